@@ -1,0 +1,1 @@
+"""Devices: choosing one, building programs for it, measuring what suits it."""

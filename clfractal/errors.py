@@ -1,0 +1,89 @@
+"""Errors a user can act on: each is one line, knows where it happened, and carries the exit status of the shell."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+# Exit statuses of the shell (sysexits are not used: scripts only need to tell "fix the input" from "fix the machine").
+STATUS_BAD_INPUT = 2
+STATUS_DEVICE_FAILED = 3
+STATUS_INTERRUPTED = 130
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """A place in the user's input: a file (or option), a position in it (both counted from 1), and a dotted path."""
+
+    file: str | None = None
+    line: int | None = None
+    column: int | None = None
+    path: str | None = None
+
+    def prefix(self) -> str:
+        """The place as `scene.yaml:12:9: camera.fov: `; empty when nothing is known."""
+        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return "".join(f"{part}: " for part in (place, self.path) if part)
+
+
+class ClfractalError(Exception):
+    """Base of every error meant for the user.
+
+    `message` is one line; `details` may hold more (a compiler's log, an excerpt) and is shown by `--verbose`.
+    """
+
+    status = STATUS_BAD_INPUT
+
+    def __init__(
+        self, message: str, where: Where | None = None, *, details: str = "", status: int | None = None
+    ) -> None:
+        self.message = " ".join(message.split())
+        self.where = where or Where()
+        self.details = details
+        if status is not None:
+            self.status = status
+        super().__init__(self.where.prefix() + self.message)
+
+
+class SceneError(ClfractalError):
+    """A scene file, or an override of one of its keys, is wrong."""
+
+
+class FormulaError(ClfractalError):
+    """A formula, one of its expressions, or a parameter of it is wrong."""
+
+
+class FileError(ClfractalError):
+    """A file cannot be read or written."""
+
+
+class DeviceError(ClfractalError):
+    """No device, an unknown one (status 2), or one that failed while running (status 3)."""
+
+    status = STATUS_DEVICE_FAILED
+
+
+class KernelBuildError(ClfractalError):
+    """A generated program does not compile: status 2 if the user's formula is at fault, 3 if our own kernel is."""
+
+    status = STATUS_DEVICE_FAILED
+
+
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """The known name that `word` was probably meant to be, or None."""
+    candidates = sorted(set(known))
+    folded = {candidate.casefold(): candidate for candidate in candidates}
+    close = difflib.get_close_matches(word.casefold(), folded, n=1, cutoff=0.5)
+    return folded[close[0]] if close else None
+
+
+def unknown_name(kind: str, word: str, known: Iterable[str]) -> str:
+    """Message text for an unknown name: `unknown key 'fow'; did you mean 'fov'?`, else the names that exist."""
+    candidates = sorted(set(known))
+    guess = nearest(word, candidates)
+    shown = word if len(word) <= 60 else word[:57] + "..."
+    if guess:
+        return f"unknown {kind} {shown!r}; did you mean {guess!r}?"
+    listing = ", ".join(candidates[:40]) if candidates else "none"
+    return f"unknown {kind} {shown!r}; known: {listing}"

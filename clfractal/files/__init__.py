@@ -1,0 +1,1 @@
+"""Files: arrays and a header to and from one format each."""

@@ -1,0 +1,1 @@
+"""Formulas: one text, read as mathematics by NumPy, mpmath and OpenCL."""

@@ -1,0 +1,22 @@
+"""Finds the data that travels with the program: kernels, scenes and the formula library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def folder(name: str) -> Path:
+    """The folder `kernels`, `scenes` or `formulas/library`.
+
+    In an installed wheel they lie inside the package; in a checkout `kernels` and `scenes` lie beside it.
+
+    Raises:
+        FileNotFoundError: the installation is incomplete.
+    """
+    for root in (_PACKAGE, _PACKAGE.parent):
+        candidate = root / name
+        if candidate.is_dir():
+            return candidate
+    raise FileNotFoundError(f"the installation lacks its folder {name!r}")
