@@ -1,0 +1,81 @@
+"""Finds, in the logs that OpenCL compilers write, what is wrong and where in our own files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from clfractal.device.source import SourceMap
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, KernelBuildError, Where
+
+# Clang's form is used by PoCL (which puts `error: ` first), Intel, AMD, Apple, Mesa and Oclgrind; NVIDIA
+# writes `<kernel>:3:5: error: ...` in the same form; the older EDG front ends write `"file", line 3: error:
+# ...`.
+_FORMS = (
+    re.compile(
+        r"^(?:error: )?(?P<file>[^\s:][^:\n]*):(?P<line>\d+):(?P<column>\d+): "
+        r"(?P<kind>(?:fatal )?error: )?(?P<text>.+)$"
+    ),
+    re.compile(
+        r'^"?(?P<file>[^",\n]+)"?, line (?P<line>\d+): (?:catastrophic )?(?P<kind>error)(?: #[\w-]+)?: '
+        r"(?P<text>.+)$"
+    ),
+    re.compile(r"^(?P<file>[^\s(:]+)\((?P<line>\d+)\): (?P<kind>error)(?: \w+)?: (?P<text>.+)$"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One error of a compiler: the file as named in `#line`, line and column (from 1), and what is wrong."""
+
+    file: str
+    line: int
+    column: int | None
+    text: str
+
+
+def diagnostics(log: str) -> list[Diagnostic]:
+    """The errors in a compiler's log, in its order; warnings and notes are left out."""
+    return list(_parse(log))
+
+
+def _parse(log: str) -> Iterator[Diagnostic]:
+    for line in log.splitlines():
+        for form in _FORMS:
+            match = form.match(line.strip())
+            if match is None:
+                continue
+            parts = match.groupdict()
+            if not parts["kind"] and not line.strip().startswith("error: "):
+                continue
+            column = parts.get("column")
+            yield Diagnostic(
+                parts["file"], int(parts["line"]), int(column) if column else None, parts["text"]
+            )
+            break
+
+
+def build_error(log: str, sources: SourceMap, device_name: str) -> KernelBuildError:
+    """The error for a program that does not compile, with the first error's place and an excerpt in its
+    details.
+
+    The status is 2 if that place lies in a text generated from the user's formula, else 3.
+    """
+    found = diagnostics(log)
+    first = next((each for each in found if each.file in sources.texts), found[0] if found else None)
+    if first is None:
+        lines = [line for line in log.splitlines() if line.strip()]
+        return KernelBuildError(
+            f"the kernel does not build on {device_name}: {lines[0].strip() if lines else 'no reason given'}",
+            details=log,
+        )
+    excerpt = sources.excerpt(first.file, first.line, first.column)
+    return KernelBuildError(
+        f"the kernel does not build on {device_name}: {first.text}",
+        Where(file=first.file, line=first.line, column=first.column),
+        details=f"{excerpt}\n\n{log}" if excerpt else log,
+        status=STATUS_BAD_INPUT
+        if first.file.removeprefix("generated/") in sources.user
+        else STATUS_DEVICE_FAILED,
+    )

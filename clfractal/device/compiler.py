@@ -1,0 +1,152 @@
+"""Builds a program in this process, and the tiny first launch that makes a driver finish its work.
+
+PoCL generates machine code only when a kernel is first enqueued, once per kernel and local size. A `Warm`
+recipe lets that happen before the binary is taken from the driver, so that the binary holds the machine code
+too.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pyopencl as cl
+
+from clfractal.device.select import Device
+
+ArgumentKind = Literal["buffer", "scalar", "bytes", "local"]
+
+
+class BuildFailureError(Exception):
+    """The compiler refused the program; the argument is its log."""
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """A kernel's argument for a first launch, as plain data.
+
+    `buffer`: a zero-filled device buffer of `size` bytes; `local`: local memory of `size` bytes; `scalar`:
+    the number `value` of NumPy type `dtype`; `bytes`: a struct by value, its bytes in hexadecimal in `dtype`.
+    """
+
+    kind: ArgumentKind
+    size: int = 0
+    dtype: str = ""
+    value: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Warm:
+    """A first launch of `kernel`: small, harmless with zero-filled buffers, of the local size used later.
+
+    PoCL also makes different code with and without a global offset (do not use one) and for a global size
+    above 65535 in a dimension.
+    """
+
+    kernel: str
+    global_size: tuple[int, ...]
+    local_size: tuple[int, ...] | None
+    arguments: tuple[Argument, ...]
+
+    def as_data(self) -> dict[str, Any]:
+        """Plain data for JSON."""
+        return {
+            "kernel": self.kernel,
+            "global_size": list(self.global_size),
+            "local_size": None if self.local_size is None else list(self.local_size),
+            "arguments": [[each.kind, each.size, each.dtype, each.value] for each in self.arguments],
+        }
+
+    @staticmethod
+    def from_data(data: Mapping[str, Any]) -> Warm:
+        """The recipe from what `as_data` gave."""
+        local = data["local_size"]
+        return Warm(
+            data["kernel"],
+            tuple(data["global_size"]),
+            None if local is None else tuple(local),
+            tuple(Argument(*each) for each in data["arguments"]),
+        )
+
+
+def compile_source(device: Device, text: str, flags: Sequence[str]) -> Any:
+    """Let the driver compile `text`; gives pyopencl's low-level program.
+
+    Raises:
+        BuildFailureError: with the compiler's log.
+        DeviceError: the driver failed otherwise.
+    """
+    with device.failures("building a program"):
+        # The low-level class: pyopencl's own keeps a second cache and leaves a copy of a failed source
+        # behind.
+        program = cl._cl._Program(device.context, text)
+        return _build(device, program, flags)
+
+
+def load_binary(device: Device, binary: bytes, flags: Sequence[str]) -> Any | None:
+    """The program from a binary that this driver gave earlier; None if the driver refuses it."""
+    try:
+        program = cl._cl._Program(device.context, [device.cl_device], [binary])
+        return _build(device, program, flags)
+    except (cl.Error, BuildFailureError):
+        return None
+
+
+def binary_of(program: Any) -> bytes:
+    """The driver's binary of a program built for one device; empty if the driver has none."""
+    try:
+        binaries = program.get_info(cl.program_info.BINARIES)
+    except cl.Error:
+        return b""
+    return bytes(binaries[0]) if binaries else b""
+
+
+def warm_up(device: Device, program: Any, warm: Warm) -> None:
+    """Perform the first launch and wait for it.
+
+    Raises:
+        DeviceError: the launch failed.
+    """
+    with device.failures(f"launching {warm.kernel} for the first time"):
+        kernel = cl.Kernel(program, warm.kernel)
+        values = [_value(device, argument) for argument in warm.arguments]
+        for index, value in enumerate(values):
+            kernel.set_arg(index, value)  # keeps no reference: `values` must outlive the launch
+        cl.enqueue_nd_range_kernel(device.queue, kernel, warm.global_size, warm.local_size).wait()
+
+
+def _value(device: Device, argument: Argument) -> Any:
+    if argument.kind == "scalar":
+        return np.dtype(argument.dtype).type(argument.value)
+    if argument.kind == "bytes":
+        return bytes.fromhex(argument.dtype)
+    if argument.kind == "local":
+        return cl.LocalMemory(argument.size)
+    zeros = np.zeros(max(argument.size, 16), np.uint8)
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    return cl.Buffer(device.context, flags, hostbuf=zeros)
+
+
+def _build(device: Device, program: Any, flags: Sequence[str]) -> Any:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore"
+            )  # pyopencl warns of any compiler output, "1 kernel built" included
+            program._build(" ".join(flags).encode(), [device.cl_device])
+    except cl.Error as error:
+        failure = cl.status_code
+        if getattr(error, "code", 0) in (failure.BUILD_PROGRAM_FAILURE, failure.COMPILE_PROGRAM_FAILURE):
+            raise BuildFailureError(_log(device, program)) from error
+        raise
+    return program
+
+
+def _log(device: Device, program: Any) -> str:
+    with contextlib.suppress(cl.Error):
+        return str(program.get_build_info(device.cl_device, cl.program_build_info.LOG)).replace("\0", "")
+    return ""

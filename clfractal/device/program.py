@@ -1,0 +1,112 @@
+"""Programs, built once: the cache's key is the whole text, the flags, the device and its driver."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pyopencl as cl
+
+from clfractal.device import cache, compiler
+from clfractal.device.buildlog import build_error
+from clfractal.device.compiler import BuildFailureError, Warm
+from clfractal.device.select import Device
+from clfractal.device.source import SourceMap
+from clfractal.device.structs import Precision
+
+_FORMAT = 1  # of what is kept under a key
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A built program. `build_ms` is the time that `build` took, whether it compiled or found a binary."""
+
+    device: Device
+    cl_program: Any
+    build_ms: float
+    cached: bool
+
+    def kernel(self, name: str) -> cl.Kernel:
+        """A new kernel object, with its own arguments.
+
+        Raises:
+            DeviceError: the program has no kernel of that name.
+        """
+        with self.device.failures(f"making the kernel {name}"):
+            return cl.Kernel(self.cl_program, name)
+
+
+def math_flags(precision: Precision) -> tuple[str, ...]:
+    """What compilers may assume, by number type. None lets them assume that numbers are finite.
+
+    float32 may fuse a*b+c with either rounding, and denormal numbers, which no picture shows, may become
+    zero. float64 must keep them apart: it exists for small differences.
+    """
+    flags: dict[Precision, tuple[str, ...]] = {
+        "float32": ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-denorms-are-zero"),
+        "float64": ("-cl-std=CL1.2", "-cl-mad-enable"),
+    }
+    return flags[precision]
+
+
+def build(
+    device: Device,
+    text: str,
+    *,
+    flags: Sequence[str],
+    sources: SourceMap | None = None,
+    warm: Warm | None = None,
+    isolated: bool = True,
+) -> Program:
+    """The program of one flat text, from the cache or the driver's compiler.
+
+    Args:
+        device: where it shall run.
+        text: the whole program, with `#line` directives (see `source.flatten`).
+        flags: all compiler flags (see `math_flags`).
+        sources: the texts that the `#line` directives name, for messages.
+        warm: a first launch to perform before the binary is kept, so that later runs start at once.
+        isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
+            an
+            interrupt is answered at once.
+
+    Raises:
+        KernelBuildError: the program does not compile, with our file, line and an excerpt.
+        DeviceError: the driver failed or aborted.
+    """
+    start = time.perf_counter()
+    key = _key(device, text, flags, warm)
+    binary = cache.load_blob(key)
+    if binary is not None:
+        program = compiler.load_binary(device, binary, flags)
+        if program is not None:
+            return Program(device, program, _milliseconds(start), cached=True)
+        cache.drop_blob(key)
+    try:
+        program = _compile(device, text, flags, warm, key)
+    except BuildFailureError as failure:
+        raise build_error(str(failure), sources or SourceMap(), device.info.name) from None
+    return Program(device, program, _milliseconds(start), cached=False)
+
+
+def _compile(device: Device, text: str, flags: Sequence[str], warm: Warm | None, key: str) -> Any:
+    program = compiler.compile_source(device, text, flags)
+    if warm is not None:
+        compiler.warm_up(device, program, warm)
+    binary = compiler.binary_of(program)
+    if binary:
+        cache.store_blob(key, binary)
+    return program
+
+
+def _key(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> str:
+    # Of the first launch only what the driver generates code for: its arguments' values change from scene to
+    # scene.
+    launch = (warm.kernel, warm.local_size) if warm is not None else None
+    return cache.key_of(_FORMAT, device.info.key, list(flags), launch, text)
+
+
+def _milliseconds(start: float) -> float:
+    return 1e3 * (time.perf_counter() - start)

@@ -1,0 +1,335 @@
+"""Which OpenCL devices there are, what is peculiar about each, and which one to take.
+
+`Device` wraps a device with its context and queue, so that only code that owns buffers has to import
+pyopencl.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import pyopencl as cl
+
+from clfractal.device import cache
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, unknown_name
+
+ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
+SPEEDS = "speeds"  # section of the cache: rays per second or the like, by `DeviceInfo.key`
+
+Kind = Literal["cpu", "gpu", "accelerator"]
+
+_INSTALL_HINT = (
+    "no OpenCL device; install one that runs on the processor with `pip install pocl-binary-distribution`, "
+    "or your GPU's OpenCL driver"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceInfo:
+    """What is known of a device without opening it. Memory is in bytes."""
+
+    index: str
+    """Platform and device number as in `--device 0:0`, both counted from 0 in the loader's order."""
+    name: str
+    platform: str
+    version: str
+    """The platform's version text, which for CPU runtimes names the compiler too."""
+    driver: str
+    kind: Kind
+    memory: int
+    max_alloc: int
+    has_float64: bool
+    gl_sharing: bool
+    compute_units: int
+    target: str
+    """The device's own version text; PoCL names the processor it generates code for in it."""
+
+    @property
+    def key(self) -> str:
+        """Names this device with this driver in caches: a new driver or processor gives a new key."""
+        return " | ".join((self.platform, self.version, self.name, self.target, self.driver))
+
+
+class Device:
+    """An OpenCL device; context and command queue (in order, profiling on) are made when first needed."""
+
+    def __init__(self, info: DeviceInfo, cl_device: cl.Device) -> None:
+        self.info = info
+        self.cl_device = cl_device
+
+    def __repr__(self) -> str:
+        return f"Device({self.info.index} {self.info.name!r})"
+
+    @cached_property
+    def context(self) -> cl.Context:
+        with self.failures("opening the device"):
+            return cl.Context([self.cl_device])
+
+    @cached_property
+    def queue(self) -> cl.CommandQueue:
+        with self.failures("opening the device"):
+            return cl.CommandQueue(self.context, properties=cl.command_queue_properties.PROFILING_ENABLE)
+
+    def buffer(self, nbytes: int, what: str, *, read_only: bool = False) -> cl.Buffer:
+        """Allocate `nbytes` of device memory for `what` (used in the message).
+
+        Raises:
+            DeviceError: status 2, with the memory needed and had, when it does not fit.
+        """
+        self.check_memory(nbytes, what, largest=nbytes)
+        flags = cl.mem_flags.READ_ONLY if read_only else cl.mem_flags.READ_WRITE
+        with self.failures(f"allocating {what}", need=nbytes):
+            return cl.Buffer(self.context, flags, max(int(nbytes), 16))
+
+    def check_memory(self, total: int, what: str, *, largest: int = 0) -> None:
+        """Refuse work whose buffers, `total` bytes and the `largest` of them, cannot fit on the device.
+
+        Raises:
+            DeviceError: status 2, with the memory needed and had.
+        """
+        for need, have, limit in (
+            (total, self.info.memory, "memory"),
+            (largest, self.info.max_alloc, "memory for one buffer"),
+        ):
+            if need > have:
+                raise DeviceError(
+                    f"{what} needs {_size(need)} of device memory, "
+                    f"{self.info.name} has {_size(have)} of {limit}",
+                    status=STATUS_BAD_INPUT,
+                )
+
+    @contextmanager
+    def failures(self, doing: str, *, need: int | None = None) -> Iterator[None]:
+        """Turn pyopencl's exceptions into DeviceError: status 2 for want of memory, else 3."""
+        try:
+            yield
+        except cl.Error as error:
+            name = self.info.name
+            if is_out_of_memory(error):
+                wanted = f"{_size(need)} are needed, " if need is not None else ""
+                raise DeviceError(
+                    f"{name}: out of device memory while {doing}: "
+                    f"{wanted}{_size(self.info.memory)} are there",
+                    details=str(error),
+                    status=STATUS_BAD_INPUT,
+                ) from error
+            raise DeviceError(
+                f"{name}: the device failed while {doing}: {error_code(error)}", details=str(error)
+            ) from error
+
+
+def devices() -> list[DeviceInfo]:
+    """Every OpenCL device, in the loader's order; an empty list if there is none."""
+    return [device.info for device in _find()]
+
+
+def choose(spec: str | None = None) -> Device:
+    """The device that `spec` names, else the environment variable CLFRACTAL_DEVICE, else the best one.
+
+    `spec` is `cpu`, `gpu`, `accelerator`, indices `PLATFORM:DEVICE`, or part of a device's or platform's name
+    (of its version, if no name fits), in any case of letters. Where several fit, the best is taken.
+
+    Raises:
+        DeviceError: status 2 if nothing fits `spec`; status 3 if there is no device at all.
+    """
+    found = _find()
+    if not found:
+        raise DeviceError(_INSTALL_HINT)
+    spec = (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
+    fitting = _fitting(found, spec)
+    if not fitting:
+        raise _nothing_fits(found, spec)
+    speeds = cache.recall(SPEEDS)
+    if any(device.info.key not in speeds for device in fitting):
+        speeds = {}  # a measured device beside one that was never measured says nothing
+    return max(fitting, key=lambda device: _score(device.info, speeds))
+
+
+def is_simulator(info: DeviceInfo) -> bool:
+    """Oclgrind interprets every instruction, some 10,000 times slower: only taken when asked for by name."""
+    return "oclgrind" in f"{info.platform} {info.name}".casefold()
+
+
+def is_pocl(info: DeviceInfo) -> bool:
+    """PoCL's CPU and GPU devices."""
+    return info.platform == "Portable Computing Language"
+
+
+def is_intel_cpu(info: DeviceInfo) -> bool:
+    """Intel's CPU runtime, which prefixes its platform and devices alike with `Intel(R)`."""
+    return info.kind == "cpu" and info.platform.startswith("Intel(R)")
+
+
+def has_float64(info: DeviceInfo) -> bool:
+    """Whether `double` works: its capabilities are non-zero, or the extension is named."""
+    return info.has_float64
+
+
+def vectorises_across_work_items(info: DeviceInfo) -> bool:
+    """Whether neighbouring work-items share a vector unit even where their loops part ways.
+
+    GPUs do so by construction and Intel's compiler with masks; PoCL's work-group vectoriser gives up on a
+    loop whose trip count differs between work-items (one ray an item runs 6 to 9 times slower there than
+    eight).
+    """
+    return info.kind == "gpu" or is_intel_cpu(info)
+
+
+def is_out_of_memory(error: cl.Error) -> bool:
+    """Whether a failure means that memory is short: drivers use any of four codes for it."""
+    status = cl.status_code
+    return error_number(error) in {
+        status.MEM_OBJECT_ALLOCATION_FAILURE,
+        status.OUT_OF_RESOURCES,
+        status.OUT_OF_HOST_MEMORY,
+        status.INVALID_BUFFER_SIZE,
+    }
+
+
+def error_number(error: cl.Error) -> int:
+    """The OpenCL status code of a failure."""
+    return int(getattr(error, "code", 0))
+
+
+def error_code(error: cl.Error) -> str:
+    """Routine and status of a failure as one short text, e.g. `clEnqueueNDRangeKernel: OUT_OF_RESOURCES`."""
+    routine = getattr(error, "routine", "") or "OpenCL"
+    return f"{routine}: {_status_name(error_number(error))}"
+
+
+def _status_name(number: int) -> str:
+    to_string: Any = cl.status_code.to_string
+    return str(to_string(number, "status %d"))
+
+
+def _find() -> list[Device]:
+    found: list[Device] = []
+    seen: set[int] = set()
+    try:
+        platforms = cl.get_platforms()
+    except cl.Error:  # PLATFORM_NOT_FOUND_KHR: the loader found no driver
+        return []
+    for platform_index, platform in enumerate(platforms):
+        try:
+            cl_devices = platform.get_devices()
+        except cl.Error:  # a driver without its hardware
+            continue
+        for device_index, cl_device in enumerate(cl_devices):
+            # The same driver may be registered twice (the wheel's PoCL by itself and through
+            # OCL_ICD_VENDORS).
+            if cl_device.int_ptr not in seen:
+                seen.add(cl_device.int_ptr)
+                found.append(
+                    Device(_describe(f"{platform_index}:{device_index}", platform, cl_device), cl_device)
+                )
+    return found
+
+
+def _describe(index: str, platform: cl.Platform, device: cl.Device) -> DeviceInfo:
+    extensions = set(device.extensions.split())
+    return DeviceInfo(
+        index=index,
+        name=_tidy(device.name),
+        platform=_tidy(platform.name),
+        version=_tidy(platform.version),
+        driver=_tidy(device.driver_version),
+        kind=_kind(device),
+        memory=int(device.global_mem_size),
+        max_alloc=int(device.max_mem_alloc_size),
+        has_float64=_double_capabilities(device) != 0 or "cl_khr_fp64" in extensions,
+        gl_sharing="cl_khr_gl_sharing" in extensions and bool(cl.have_gl()),
+        compute_units=int(device.max_compute_units),
+        target=_tidy(device.version),
+    )
+
+
+def _kind(device: cl.Device) -> Kind:
+    # Oclgrind says it is every type at once, so the processor is asked for first.
+    kinds: tuple[tuple[Any, Kind], ...] = (
+        (cl.device_type.CPU, "cpu"),
+        (cl.device_type.GPU, "gpu"),
+    )
+    for bit, kind in kinds:
+        if int(device.type) & int(bit):
+            return kind
+    return "accelerator"
+
+
+def _double_capabilities(device: cl.Device) -> int:
+    try:
+        return int(device.double_fp_config)
+    except (cl.Error, AttributeError):  # the question is unknown to OpenCL 1.1 drivers
+        return 0
+
+
+def _tidy(text: str) -> str:
+    return " ".join(text.replace("\0", " ").split())
+
+
+def _fitting(found: list[Device], spec: str) -> list[Device]:
+    wanted = spec.casefold()
+    if not wanted:
+        return [device for device in found if not is_simulator(device.info)]
+    if re.fullmatch(r"\d+:\d+", wanted):
+        return [device for device in found if device.info.index == wanted]
+    if wanted in ("cpu", "gpu", "accelerator"):
+        return [device for device in found if device.info.kind == wanted and not is_simulator(device.info)]
+    for text in (_names, _versions):
+        fitting = [device for device in found if wanted in text(device.info).casefold()]
+        if fitting:
+            return fitting
+    return []
+
+
+def _names(info: DeviceInfo) -> str:
+    return f"{info.name}\n{info.platform}"
+
+
+def _versions(info: DeviceInfo) -> str:
+    return f"{info.version}\n{info.target}\n{info.driver}"
+
+
+def _nothing_fits(found: list[Device], spec: str) -> DeviceError:
+    there = "; ".join(f"{device.info.index} {device.info.name} ({device.info.platform})" for device in found)
+    if not spec:
+        return DeviceError(
+            f"{_INSTALL_HINT}; only a simulator is there: {there}", status=STATUS_DEVICE_FAILED
+        )
+    if re.fullmatch(r"\d+:\d+", spec) or spec.casefold() in ("cpu", "gpu", "accelerator"):
+        return DeviceError(f"no device {spec!r}; there are: {there}", status=STATUS_BAD_INPUT)
+    words = {word for device in found for word in _names(device.info).split()}
+    guess = unknown_name("device", spec, words)
+    if "did you mean" in guess:
+        return DeviceError(f"{guess.rstrip('?')}, in {there}?", status=STATUS_BAD_INPUT)
+    return DeviceError(f"unknown device {spec[:60]!r}; there are: {there}", status=STATUS_BAD_INPUT)
+
+
+def _score(info: DeviceInfo, speeds: dict[str, Any]) -> tuple[Any, ...]:
+    """Larger is better: GPU, then measured speed, then what was fastest where it was measured."""
+    measured = speeds.get(info.key)
+    speed = float(measured) if isinstance(measured, (int, float)) else 0.0
+    runtime = 2 if is_intel_cpu(info) else 1 if is_pocl(info) else 0
+    return (
+        not is_simulator(info),
+        {"gpu": 2, "cpu": 1, "accelerator": 0}[info.kind],
+        speed,
+        runtime,
+        _version_numbers(info.version),
+        info.compute_units,
+    )
+
+
+def _version_numbers(version: str) -> tuple[int, ...]:
+    """The runtime's own version: `OpenCL 3.0 PoCL 3.1+debian` gives (3, 1), `OpenCL 3.1 LINUX` too."""
+    match = re.search(r"PoCL (\d+(?:\.\d+)*)", version) or re.search(r"OpenCL (\d+(?:\.\d+)*)", version)
+    return tuple(int(number) for number in match.group(1).split(".")) if match else ()
+
+
+def _size(nbytes: int) -> str:
+    return f"{nbytes / 2**30:.1f} GiB" if nbytes >= 2**30 else f"{nbytes / 2**20:.1f} MiB"

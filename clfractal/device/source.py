@@ -1,0 +1,124 @@
+"""One flat OpenCL C text out of an entry point, its headers and generated parts, with every line's origin
+kept.
+
+Drivers disagree about include paths and cache by file name, so they are given a single text; `#line`
+directives make their messages speak of the files that were written by hand.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from clfractal.errors import KernelBuildError, Where, nearest
+from clfractal.resources import folder
+
+_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))')
+
+
+@dataclass(frozen=True, slots=True)
+class SourceMap:
+    """The texts a program was made of, by the names used in its `#line` directives."""
+
+    texts: Mapping[str, str] = field(default_factory=dict)
+    user: frozenset[str] = frozenset()
+    """Names of texts generated from the user's formula: if they do not compile, the status is 2."""
+
+    def excerpt(self, name: str, line: int, column: int | None = None) -> str:
+        """The line (from 1) between its neighbours, numbered, with a caret under the column; or ''."""
+        lines = self.texts.get(name, "").splitlines()
+        if not 1 <= line <= len(lines):
+            return ""
+        shown: list[str] = []
+        for number in range(max(1, line - 1), min(len(lines), line + 1) + 1):
+            text = lines[number - 1].expandtabs(4)
+            shown.append(f"{number:5d} | {text}")
+            if number == line and column is not None and column >= 1:
+                prefix = len(lines[number - 1][: column - 1].expandtabs(4))
+                shown.append(" " * 5 + " | " + " " * prefix + "^")
+        return "\n".join(shown)
+
+
+@dataclass(frozen=True, slots=True)
+class FlatText:
+    """The text for the driver and where its lines come from."""
+
+    text: str
+    sources: SourceMap
+
+
+def flatten(
+    entry: str,
+    *,
+    generated: Mapping[str, str] | None = None,
+    defines: Mapping[str, object] | None = None,
+    user: Collection[str] = (),
+    kernels: Path | None = None,
+) -> FlatText:
+    """Put `entry` and all it includes into one text.
+
+    Args:
+        entry: a file of the kernels folder (`surface.cl`) or the name of a generated text.
+        generated: texts that may be included by their names (`formula.h`); they go before files of the same
+            name.
+        defines: names and values written as `#define` lines at the head of the text.
+        user: the generated texts that come from the user's formula.
+        kernels: another folder than the one that travels with the program.
+
+    Every text is taken in once, where it is first included: includes must not depend on `#if`. Quoted
+    includes are looked for beside the including file, then in the kernels folder.
+
+    Raises:
+        KernelBuildError: an include cannot be found or is not quoted, with its file and line.
+    """
+    flattener = _Flattener(kernels or folder("kernels"), dict(generated or {}))
+    for name, value in (defines or {}).items():
+        flattener.lines.append(f"#define {name} {value}")
+    flattener.add(entry, Where())
+    return FlatText("\n".join(flattener.lines) + "\n", SourceMap(flattener.texts, frozenset(user)))
+
+
+class _Flattener:
+    def __init__(self, kernels: Path, generated: dict[str, str]) -> None:
+        self.kernels = kernels
+        self.generated = generated
+        self.lines: list[str] = []
+        self.texts: dict[str, str] = {}
+
+    def add(self, name: str, where: Where, beside: str = "") -> None:
+        shown, text = self._find(name, where, beside)
+        if shown in self.texts:
+            return
+        self.texts[shown] = text
+        self.lines.append(f'#line 1 "{shown}"')
+        for number, line in enumerate(text.splitlines(), start=1):
+            include = _INCLUDE.match(line)
+            if include is None:
+                self.lines.append(line)
+                continue
+            place = Where(file=shown, line=number)
+            if include["name"] is None:
+                raise KernelBuildError(
+                    f'only #include "..." is possible, got {include["other"].strip()!r}', place
+                )
+            self.add(include["name"], place, beside=shown)
+            self.lines.append(f'#line {number + 1} "{shown}"')
+
+    def _find(self, name: str, where: Where, beside: str) -> tuple[str, str]:
+        if name in self.generated:
+            return f"generated/{name}", self.generated[name]
+        folders = [self.kernels]
+        if beside.startswith("kernels/"):
+            folders.insert(0, (self.kernels / beside.removeprefix("kernels/")).parent)
+        root = self.kernels.resolve()
+        for candidate in ((base / name).resolve() for base in folders):
+            if candidate.is_relative_to(root) and candidate.is_file():
+                return f"kernels/{candidate.relative_to(root).as_posix()}", candidate.read_text(
+                    encoding="utf-8"
+                )
+        there = [path.relative_to(root).as_posix() for path in root.rglob("*.[ch]*")] + list(self.generated)
+        guess = nearest(name, there)
+        hint = f"; did you mean {guess!r}?" if guess else ""
+        raise KernelBuildError(f"there is no kernel file {name!r}{hint}", where)
