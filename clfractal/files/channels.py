@@ -1,0 +1,68 @@
+"""The channels a picture may have: one table for scenes, films and files."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from clfractal.errors import SceneError, Where, unknown_name
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One named plane of numbers.
+
+    `kind`: `color` channels are averaged over a pixel's samples, `data` channels take the sample nearest to
+    its centre.
+    `precision`: how an EXR file stores it unless the scene says otherwise.
+    `fill`: the value where nothing is hit, and of pixels not rendered.
+    """
+
+    name: str
+    kind: Literal["color", "data"]
+    precision: Literal["half", "float"]
+    fill: float
+    description: str
+
+
+_TABLE = (
+    Channel("R", "color", "half", 0.0, "red, linear Rec. 709"),
+    Channel("G", "color", "half", 0.0, "green, linear Rec. 709"),
+    Channel("B", "color", "half", 0.0, "blue, linear Rec. 709"),
+    Channel("A", "color", "half", 0.0, "coverage, 0 to 1"),
+    Channel("Z", "data", "float", math.inf, "distance along the view axis, scene units; inf where no hit"),
+    Channel("N.X", "data", "half", 0.0, "surface normal, x; 0 where nothing is hit"),
+    Channel("N.Y", "data", "half", 0.0, "surface normal, y"),
+    Channel("N.Z", "data", "half", 0.0, "surface normal, z"),
+    Channel("P.X", "data", "float", 0.0, "point hit, x, scene units; 0 where nothing is hit"),
+    Channel("P.Y", "data", "float", 0.0, "point hit, y, scene units"),
+    Channel("P.Z", "data", "float", 0.0, "point hit, z, scene units"),
+    Channel("iterations", "data", "float", 0.0, "smooth escape count"),
+    Channel("steps", "data", "float", 0.0, "distance evaluations of the ray"),
+)
+
+CHANNELS: dict[str, Channel] = {channel.name: channel for channel in _TABLE}
+"""Every channel by name, in the order in which pictures list them."""
+
+DEFAULT_CHANNELS: tuple[str, ...] = ("R", "G", "B", "A", "Z")
+"""What a picture holds unless the scene's `output.channels` says otherwise."""
+
+
+def check_channels(names: Iterable[str], where: Where | None = None) -> tuple[str, ...]:
+    """The names as a tuple, in the given order.
+
+    Raises:
+        SceneError: no name, an unknown one (with the nearest known), or one given twice.
+    """
+    chosen: list[str] = []
+    for name in names:
+        if name not in CHANNELS:
+            raise SceneError(unknown_name("channel", str(name), CHANNELS), where)
+        if name in chosen:
+            raise SceneError(f"channel {name!r} is given twice", where)
+        chosen.append(name)
+    if not chosen:
+        raise SceneError("a picture needs at least one channel", where)
+    return tuple(chosen)

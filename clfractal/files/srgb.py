@@ -1,0 +1,94 @@
+"""Linear light to and from the numbers a screen wants: the sRGB transfer function, IEC 61966-2-1, clause 5.2.
+
+Eight bits are too few for a smooth dark gradient: rounding alone would show it as bands. So the rounding to 8 bits is
+dithered with a fixed pattern that depends on the pixel's place in the picture only: a crop of a picture equals the
+crop's own render. A value that 8 bits hold exactly stays what it is.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float32]
+
+# The table for 8 bits is indexed by the leading bits of the float itself (exponent and 13 bits of the fraction):
+# equally fine, relative to the value, in the shadows and in the lights, and no arithmetic is spent on the index.
+_SHIFT = 23 - 13
+_LOWEST = int(np.float32(2.0**-16).view(np.int32)) >> _SHIFT  # below: code 0.05 of 255, taken as 0
+_ONE = int(np.float32(1.0).view(np.int32)) >> _SHIFT
+
+
+def encode(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Linear light, 0 to 1, to the sRGB code value, 0 to 1."""
+    small = linear <= 0.0031308
+    return np.where(small, 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def decode(code: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """sRGB code value, 0 to 1, to linear light, 0 to 1."""
+    return np.where(code <= 0.04045, code / 12.92, ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4)
+
+
+@cache
+def _table8() -> npt.NDArray[np.uint16]:
+    """Code values in 1/256 of an 8-bit step (0 to 65280) for every index from `_LOWEST` to `_ONE`."""
+    index = np.arange(_LOWEST, _ONE + 1, dtype=np.int32)
+    # The middle of the interval of floats that share an index, but 1 itself for the last one.
+    middle = ((index << _SHIFT) + (1 << (_SHIFT - 1))).view(np.float32).astype(np.float64)
+    table = np.rint(encode(np.minimum(middle, 1.0)) * 255 * 256).astype(np.uint16)
+    table[0] = 0
+    return table
+
+
+@cache
+def _pattern(columns: int, components: int, left: int) -> npt.NDArray[np.uint16]:
+    """Bayer's 16 x 16 ordered dither (Bayer 1973): thresholds for 32 rows, from column `left` of the pattern on.
+
+    The thresholds, 4 to 251 of 256, keep away from both ends by more than the table's error of 2 at most, so
+    exact values stay exact. They are repeated for each component because adding arrays of one shape is faster.
+    """
+    order = np.zeros((1, 1), dtype=np.int64)
+    for _ in range(4):
+        order = np.block([[4 * order, 4 * order + 2], [4 * order + 3, 4 * order + 1]])
+    thresholds = 4 + order * 248 // 256
+    wide = thresholds[np.arange(32) % 16][:, (np.arange(columns) + left) % 16]
+    return np.repeat(wide[:, :, None], components, axis=2).astype(np.uint16)
+
+
+def encode8(linear: Floats, *, origin: tuple[int, int] = (0, 0)) -> npt.NDArray[np.uint8]:
+    """Linear light to dithered 8-bit sRGB.
+
+    Args:
+        linear: shape (rows, columns, components); values are limited to 0..1, NaN counts as 0.
+        origin: the picture coordinates (x, y) of the first pixel, which fix the dither pattern.
+    """
+    rows, columns, components = linear.shape
+    pattern = _pattern(columns, components, origin[0] % 16)
+    result = np.empty(linear.shape, dtype=np.uint8)
+    # In pieces of at most 16 rows, which stay in the processor's cache.
+    for first in range(0, rows, 16):
+        last = min(first + 16, rows)
+        index = np.fmax(linear[first:last], np.float32(0)).view(np.int32)
+        np.right_shift(index, _SHIFT, out=index)
+        np.clip(index, _LOWEST, _ONE, out=index)
+        index -= _LOWEST
+        code = _table8().take(index)
+        top = (origin[1] + first) % 16
+        code += pattern[top : top + last - first]
+        code >>= 8
+        result[first:last] = code
+    return result
+
+
+def encode16(linear: Floats) -> npt.NDArray[np.uint16]:
+    """Linear light to 16-bit sRGB, rounded to nearest; values are limited to 0..1, NaN counts as 0."""
+    limited = np.fmin(np.fmax(linear, np.float32(0)), np.float32(1))
+    small = limited <= np.float32(0.0031308)
+    code = np.maximum(limited, np.float32(0.0031308)) ** np.float32(1 / 2.4)
+    code *= np.float32(1.055 * 65535)
+    code -= np.float32(0.055 * 65535)
+    np.multiply(limited, np.float32(12.92 * 65535), out=code, where=small)
+    return np.rint(code).astype(np.uint16)

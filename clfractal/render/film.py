@@ -1,0 +1,180 @@
+"""The film: finished tiles become named channels, in memory; `store.py` has the one that lies on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.errors import unknown_name
+from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
+from clfractal.render.tiles import TILE, Region, Tile, TileGrid
+
+Floats = npt.NDArray[np.float32]
+Bands = Iterator[tuple[int, dict[str, Floats]]]
+
+
+class TiledStore(Protocol):
+    """Where the engine puts finished tiles and from where files are written."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels, in the order of a tile's first axis."""
+
+    @property
+    def display(self) -> tuple[int, int]:
+        """Width and height of the whole picture, in pixels."""
+
+    @property
+    def region(self) -> Region:
+        """The part of the picture that the store holds."""
+
+    @property
+    def grid(self) -> TileGrid:
+        """The tiles of the region."""
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What files tell about the picture; see `Film`."""
+
+    @property
+    def done(self) -> npt.NDArray[np.bool_]:
+        """For each tile whether it is there; not to be written to."""
+
+    def put(self, tile_index: int, array: Floats) -> None:
+        """Stores a tile: float32 of shape (channels, rows, columns), cut to the region as `grid.tile` is."""
+
+    def bands(self) -> Bands:
+        """The picture from top to bottom, one row of tiles at a time.
+
+        Gives (first_row, channel name -> float32 of shape (rows, region width)); first_row in picture
+        coordinates. Pixels of missing tiles have the channel's fill value.
+        """
+
+
+def check_tile(array: Floats, tile: Tile, channels: Sequence[str]) -> None:
+    """Raises ValueError if an array does not fit its tile: a mistake of the program, not of the user."""
+    expected = (len(channels), tile.height, tile.width)
+    if array.shape != expected:
+        raise ValueError(f"tile {tile.index} needs shape {expected}, got {array.shape}")
+
+
+class Film:
+    """A picture in memory: `film["R"]` is a float32 array of shape (height, width) of the region.
+
+    R, G, B are linear Rec. 709; if the background is transparent they are premultiplied by A.
+    `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, and `worldToCamera` and
+    `worldToNDC`, 4 x 4 matrices for row vectors (point_camera = [x, y, z, 1] @ matrix: the translation is the
+    last row), as OpenEXR's standard attributes want them.
+
+    Raises:
+        SceneError: an unknown channel name.
+        ValueError: the region is not inside the picture.
+    """
+
+    def __init__(
+        self,
+        channels: Sequence[str] = DEFAULT_CHANNELS,
+        display: tuple[int, int] = (1, 1),
+        region: Region | None = None,
+        header: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.channels: tuple[str, ...] = check_channels(channels)
+        self.display = display
+        self.region = region or Region(0, 0, *display)
+        if not self.region.inside(*display):
+            raise ValueError(f"{self.region} is not inside a picture of {display[0]} x {display[1]}")
+        self.grid = TileGrid(self.region)
+        self.header: dict[str, Any] = dict(header or {})
+        shape = (self.region.height, self.region.width)
+        self._planes = {name: np.full(shape, CHANNELS[name].fill, np.float32) for name in self.channels}
+        self._done = np.zeros(self.grid.count, dtype=np.bool_)
+
+    @property
+    def width(self) -> int:
+        """Width of the region, in pixels."""
+        return self.region.width
+
+    @property
+    def height(self) -> int:
+        """Height of the region, in pixels."""
+        return self.region.height
+
+    @property
+    def done(self) -> npt.NDArray[np.bool_]:
+        """For each tile whether it is there."""
+        return self._done
+
+    def __getitem__(self, name: str) -> Floats:
+        """One channel, shape (height, width).
+
+        Raises:
+            KeyError: the film has no such channel.
+        """
+        try:
+            return self._planes[name]
+        except KeyError:
+            raise KeyError(unknown_name("channel", name, self.channels)) from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._planes
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.channels)
+
+    def __repr__(self) -> str:
+        part = "" if self.region == Region(0, 0, *self.display) else f", {self.region}"
+        size = f"{self.display[0]}x{self.display[1]}"
+        return f"<Film {size}{part}, channels {' '.join(self.channels)}, {self._done.mean():.0%} done>"
+
+    def put(self, tile_index: int, array: Floats) -> None:
+        """Stores a tile: float32 of shape (channels, rows, columns)."""
+        tile = self.grid.tile(tile_index)
+        check_tile(array, tile, self.channels)
+        top, left = tile.y - self.region.y, tile.x - self.region.x
+        for plane, name in zip(array, self.channels, strict=True):
+            self._planes[name][top : top + tile.height, left : left + tile.width] = plane
+        self._done[tile_index] = True
+
+    def bands(self) -> Bands:
+        """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows)."""
+        row = self.region.y
+        while row < self.region.bottom:
+            end = min((row // TILE + 1) * TILE, self.region.bottom)
+            part = slice(row - self.region.y, end - self.region.y)
+            yield row, {name: plane[part] for name, plane in self._planes.items()}
+            row = end
+
+    def save(self, path: str | Path, **settings: Any) -> None:
+        """Writes an `.exr` or `.png` file; settings as in `store.save_outputs`.
+
+        Raises:
+            FileError: it cannot be written.
+        """
+        from clfractal.render.store import save_outputs
+
+        save_outputs(self, [path], **settings)
+
+    def to_rgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
+        """The picture as a screen shows it: sRGB, uint8 of shape (height, width, 3); exposure in stops.
+
+        Raises:
+            KeyError: the film has no R, G, B.
+        """
+        from clfractal.files.srgb import encode8
+
+        linear = np.stack([self["R"], self["G"], self["B"]], axis=-1)
+        if exposure:
+            linear *= np.float32(2.0**exposure)
+        return encode8(linear, origin=(self.region.x, self.region.y))
+
+    def _repr_png_(self) -> bytes | None:
+        """What a notebook shows; None (the text form instead) if there are no colours."""
+        if not {"R", "G", "B"} <= set(self.channels):
+            return None
+        from clfractal.render.store import png_bytes
+
+        return png_bytes(self)
