@@ -1,0 +1,300 @@
+"""Finds formulas: in the library, in a file, in a scene; and turns what a scene says into a chain."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from clfractal.errors import FileError, FormulaError, Where, unknown_name
+from clfractal.formulas.binding import bind, check_radius
+from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_from_mapping
+from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
+from clfractal.formulas.evaluate import evaluate_constant
+from clfractal.formulas.model import Formula, inside
+from clfractal.resources import folder
+
+_SOURCES = ("name", "file", "inline", "chain")
+_OPTIONS = ("parameters", "julia", "bailout", "distance_bailout")
+_IGNORED = ("iterations",)
+_CHAIN_KEYS = (
+    *("title", "reference", "description", "chain", "bounds", "bailout", "distance_bailout"),
+    "step_scale",
+)
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """The library's names, sorted: formulas and chains."""
+    return tuple(sorted(path.stem for path in folder("formulas/library").glob("*.yaml")))
+
+
+@cache
+def description(name: str) -> Mapping[str, Any]:
+    """A library file as plain data; FormulaError with the nearest name for one that does not exist."""
+    if name not in names():
+        raise FormulaError(unknown_name("formula", name, names()))
+    return _read(folder("formulas/library") / f"{name}.yaml", f"{name}.yaml")[0]
+
+
+def is_chain(name: str) -> bool:
+    """Whether a library name is a chain rather than a single formula."""
+    return "chain" in description(name)
+
+
+@cache
+def load(name: str) -> Formula:
+    """A formula of the library; FormulaError for an unknown name, or the name of a chain."""
+    data = description(name)
+    if "chain" in data:
+        raise FormulaError(f"{name!r} is a chain of formulas, not a single one")
+    return formula_from_mapping(data, Where(f"{name}.yaml"), name=name)
+
+
+def load_file(path: str | Path, *, shown: str | None = None) -> Formula:
+    """A formula from a file.
+
+    Raises:
+        FormulaError: the file's content is wrong, with line and column; or it holds a chain.
+        FileError: it cannot be read.
+    """
+    data, document = _read(Path(path), shown or str(path))
+    if "chain" in data:
+        raise FormulaError("holds a chain of formulas, not a single one", Where(shown or str(path)))
+    try:
+        return formula_from_mapping(data, Where(), name=Path(path).stem)
+    except FormulaError as error:
+        raise document.locate(error) from None
+
+
+def load_chain(spec: str | Mapping[str, Any], base_folder: Path | None = None) -> Chain:
+    """The chain of a library name or of what a scene says (see `resolve`)."""
+    return resolve({"name": spec} if isinstance(spec, str) else spec, base_folder)
+
+
+def resolve(spec: Mapping[str, Any], base_folder: Path | None = None, where: Where | None = None) -> Chain:
+    """The chain that a scene's `formula` section describes.
+
+    Args:
+        spec: one of `name` (of the library), `file`, `inline` (a formula's mapping), `chain` (a list of such mappings,
+            each with a `count`), and `parameters`, `julia`, `bailout`, `distance_bailout`. For a chain `julia` goes to
+            every link that adds the point, `parameters` is not allowed.
+        base_folder: the folder that `file` is relative to and must stay in; None: files are not allowed.
+        where: where the section stands; errors add the path below it, and the column inside an expression.
+
+    Raises:
+        FormulaError: anything wrong in the section or in a formula.
+        FileError: a file that cannot be read, or lies outside the folder.
+    """
+    return _Resolver(base_folder).chain(spec, where or Where())
+
+
+class _Resolver:
+    """Resolves one section; files are read relative to one folder."""
+
+    def __init__(self, base_folder: Path | None) -> None:
+        self.base_folder = base_folder
+
+    def chain(self, spec: Mapping[str, Any], where: Where) -> Chain:
+        key = _source_key(spec, where, (*_OPTIONS, *_IGNORED))
+        data, place, source = self._data(key, spec, where)
+        if "chain" not in data:
+            link = self._link(spec, where, data, place, source)
+            return Chain((link,), title=link.bound.formula.title, source={**source, **_options(spec)})
+        if spec.get("parameters"):
+            message = "a chain has no parameters of its own; give them to its formulas"
+            raise FormulaError(message, inside(where, "parameters"))
+        return self._links(spec, where, data, place, key)
+
+    def _data(
+        self, key: str, spec: Mapping[str, Any], where: Where
+    ) -> tuple[Mapping[str, Any], Where, Mapping[str, Any]]:
+        """The file's mapping, where it stands, and the part of a source that stands for it."""
+        value = spec[key]
+        here = inside(where, key)
+        if key == "chain":
+            return {"chain": value}, where, {}
+        if key == "inline":
+            if not isinstance(value, Mapping):
+                raise FormulaError("must be a mapping, a formula's keys", here)
+            return value, here, {"inline": value}
+        if not isinstance(value, str):
+            raise FormulaError("must be a text", here)
+        if key == "name":
+            try:
+                return description(value), Where(f"{value}.yaml"), {"name": value}
+            except FormulaError as error:
+                if error.where == Where():
+                    raise FormulaError(error.message, here) from None
+                raise
+        if self.base_folder is None:
+            raise FormulaError("a formula's file needs a scene file beside it", here)
+        data, _ = _read(safe_path(value, self.base_folder, here), value)
+        return data, Where(value), {"inline": data}
+
+    def _link(
+        self,
+        spec: Mapping[str, Any],
+        where: Where,
+        data: Mapping[str, Any],
+        place: Where,
+        source: Mapping[str, Any],
+    ) -> Link:
+        if "name" in source:
+            formula = load(str(source["name"]))
+        else:
+            name = Path(place.file).stem if place.file and place != where and "file" in spec else "inline"
+            formula = self._formula(data, place, name)
+        parameters = spec.get("parameters") or {}
+        if not isinstance(parameters, Mapping):
+            raise FormulaError("must be a mapping of names to numbers", inside(where, "parameters"))
+        bound = bind(
+            formula,
+            parameters,
+            spec.get("julia"),
+            spec.get("bailout"),
+            where,
+            distance_bailout=spec.get("distance_bailout"),
+        )
+        count = spec.get("count", 1)
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_COUNT:
+            message = f"must be a whole number, 1 to {MAX_COUNT}, got {str(count)[:60]}"
+            raise FormulaError(message, inside(where, "count"))
+        return Link(bound, count)
+
+    def _formula(self, data: Mapping[str, Any], place: Where, name: str) -> Formula:
+        if place.file is None or self.base_folder is None:
+            return formula_from_mapping(data, place, name=name)
+        try:
+            return formula_from_mapping(data, Where(), name=name)
+        except FormulaError as error:
+            # Read again, for the line and column that the plain data no longer has.
+            document = _read(self.base_folder / place.file, place.file)[1]
+            raise document.locate(error) from None
+
+    def _links(
+        self, spec: Mapping[str, Any], where: Where, data: Mapping[str, Any], place: Where, key: str
+    ) -> Chain:
+        check_keys(data, _CHAIN_KEYS, place)
+        entries = data["chain"]
+        here = inside(place, "chain")
+        if not isinstance(entries, Sequence) or isinstance(entries, str) or not entries:
+            raise FormulaError("must be a list of formulas", here)
+        if len(entries) > MAX_LINKS:
+            raise FormulaError(f"must be at most {MAX_LINKS} formulas, got {len(entries)}", here)
+        links = []
+        sources = []
+        for index, entry in enumerate(entries):
+            at = inside(here, str(index))
+            if not isinstance(entry, Mapping):
+                raise FormulaError("must be a mapping with name, file or inline", at)
+            entry_key = _source_key(entry, at, (*_OPTIONS, "count"))
+            entry_data, entry_place, entry_source = self._data(entry_key, entry, at)
+            if "chain" in entry_data:
+                raise FormulaError("a chain cannot hold another chain", inside(at, entry_key))
+            merged = self._with_julia(entry, spec, entry_data)
+            links.append(self._link(merged, at, entry_data, entry_place, entry_source))
+            sources.append({**entry_source, **_options(merged), "count": links[-1].count})
+        radii = {
+            option: check_radius(
+                spec.get(option, data.get(option)), inside(where if option in spec else place, option)
+            )
+            for option in ("bailout", "distance_bailout")
+        }
+        overrides = {name: data[name] for name in ("bounds", "step_scale", "title") if name in data}
+        source = {"inline": {"chain": sources, **overrides}} if overrides else {"chain": sources}
+        if key == "name":
+            source = {"name": spec["name"], **_options({"julia": spec.get("julia")})}
+        try:
+            return Chain(
+                tuple(links),
+                bounds_override=_bounds(data, place),
+                bailout_override=radii["bailout"],
+                distance_bailout_override=radii["distance_bailout"],
+                step_scale_override=_step_scale(data, place),
+                title=str(data.get("title", "Chain")),
+                source={**source, **{name: value for name, value in radii.items() if value is not None}},
+            )
+        except FormulaError as error:
+            raise FormulaError(error.message, here) from None
+
+    def _with_julia(
+        self, entry: Mapping[str, Any], spec: Mapping[str, Any], data: Mapping[str, Any]
+    ) -> Mapping[str, Any]:
+        if spec.get("julia") is None or data.get("add", "point") != "point" or entry.get("julia") is not None:
+            return entry
+        return {**entry, "julia": spec["julia"]}
+
+
+def safe_path(text: str, base_folder: Path, where: Where) -> Path:
+    """The path of a file named in a scene, which must stay inside the scene's folder.
+
+    Raises:
+        FileError: an absolute path, one that leads out of the folder, by `..` or by a link.
+    """
+    path = Path(text)
+    if not text or "\0" in text or path.is_absolute() or ".." in path.parts or path.drive:
+        raise FileError(f"must be a path inside the scene's folder, got {text[:80]!r}", where)
+    full = base_folder / path
+    try:
+        real, base = full.resolve(), base_folder.resolve()
+    except (OSError, RuntimeError) as error:
+        raise FileError(f"cannot be read: {text[:80]}", where) from error
+    if not real.is_relative_to(base):
+        raise FileError(f"leads out of the scene's folder: {text[:80]!r}", where)
+    return full
+
+
+def _source_key(spec: Mapping[str, Any], where: Where, others: tuple[str, ...]) -> str:
+    check_keys(spec, (*_SOURCES, *others), where)
+    given = [key for key in _SOURCES if spec.get(key) is not None]
+    if len(given) != 1:
+        got = " and ".join(given) if given else "none"
+        raise FormulaError(f"needs exactly one of {', '.join(_SOURCES)}, got {got}", where)
+    return given[0]
+
+
+def _options(spec: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: spec[key] for key in _OPTIONS if spec.get(key) not in (None, {})}
+
+
+def _bounds(data: Mapping[str, Any], place: Where) -> tuple[tuple[float, float, float], float] | None:
+    if "bounds" not in data:
+        return None
+    center, radius = bounds_from_mapping(data["bounds"], (), inside(place, "bounds"))
+    x, y, z = (evaluate_constant(node, {"julia": 0.0}) for node in center)
+    size = check_radius(evaluate_constant(radius, {"julia": 0.0}), inside(place, "bounds", "radius"))
+    return (x, y, z), size or 0.0
+
+
+def _step_scale(data: Mapping[str, Any], place: Where) -> float | None:
+    value = data.get("step_scale")
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 1:
+        raise FormulaError("must be above 0 and at most 1", inside(place, "step_scale"))
+    return float(value)
+
+
+def _read(path: Path, shown: str) -> tuple[Mapping[str, Any], Any]:
+    """A YAML file's mapping, and the document that knows where everything in it stands."""
+    from clfractal.files.document import read_document, read_text_file
+
+    document = read_document(read_text_file(path, name=shown), shown, error=FormulaError)
+    data = document.plain()
+    if not isinstance(data, Mapping):
+        raise FormulaError("must be a mapping, a formula's keys", Where(shown))
+    return data, document
+
+
+__all__ = [
+    "description",
+    "is_chain",
+    "load",
+    "load_chain",
+    "load_file",
+    "names",
+    "resolve",
+    "safe_path",
+]

@@ -1,0 +1,131 @@
+"""Formulas applied in turn; a single formula is a chain of one link."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from clfractal.errors import FormulaError, Where
+from clfractal.formulas.model import Add, BoundFormula
+
+MAX_LINKS = 32
+MAX_COUNT = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A formula and how often it is applied (each time with its repeats and its addition) before the next link."""
+
+    bound: BoundFormula
+    count: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Links applied in turn, from the first again after the last.
+
+    Radii and bounds follow from the links unless they are given.
+
+    Attributes:
+        bounds_override: (centre, radius) of a sphere that holds the set, in scene units.
+        source: a mapping (`name`, `inline` or `chain` with what goes with it) that `catalog.resolve` turns into an
+            equal chain on any machine with this version of the library.
+    """
+
+    links: tuple[Link, ...]
+    bounds_override: tuple[tuple[float, float, float], float] | None = None
+    bailout_override: float | None = None
+    distance_bailout_override: float | None = None
+    step_scale_override: float | None = None
+    title: str = ""
+    source: Mapping[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.links) <= MAX_LINKS:
+            raise FormulaError(f"a chain has 1 to {MAX_LINKS} formulas, got {len(self.links)}", Where())
+        sizes = {len(link.bound.formula.variables) for link in self.links}
+        if len(sizes) > 1:
+            raise FormulaError("the formulas of a chain must have equally many variables", Where())
+        for link in self.links:
+            if not 1 <= link.count <= MAX_COUNT:
+                raise FormulaError(f"count must be 1 to {MAX_COUNT}, got {link.count}", Where())
+
+    @property
+    def first(self) -> BoundFormula:
+        """The first link's formula: it decides where iteration starts and gives a point its fourth coordinate."""
+        return self.links[0].bound
+
+    @property
+    def size(self) -> int:
+        """Components of z, 3 or 4."""
+        return len(self.first.formula.variables)
+
+    @property
+    def add(self) -> Add:
+        """How iteration starts: at z = 0 with count 0 for `point`, else at the point with count 0."""
+        return self.first.add
+
+    @cached_property
+    def cycle_length(self) -> int:
+        """Applications until the first link comes again."""
+        return sum(link.count for link in self.links)
+
+    def link_at(self, application: int) -> Link:
+        """The link of an application, counted from 0."""
+        place = application % self.cycle_length
+        for link in self.links:
+            if place < link.count:
+                return link
+            place -= link.count
+        raise AssertionError("a place in the cycle belongs to a link")
+
+    @cached_property
+    def degree(self) -> float:
+        """Growth of |z| over one cycle: the product of the links' degrees (at most 1e300); 1 means linear."""
+        exponent = sum(link.count * math.log(link.bound.degree) for link in self.links)
+        if len(self.links) == 1 and self.links[0].count == 1:
+            return self.first.degree
+        return math.exp(min(exponent, 690.0))
+
+    @cached_property
+    def bailout(self) -> float:
+        """|z| beyond which a point has escaped, for counts and inside tests."""
+        return self.bailout_override or max(link.bound.bailout for link in self.links)
+
+    @cached_property
+    def distance_bailout(self) -> float:
+        """|z| at which iteration for a distance stops, at least the bailout."""
+        wanted = self.distance_bailout_override or min(link.bound.distance_bailout for link in self.links)
+        return max(wanted, self.bailout)
+
+    @cached_property
+    def center(self) -> tuple[float, float, float]:
+        """Centre of the bounding sphere, in scene units: that of the link with the largest one."""
+        if self.bounds_override:
+            return self.bounds_override[0]
+        return max((link.bound for link in self.links), key=lambda bound: bound.radius).center
+
+    @cached_property
+    def radius(self) -> float:
+        """Radius of the bounding sphere, in scene units: the smallest around `center` that holds every link's."""
+        if self.bounds_override:
+            return self.bounds_override[1]
+        return max(math.dist(link.bound.center, self.center) + link.bound.radius for link in self.links)
+
+    @property
+    def solid_radius(self) -> float:
+        """For degree 1: the radius around z = 0 of a ball that holds the last solid."""
+        return math.hypot(*self.center) + self.radius
+
+    @cached_property
+    def step_scale(self) -> float:
+        """Part of an estimated distance that is safe to step: the links' smallest."""
+        return self.step_scale_override or min(link.bound.step_scale for link in self.links)
+
+
+def single(bound: BoundFormula, source: Mapping[str, Any] | None = None) -> Chain:
+    """A chain of one formula."""
+    return Chain((Link(bound),), title=bound.formula.title, source=source)

@@ -1,0 +1,249 @@
+"""A formula, its parameters, and a formula bound to values of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+from clfractal.errors import FormulaError, Where
+from clfractal.formulas.evaluate import evaluate_constant
+from clfractal.formulas.nodes import Node, Number, substitute
+
+Add: TypeAlias = Literal["point", "constant", "none"]
+
+DEFAULT_DISTANCE_BAILOUT = 1000.0
+# |z| after one more application than needed may be distance_bailout**degree, its Jacobian that over the distance, and
+# squares of both are taken: 1e8 leaves a float32 room for distances down to 1e-10.
+LARGEST_POWER = 1e8
+MAX_REPEAT = 64
+
+
+def point_name(variable: str) -> str:
+    """The name under which a map may use the constant C of a variable (`point_x`)."""
+    return f"point_{variable}"
+
+
+def inside(where: Where, *parts: str) -> Where:
+    """The place of a key below `where`."""
+    path = ".".join([*([where.path] if where.path else []), *parts])
+    return Where(where.file, where.line, where.column, path)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A named number of a formula.
+
+    `baked` ones shape the generated code (a change recompiles it); the others are passed at run time.
+    """
+
+    name: str
+    type: Literal["int", "real"]
+    default: float
+    minimum: float | None = None
+    maximum: float | None = None
+    choices: tuple[float, ...] | None = None
+    baked: bool = False
+    description: str = ""
+
+    def check(self, value: object, where: Where) -> float:
+        """The value as a float (a whole one for `int`).
+
+        Raises:
+            FormulaError: not a finite number, not whole, out of range, or none of the choices.
+        """
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise FormulaError(f"must be a number, got {str(value)[:60]!r}", where)
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        shown = f"{number:g}"
+        if not math.isfinite(number):
+            raise FormulaError(f"must be a finite number, got {shown}", where)
+        if self.type == "int" and number != math.floor(number):
+            raise FormulaError(f"must be a whole number, got {shown}", where)
+        if self.choices is not None and number not in self.choices:
+            listing = ", ".join(f"{choice:g}" for choice in self.choices)
+            raise FormulaError(f"must be one of {listing}, got {shown}", where)
+        if self.minimum is not None and number < self.minimum:
+            raise FormulaError(f"must be at least {self.minimum:g}, got {shown}", where)
+        if self.maximum is not None and number > self.maximum:
+            raise FormulaError(f"must be at most {self.maximum:g}, got {shown}", where)
+        return number
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A map of three or four real variables that is iterated, as its file describes it.
+
+    Attributes:
+        variables: names of the components of z; their order is the order of `map`.
+        let: names for parts of the map, computed in this order before it; later ones may use earlier ones.
+        map: one expression for each variable.
+        repeat: how often the map is applied before C is added.
+        add: `point` adds the point in space, `constant` a fixed one (a Julia set), `none` nothing (an IFS).
+        degree: |z| grows like |z|**degree far outside, for one application with all its repeats; 1 means linearly.
+        bounds_center, bounds_radius: a sphere that holds the set, in scene units.
+        bailout, distance_bailout: |z| beyond which a point has escaped, for counts and for distances.
+        step_scale: how much of an estimated distance it is safe to step.
+        slice: the fourth coordinate of a point in space, for four variables.
+        shape: for degree 1, the distance in z-space to the last solid; without it a ball around the origin.
+        derivative: a cheaper scalar rule for |dz/dC|: its new value from `dr`, the old one, and the state before the
+            application, with `added` 1 where C is the point and 0 elsewhere.
+        point_map: the map or a `let` uses `point_<variable>`, the constant C.
+        julia: the constant to add when none is given (only with `add: constant`).
+        source: the mapping it was read from, as plain data.
+    """
+
+    name: str
+    title: str
+    reference: str
+    variables: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    let: tuple[tuple[str, Node], ...]
+    map: tuple[Node, ...]
+    repeat: Node
+    add: Add
+    degree: Node
+    bounds_center: tuple[Node, Node, Node]
+    bounds_radius: Node
+    bailout: Node
+    distance_bailout: Node | None
+    step_scale: Node
+    slice: Node | None
+    shape: Node | None
+    derivative: Node | None
+    point_map: bool
+    julia: tuple[float, ...] | None
+    source: Mapping[str, Any]
+    description: str
+
+    def parameter(self, name: str) -> Parameter | None:
+        """The parameter of that name, or None."""
+        return next((parameter for parameter in self.parameters if parameter.name == name), None)
+
+
+@dataclass(frozen=True, eq=False)
+class BoundFormula:
+    """A formula with a value for each parameter; made by `bind`, which checks them.
+
+    Attributes:
+        values: parameter name to value (whole for `int`).
+        julia: the constant that is added, one number for each variable, or None.
+        bailout_override, distance_bailout_override: radii that replace the formula's own.
+    """
+
+    formula: Formula
+    values: Mapping[str, float]
+    julia: tuple[float, ...] | None = None
+    bailout_override: float | None = None
+    distance_bailout_override: float | None = None
+
+    @property
+    def add(self) -> Add:
+        """What is added: a julia constant turns `point` into `constant`."""
+        return "constant" if self.julia is not None else self.formula.add
+
+    @property
+    def repeat(self) -> int:
+        """Applications of the map before C is added, 1 to MAX_REPEAT."""
+        return round(self.value(self.formula.repeat))
+
+    @property
+    def degree(self) -> float:
+        """Growth of |z| by one application with its repeats, at least 1."""
+        return self.value(self.formula.degree)
+
+    @property
+    def bailout(self) -> float:
+        """|z| beyond which a point has escaped, for counts and inside tests."""
+        return self.bailout_override or self.value(self.formula.bailout)
+
+    @property
+    def distance_bailout(self) -> float:
+        """|z| beyond which iteration for a distance stops: reduced with the degree, so that float32 never overflows."""
+        if self.distance_bailout_override is not None:
+            return max(self.distance_bailout_override, self.bailout)
+        own = self.formula.distance_bailout
+        wanted = DEFAULT_DISTANCE_BAILOUT if own is None else self.value(own)
+        return max(
+            min(wanted, LARGEST_POWER ** (1 / self.degree)) if self.degree > 1 else wanted, self.bailout
+        )
+
+    @property
+    def center(self) -> tuple[float, float, float]:
+        """Centre of the bounding sphere, in scene units; the origin for a formula turned into its Julia set."""
+        if self._converted:
+            return 0.0, 0.0, 0.0
+        x, y, z = (self.value(node) for node in self.formula.bounds_center)
+        return x, y, z
+
+    @property
+    def radius(self) -> float:
+        """Radius of the bounding sphere, in scene units.
+
+        For `add: point` turned into a Julia set it is derived. Superlinear maps: with |f(z)| >= |z|**d and R the
+        radius for the set in C, |z| > max(R, |C|) escapes. Linear ones: twice that. Never beyond the bailout, since
+        a point that starts there has escaped.
+        """
+        radius = self.value(self.formula.bounds_radius)
+        if not self._converted or self.julia is None:
+            return radius
+        radius = max(
+            radius + math.hypot(*(self.value(node) for node in self.formula.bounds_center)), self.julia_size
+        )
+        return min(radius if self.degree > 1 else 2 * radius, self.bailout)
+
+    @property
+    def julia_size(self) -> float:
+        """|C| of a Julia set, else 0."""
+        return math.hypot(*self.julia) if self.julia is not None else 0.0
+
+    @property
+    def step_scale(self) -> float:
+        """Part of an estimated distance that is safe to step, above 0 to 1."""
+        return self.value(self.formula.step_scale)
+
+    @property
+    def derivative(self) -> Node | None:
+        """The scalar rule with `added` filled in, or None."""
+        if self.formula.derivative is None:
+            return None
+        added = Number(1.0 if self.add == "point" else 0.0)
+        return substitute(self.formula.derivative, {"added": added})
+
+    @property
+    def baked(self) -> Mapping[str, float]:
+        """The values that shape the code."""
+        return {p.name: self.values[p.name] for p in self.formula.parameters if p.baked}
+
+    @property
+    def start(self) -> tuple[float, ...] | None:
+        """f(0), for `add: point`: iteration may begin at z = f(0) + C with count 1 and derivative identity.
+
+        None where it may not (f(0) depends on C, or is not finite): begin at z = 0 with count 0 and derivative 0.
+        """
+        if self.formula.point_map:
+            return None
+        state = (0.0,) * len(self.formula.variables)
+        for _ in range(self.repeat):
+            names = {**self.values, **dict(zip(self.formula.variables, state, strict=True))}
+            try:
+                for name, node in self.formula.let:
+                    names[name] = evaluate_constant(node, names)
+                state = tuple(evaluate_constant(node, names) for node in self.formula.map)
+            except FormulaError:
+                return None
+        return state
+
+    @property
+    def _converted(self) -> bool:
+        return self.formula.add == "point" and self.julia is not None
+
+    def value(self, node: Node) -> float:
+        """The value of an expression of parameters; `julia` in it is |C| of a Julia set, else 0."""
+        names = dict(self.values)
+        names["julia"] = self.julia_size
+        return evaluate_constant(node, names)
