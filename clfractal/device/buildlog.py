@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from clfractal.device.source import SourceMap
+from clfractal.device.source import SourceMap, origin
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, KernelBuildError, Where
 
 # Clang's form is used by PoCL (which puts `error: ` first), Intel, AMD, Apple, Mesa and Oclgrind; NVIDIA
@@ -56,13 +56,13 @@ def _parse(log: str) -> Iterator[Diagnostic]:
             break
 
 
-def build_error(log: str, sources: SourceMap, device_name: str) -> KernelBuildError:
-    """The error for a program that does not compile, with the first error's place and an excerpt in its
-    details.
+def build_error(log: str, text: str, sources: SourceMap, device_name: str) -> KernelBuildError:
+    """The error for a program that does not compile: the first error's place, and an excerpt in the details.
 
-    The status is 2 if that place lies in a text generated from the user's formula, else 3.
+    `text` is the whole program. The status is 2 if the place lies in a text generated from the user's
+    formula, else 3.
     """
-    found = diagnostics(log)
+    found = [_in_our_files(each, text, sources) for each in diagnostics(log)]
     first = next((each for each in found if each.file in sources.texts), found[0] if found else None)
     if first is None:
         lines = [line for line in log.splitlines() if line.strip()]
@@ -71,11 +71,18 @@ def build_error(log: str, sources: SourceMap, device_name: str) -> KernelBuildEr
             details=log,
         )
     excerpt = sources.excerpt(first.file, first.line, first.column)
+    by_user = first.file.removeprefix("generated/") in sources.user
     return KernelBuildError(
         f"the kernel does not build on {device_name}: {first.text}",
         Where(file=first.file, line=first.line, column=first.column),
         details=f"{excerpt}\n\n{log}" if excerpt else log,
-        status=STATUS_BAD_INPUT
-        if first.file.removeprefix("generated/") in sources.user
-        else STATUS_DEVICE_FAILED,
+        status=STATUS_BAD_INPUT if by_user else STATUS_DEVICE_FAILED,
     )
+
+
+def _in_our_files(diagnostic: Diagnostic, text: str, sources: SourceMap) -> Diagnostic:
+    """The same diagnostic, moved to our own file if the driver did not heed `#line`."""
+    if diagnostic.file in sources.texts:
+        return diagnostic
+    place = origin(text, diagnostic.line)
+    return diagnostic if place is None else replace(diagnostic, file=place[0], line=place[1])

@@ -11,12 +11,15 @@ import contextlib
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pyopencl as cl
 
-from clfractal.device.select import Device
+from clfractal.device.select import Device, by_key
+
+BINARY = "binary"  # the file that `compile_job` leaves
 
 ArgumentKind = Literal["buffer", "scalar", "bytes", "local"]
 
@@ -117,6 +120,19 @@ def warm_up(device: Device, program: Any, warm: Warm) -> None:
         for index, value in enumerate(values):
             kernel.set_arg(index, value)  # keeps no reference: `values` must outlive the launch
         cl.enqueue_nd_range_kernel(device.queue, kernel, warm.global_size, warm.local_size).wait()
+
+
+def compile_job(request: Mapping[str, Any]) -> str | None:
+    """Compile and warm up in a child process; leaves the binary in the folder, or returns the compiler's log."""
+    device = by_key(*request["device"])
+    try:
+        program = compile_source(device, request["text"], request["flags"])
+    except BuildFailureError as failure:
+        return str(failure)
+    if request["warm"] is not None:
+        warm_up(device, program, Warm.from_data(request["warm"]))
+    (Path(request["folder"]) / BINARY).write_bytes(binary_of(program))
+    return None
 
 
 def _value(device: Device, argument: Argument) -> Any:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pyopencl as cl
 
-from clfractal.device import cache, compiler
+from clfractal.device import cache, compiler, isolate
 from clfractal.device.buildlog import build_error
 from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
+
+BUILD_TIMEOUT_S = 600.0
 
 _FORMAT = 1  # of what is kept under a key
 
@@ -85,20 +89,43 @@ def build(
             return Program(device, program, _milliseconds(start), cached=True)
         cache.drop_blob(key)
     try:
-        program = _compile(device, text, flags, warm, key)
+        program, binary = _compile(device, text, flags, warm, isolated=isolated)
     except BuildFailureError as failure:
-        raise build_error(str(failure), sources or SourceMap(), device.info.name) from None
+        raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
+    if binary:
+        cache.store_blob(key, binary)
     return Program(device, program, _milliseconds(start), cached=False)
 
 
-def _compile(device: Device, text: str, flags: Sequence[str], warm: Warm | None, key: str) -> Any:
+def _compile(
+    device: Device, text: str, flags: Sequence[str], warm: Warm | None, *, isolated: bool
+) -> tuple[Any, bytes]:
+    """The program and its binary, which may be empty."""
+    if isolated:
+        binary = _compile_in_child(device, text, flags, warm)
+        program = compiler.load_binary(device, binary, flags) if binary else None
+        if program is not None:
+            return program, binary
+        # A driver without binaries (or that cannot read its own): the child has shown that compiling is safe.
     program = compiler.compile_source(device, text, flags)
     if warm is not None:
         compiler.warm_up(device, program, warm)
-    binary = compiler.binary_of(program)
-    if binary:
-        cache.store_blob(key, binary)
-    return program
+    return program, compiler.binary_of(program)
+
+
+def _compile_in_child(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="clfractal-") as temporary:
+        failure = isolate.run(
+            "clfractal.device.compiler:compile_job",
+            device,
+            {"text": text, "flags": list(flags), "warm": None if warm is None else warm.as_data()},
+            doing="building a program",
+            timeout_s=BUILD_TIMEOUT_S,
+            folder=Path(temporary),
+        )
+        if failure is not None:
+            raise BuildFailureError(failure)
+        return (Path(temporary) / compiler.BINARY).read_bytes()
 
 
 def _key(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> str:

@@ -151,6 +151,18 @@ def choose(spec: str | None = None) -> Device:
     return max(fitting, key=lambda device: _score(device.info, speeds))
 
 
+def by_key(index: str, key: str) -> Device:
+    """The device with that `DeviceInfo.key`, the one at `index` if several are alike.
+
+    Raises:
+        DeviceError: status 3, it is no longer there.
+    """
+    alike = [device for device in _find() if device.info.key == key]
+    if not alike:
+        raise DeviceError(f"the device {index} has gone or changed")
+    return next((device for device in alike if device.info.index == index), alike[0])
+
+
 def is_simulator(info: DeviceInfo) -> bool:
     """Oclgrind interprets every instruction, some 10,000 times slower: only taken when asked for by name."""
     return "oclgrind" in f"{info.platform} {info.name}".casefold()

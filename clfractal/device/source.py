@@ -16,6 +16,7 @@ from clfractal.errors import KernelBuildError, Where, nearest
 from clfractal.resources import folder
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))')
+_LINE = re.compile(r'^#line (?P<line>\d+) "(?P<name>[^"]*)"')
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,18 @@ class SourceMap:
                 prefix = len(lines[number - 1][: column - 1].expandtabs(4))
                 shown.append(" " * 5 + " | " + " " * prefix + "^")
         return "\n".join(shown)
+
+
+def origin(text: str, line: int) -> tuple[str, int] | None:
+    """File and line that `#line` directives give to a line (from 1) of a flat text.
+
+    Oclgrind's messages count the lines of the whole text and call it `input.cl`.
+    """
+    for above, shown in enumerate(reversed(text.splitlines()[: line - 1])):
+        directive = _LINE.match(shown)
+        if directive is not None:
+            return directive["name"], int(directive["line"]) + above
+    return None
 
 
 @dataclass(frozen=True, slots=True)
