@@ -1,0 +1,1 @@
+"""Benchmarks: this engine beside other programs, in one session on one machine."""
