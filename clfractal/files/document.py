@@ -1,25 +1,26 @@
-"""Reads YAML from anybody into plain data, keeping the line and column of every value; the only file that knows yaml.
+"""Reads YAML from anybody into plain data with its places, and writes it; the only file that knows yaml.
 
-The document is built from the parser's events rather than by a loader: nothing recurses, nothing is constructed but
-strings, numbers, booleans, lists and mappings, and an alias is counted for all that it expands to before it is used.
+A document is built from the parser's events rather than by a loader: nothing recurses, nothing is constructed
+but strings, numbers, booleans, lists and mappings, and an alias is counted for all that it expands to before
+it is used.
 """
 
 from __future__ import annotations
 
 import math
-import os
 import re
-import stat
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 import yaml
 
-from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.errors import ClfractalError, SceneError, Where
+from clfractal.files.marks import Document, Node, dotted, node_from_plain
+from clfractal.files.regular import MAX_BYTES, read_text_file
 
-MAX_BYTES = 1_000_000
+__all__ = ["MAX_DEPTH", "MAX_NODES", "read_document", "read_text_file", "read_value", "write_document"]
+
 MAX_NODES = 100_000
 MAX_DEPTH = 100
 MAX_NUMBER_LENGTH = 40
@@ -33,156 +34,6 @@ _WORDS: Mapping[str, bool | None] = {
     **dict.fromkeys(("true", "True", "TRUE"), True),
     **dict.fromkeys(("false", "False", "FALSE"), False),
 }
-
-
-@dataclass(slots=True)
-class Node:
-    """A value of the document and where it stands.
-
-    Attributes:
-        value: a scalar, `list[Node]` or `dict[str, Node]`.
-        file: the name of the text it stands in (a scene may hold nodes of a formula's own file, or of an option).
-        line, column: its first character, from 1; None in an option.
-        end: the position after its last character, to order errors in the text.
-        text_column: the column of a string's first character when its text stands on one line just as it is.
-        keys: position of each key of a mapping.
-        size: the number of nodes it expands to.
-    """
-
-    value: Any
-    file: str | None
-    line: int | None
-    column: int | None
-    end: tuple[int, int] = (0, 0)
-    text_column: int | None = None
-    keys: dict[str, tuple[int, int]] = field(default_factory=dict)
-    size: int = 1
-
-    def plain(self) -> Any:
-        """The value as plain data."""
-        if isinstance(self.value, dict):
-            return {key: child.plain() for key, child in self.value.items()}
-        if isinstance(self.value, list):
-            return [child.plain() for child in self.value]
-        return self.value
-
-    def child(self, part: str | int) -> Node | None:
-        """The value under a key or at an index (which may be a word such as "0"), or None."""
-        if isinstance(self.value, dict):
-            found = self.value.get(str(part))
-            return found if isinstance(found, Node) else None
-        if isinstance(self.value, list) and str(part).isdecimal() and int(part) < len(self.value):
-            found = self.value[int(part)]
-            return found if isinstance(found, Node) else None
-        return None
-
-
-@dataclass(frozen=True, slots=True)
-class Document:
-    """A document's root node, and finding places in it."""
-
-    root: Node
-
-    def plain(self) -> Any:
-        """The document as plain data: None, bool, int, float, str, list and dict with string keys."""
-        return self.root.plain()
-
-    def find(self, path: Sequence[str | int]) -> tuple[Node, int]:
-        """The deepest node along `path` that exists, and how many parts of the path lead there."""
-        node, depth = self.root, 0
-        for part in path:
-            child = node.child(part)
-            if child is None:
-                break
-            node, depth = child, depth + 1
-        return node, depth
-
-    def where(self, path: Sequence[str | int], *, key: str | None = None, column: int | None = None) -> Where:
-        """The place of the value at `path`, or of the key `key` in it, or of a column (from 1) in its text."""
-        node, depth = self.find(path)
-        line, place = node.line, node.column
-        if depth == len(path):
-            if key is not None and key in node.keys:
-                line, place = node.keys[key]
-            elif column is not None and node.text_column is not None:
-                place = node.text_column + column - 1
-        return Where(node.file, line, place, dotted(path) or None)
-
-    def locate(self, error: ClfractalError) -> ClfractalError:
-        """The same error at its place in the text.
-
-        `error.where` holds a dotted path and perhaps a column inside the string at that path, but no file.
-        """
-        if error.where.file is not None:
-            return error
-        path = split_path(error.where.path or "")
-        unknown = re.match(r"unknown key '(.*?)'", error.message)
-        key = unknown.group(1) if unknown else None
-        where = self.where(path, key=key, column=error.where.column)
-        return type(error)(error.message, where, details=error.details, status=error.status)
-
-
-def dotted(path: Sequence[str | int]) -> str:
-    """A path as it is shown: `lights.0.color`."""
-    return ".".join(str(part) for part in path)
-
-
-def split_path(text: str) -> tuple[str, ...]:
-    """The parts of a dotted path; `map[0]` is read like `map.0`."""
-    return tuple(part for part in re.split(r"[.\[\]]", text) if part)
-
-
-def check_regular(descriptor: int, name: str, limit: int | None) -> None:
-    """Refuses what is no regular file (a device could be read for ever), and a file above `limit` bytes."""
-    status = os.fstat(descriptor)
-    if stat.S_ISDIR(status.st_mode):
-        raise FileError("is a folder, not a file", Where(name))
-    if not stat.S_ISREG(status.st_mode):
-        raise FileError("is not a regular file", Where(name))
-    if limit is not None and status.st_size > limit:
-        raise FileError(f"is too large: {status.st_size:,} bytes, at most {limit:,}", Where(name))
-
-
-def read_bytes(
-    path: Path, *, name: str | None = None, limit: int = MAX_BYTES, prefix: int | None = None
-) -> bytes:
-    """The bytes of a regular file, at most `limit`; only the first `prefix` ones, of a file of any size, if given.
-
-    Raises:
-        FileError: it cannot be read, is no regular file, or is too large.
-    """
-    shown = name or str(path)
-    try:
-        # Without O_NONBLOCK opening a FIFO would wait for a writer.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(f"cannot be read: {reason}", Where(shown)) from error
-    try:
-        check_regular(descriptor, shown, None if prefix is not None else limit)
-        with os.fdopen(descriptor, "rb", closefd=False) as stream:
-            content = stream.read(prefix if prefix is not None else limit + 1)
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", Where(shown)) from error
-    finally:
-        os.close(descriptor)
-    if prefix is None and len(content) > limit:
-        raise FileError(f"is too large: at most {limit:,} bytes", Where(shown))
-    return content
-
-
-def decode(content: bytes, name: str) -> str:
-    """UTF-8 text, or a FileError naming the line with the first byte that is none."""
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise FileError("is not UTF-8 text", Where(name, line)) from error
-
-
-def read_text_file(path: Path, *, name: str | None = None, limit: int = MAX_BYTES) -> str:
-    """The text of a regular file of at most `limit` bytes; FileError otherwise."""
-    return decode(read_bytes(path, name=name, limit=limit), name or str(path))
 
 
 def read_document(
@@ -212,15 +63,42 @@ def read_value(text: str, file: str) -> Node:
     return node_from_plain(root.plain(), file)
 
 
-def node_from_plain(value: Any, file: str | None) -> Node:
-    """Plain data as nodes that stand at no line of `file`."""
-    if isinstance(value, Mapping):
-        return Node(
-            {str(key): node_from_plain(child, file) for key, child in value.items()}, file, None, None
+def write_document(value: Any) -> str:
+    """YAML text of plain data that `read_document` reads back as equal data (whole floats as int)."""
+    return str(
+        yaml.dump(
+            _short(value),
+            Dumper=_Dumper,
+            sort_keys=False,
+            default_flow_style=None,
+            allow_unicode=True,
+            width=100,
         )
+    )
+
+
+def _short(value: Any) -> Any:
+    """Whole floats as int, since [0, -3, 0] reads better than [0.0, -3.0, 0.0]."""
+    if isinstance(value, Mapping):
+        return {key: _short(child) for key, child in value.items()}
     if isinstance(value, (list, tuple)):
-        return Node([node_from_plain(child, file) for child in value], file, None, None)
-    return Node(value, file, None, None)
+        return [_short(child) for child in value]
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15 and str(value) != "-0.0":
+        return int(value)
+    return value
+
+
+class _Dumper(yaml.SafeDumper):
+    """Quotes the strings that this file's reader would take for something else; writes no aliases."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+for _pattern in (_INT, _FLOAT, _NON_FINITE):
+    _Dumper.add_implicit_resolver(
+        "tag:yaml.org,2002:float", re.compile(f"(?:{_pattern.pattern})$"), list("-+.0123456789")
+    )
 
 
 @dataclass(slots=True)
@@ -277,8 +155,8 @@ class _Builder:
             line = text.encode().count(b"\n", 0, error.position) + 1
             raise self.error("holds a character that YAML does not allow", Where(self.file, line)) from error
         except yaml.MarkedYAMLError as error:
-            mark = error.problem_mark or error.context_mark
-            place = Where(self.file, mark.line + 1, mark.column + 1) if mark else Where(self.file)
+            mark: Any = error.problem_mark or error.context_mark
+            place = Where(self.file, mark.line + 1, mark.column + 1) if mark is not None else Where(self.file)
             problem = error.problem or error.context or "cannot be read"
             raise self.error(f"not valid YAML: {problem}", place) from error
         except (yaml.YAMLError, ValueError) as error:

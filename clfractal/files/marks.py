@@ -1,0 +1,156 @@
+"""Plain data that remembers where each value stands in a text, so that an error can point at it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from clfractal.errors import ClfractalError, SceneError, Where
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """A path as it is shown: `lights.0.color`."""
+    return ".".join(str(part) for part in path)
+
+
+def split_path(text: str) -> tuple[str, ...]:
+    """The parts of a dotted path; `map[0]` is read like `map.0`."""
+    return tuple(part for part in re.split(r"[.\[\]]", text) if part)
+
+
+@dataclass(slots=True)
+class Node:
+    """A value of the document and where it stands.
+
+    Attributes:
+        value: a scalar, `list[Node]` or `dict[str, Node]`.
+        file: the name of the text it stands in; in a scene also a formula's own file, or an option.
+        line, column: its first character, from 1; None in an option.
+        end: the position after its last character, to order errors in the text.
+        text_column: the column of a string's first character when its text stands on one line just as it is.
+        keys: position of each key of a mapping.
+        size: the number of nodes it expands to.
+    """
+
+    value: Any
+    file: str | None
+    line: int | None
+    column: int | None
+    end: tuple[int, int] = (0, 0)
+    text_column: int | None = None
+    keys: dict[str, tuple[int, int]] = field(default_factory=dict)
+    size: int = 1
+
+    def plain(self) -> Any:
+        """The value as plain data."""
+        if isinstance(self.value, dict):
+            return {key: child.plain() for key, child in self.value.items()}
+        if isinstance(self.value, list):
+            return [child.plain() for child in self.value]
+        return self.value
+
+    def child(self, part: str | int) -> Node | None:
+        """The value under a key or at an index (which may be a word such as "0"), or None."""
+        if isinstance(self.value, dict):
+            found = self.value.get(str(part))
+            return found if isinstance(found, Node) else None
+        if isinstance(self.value, list) and str(part).isdecimal() and int(part) < len(self.value):
+            found = self.value[int(part)]
+            return found if isinstance(found, Node) else None
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A document's root node, and finding places in it."""
+
+    root: Node
+
+    def plain(self) -> Any:
+        """The document as plain data: None, bool, int, float, str, list and dict with string keys."""
+        return self.root.plain()
+
+    def where(self, path: Sequence[str | int], *, key: str | None = None, column: int | None = None) -> Where:
+        """The place of the value at `path`, of the key `key` in it, or of a column (from 1) in its text.
+
+        The path shown begins in the text that holds the place: in a formula's own file it is `map.0`.
+        """
+        node, depth, start = self.root, 0, 0
+        for part in path:
+            child = node.child(part)
+            if child is None:
+                break
+            depth += 1
+            if child.file != node.file:
+                start = depth
+            node = child
+        line, place, shown = node.line, node.column, dotted(path[start:]) or None
+        if depth < len(path):
+            return Where(node.file, line, place, shown)
+        if key is not None and key in node.keys:
+            line, place = node.keys[key]
+        elif key is not None and (child := node.child(key)) is not None:
+            return Where(child.file, child.line, child.column, shown if child.file == node.file else None)
+        elif column is not None and node.text_column is not None:
+            place = node.text_column + column - 1
+        return Where(node.file, line, place, shown)
+
+    def replaced(self, path: Sequence[str], value: Node) -> Document:
+        """The document with `value` at `path`; mappings that do not exist on the way are made.
+
+        Raises:
+            SceneError: the path leads through a value without keys, or to an entry that a list does not have.
+        """
+        return Document(_replaced(self.root, path, 0, value))
+
+    def locate(self, error: ClfractalError) -> ClfractalError:
+        """The same error at its place in the text.
+
+        `error.where` holds a dotted path and perhaps a column inside the string at that path, but no file.
+        """
+        if error.where.file is not None:
+            return error
+        path = split_path(error.where.path or "")
+        unknown = re.match(r"unknown \w+ '(.*?)'", error.message)
+        key = unknown.group(1) if unknown else None
+        if key is not None and path and path[-1] == key:
+            named = self.where(path[:-1], key=key)
+            where = replace(named, path=self.where(path).path)
+        else:
+            where = self.where(path, key=key, column=error.where.column)
+        return type(error)(error.message, where, details=error.details, status=error.status)
+
+
+def _replaced(node: Node, path: Sequence[str], depth: int, value: Node) -> Node:
+    """A copy of `node` with `value` put in: an alias elsewhere may share the original."""
+    if depth == len(path):
+        return value
+    part, shown = path[depth], dotted(path[: depth + 1])
+    child = node.child(part)
+    if isinstance(node.value, list):
+        if child is None:
+            entries = f"entries 0 to {len(node.value) - 1}" if node.value else "no entries"
+            raise SceneError(f"{shown} does not exist: the list has {entries}", Where(value.file))
+        index = int(part)
+        inner: Any = [*node.value[:index], _replaced(child, path, depth + 1, value), *node.value[index + 1 :]]
+    elif isinstance(node.value, dict):
+        below = child if child is not None and child.value is not None else Node({}, value.file, None, None)
+        inner = {**node.value, part: _replaced(below, path, depth + 1, value)}
+    else:
+        raise SceneError(
+            f"{dotted(path[:depth])} is a single value, so it has no key {part!r}", Where(value.file)
+        )
+    return replace(node, value=inner)
+
+
+def node_from_plain(value: Any, file: str | None) -> Node:
+    """Plain data as nodes that stand at no line of `file`."""
+    if isinstance(value, Mapping):
+        return Node(
+            {str(key): node_from_plain(child, file) for key, child in value.items()}, file, None, None
+        )
+    if isinstance(value, (list, tuple)):
+        return Node([node_from_plain(child, file) for child in value], file, None, None)
+    return Node(value, file, None, None)

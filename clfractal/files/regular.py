@@ -1,0 +1,64 @@
+"""Reads files named by anybody: regular ones only, of bounded size, as UTF-8 text."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from clfractal.errors import FileError, Where
+
+MAX_BYTES = 1_000_000
+
+
+def check_regular(descriptor: int, name: str, limit: int | None) -> None:
+    """Refuses what is no regular file (a device could be read for ever), and a file above `limit` bytes."""
+    status = os.fstat(descriptor)
+    if stat.S_ISDIR(status.st_mode):
+        raise FileError("is a folder, not a file", Where(name))
+    if not stat.S_ISREG(status.st_mode):
+        raise FileError("is not a regular file", Where(name))
+    if limit is not None and status.st_size > limit:
+        raise FileError(f"is too large: {status.st_size:,} bytes, at most {limit:,}", Where(name))
+
+
+def read_bytes(
+    path: Path, *, name: str | None = None, limit: int = MAX_BYTES, prefix: int | None = None
+) -> bytes:
+    """The bytes of a regular file, at most `limit`; or only the first `prefix` ones, of a file of any size.
+
+    Raises:
+        FileError: it cannot be read, is no regular file, or is too large.
+    """
+    shown = name or str(path)
+    try:
+        # Without O_NONBLOCK opening a FIFO would wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise FileError(f"cannot be read: {reason}", Where(shown)) from error
+    try:
+        check_regular(descriptor, shown, None if prefix is not None else limit)
+        with os.fdopen(descriptor, "rb", closefd=False) as stream:
+            content = stream.read(prefix if prefix is not None else limit + 1)
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror}", Where(shown)) from error
+    finally:
+        os.close(descriptor)
+    if prefix is None and len(content) > limit:
+        raise FileError(f"is too large: at most {limit:,} bytes", Where(shown))
+    return content
+
+
+def decode(content: bytes, name: str) -> str:
+    """UTF-8 text, or a FileError naming the line with the first byte that is none."""
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise FileError("is not UTF-8 text", Where(name, line)) from error
+
+
+def read_text_file(path: Path, *, name: str | None = None, limit: int = MAX_BYTES) -> str:
+    """The text of a regular file of at most `limit` bytes; FileError otherwise."""
+    return decode(read_bytes(path, name=name, limit=limit), name or str(path))

@@ -1,0 +1,75 @@
+"""What all parts of a scene are made of: strict frozen models, and numbers with their bounds.
+
+The models name their types without `from __future__ import annotations`, and are built when first used: both
+keep the import of the schema short.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Self, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field
+from pydantic_core import PydanticCustomError
+
+Vector: TypeAlias = tuple[float, float, float]
+
+Coordinate = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
+Amount = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
+Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12, allow_inf_nan=False)]
+
+# Strictness would refuse the lists of YAML and JSON; it is kept for what is in them.
+Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
+Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False)]
+Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
+
+
+class Section(BaseModel):
+    """A mapping of the scene: unknown keys are errors, values keep their types, nothing ever changes.
+
+    `tag` is the word that chooses the class where several share a place.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
+    tag: ClassVar[str] = ""
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy; with `update` its values are checked, and nothing derived from the old ones is kept."""
+        if not update:
+            return super().model_copy(deep=deep)
+        values = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self).model_validate({**values, **update})
+
+
+def problem(message: str, at: str = "") -> PydanticCustomError:
+    """An error of ours inside a validator, at the key (or dotted path) `at` of the model that raises it."""
+    return PydanticCustomError("clfractal", "{message}", {"message": message, "at": at})
+
+
+def chosen_by(key: str, default: str) -> Discriminator:
+    """Chooses a class of a union by the word under `key`; without the key it is `default`."""
+
+    def choose(value: Any) -> str:
+        found = value.get(key, default) if isinstance(value, Mapping) else getattr(value, key, default)
+        return found if isinstance(found, str) else repr(found)
+
+    return Discriminator(choose)
+
+
+def chosen_by_word(word: str, other: str) -> Discriminator:
+    """Chooses `word` for a string and `other` for anything else."""
+    return Discriminator(lambda value: word if isinstance(value, str) else other)
+
+
+def minus(a: Vector, b: Vector) -> Vector:
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def length(a: Vector) -> float:
+    """The Euclidean length of a."""
+    return float((a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) ** 0.5)

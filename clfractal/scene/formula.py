@@ -1,0 +1,72 @@
+"""The scene's `formula`: which one is drawn, with which numbers."""
+
+from typing import Annotated, Any, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.scene.base import Coordinate, Number, Section, problem
+
+MAX_LINKS = 64
+
+Source = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
+Bailout = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)]
+Julia = Annotated[tuple[Coordinate, ...], Field(strict=False, min_length=3, max_length=4)]
+
+
+class _Source(Section):
+    name: Source | None = Field(None, description="a formula of the library")
+    file: Source | None = Field(None, description="a formula file, in the scene's folder or below")
+    inline: dict[str, Any] | None = Field(None, description="a formula, written here")
+    parameters: dict[str, Number] = Field({}, description="values of its parameters")
+    julia: Julia | None = Field(None, description="the added constant: a number for each variable")
+
+
+class ChainLink(_Source):
+    """One member of a chain: a formula and how many times it is applied before the next one's turn."""
+
+    count: int = Field(1, ge=1, le=1000, description="applications in a row")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        _check_source(self, ("name", "file", "inline"))
+        return self
+
+
+class FormulaSpec(_Source):
+    """Which formula is drawn, and how far it is iterated; exactly one of name, file, inline, chain."""
+
+    chain: (
+        Annotated[tuple[ChainLink, ...], Field(strict=False, min_length=1, max_length=MAX_LINKS)] | None
+    ) = Field(None, description="formulas applied in turn")
+    iterations: int = Field(30, ge=1, le=1_000_000, description="most applications of the formula")
+    bailout: Bailout | None = Field(None, description="escape radius of counts and inside tests")
+    distance_bailout: Bailout | None = Field(None, description="escape radius of distances")
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        _check_source(self, ("name", "file", "inline", "chain"))
+        if self.chain is not None:
+            for key in ("parameters", "julia"):
+                if getattr(self, key):
+                    raise problem("belongs to the members of a chain, not to the chain", key)
+        return self
+
+    def mapping(self) -> dict[str, Any]:
+        """Plain data without what is not given; it loads back to an equal FormulaSpec."""
+        plain: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
+        return _without_empty(plain)
+
+
+def _without_empty(spec: dict[str, Any]) -> dict[str, Any]:
+    if "chain" in spec:
+        spec["chain"] = [_without_empty(link) for link in spec["chain"]]
+    return {key: value for key, value in spec.items() if key != "parameters" or value}
+
+
+def _check_source(spec: Section, keys: tuple[str, ...]) -> None:
+    given = [key for key in keys if getattr(spec, key) is not None]
+    listing = ", ".join(keys[:-1]) + f" or {keys[-1]}"
+    if not given:
+        raise problem(f"needs one of {listing}")
+    if len(given) > 1:
+        raise problem(f"cannot stand beside {given[0]}: give one of {listing}", given[1])
