@@ -146,8 +146,8 @@ def report(entries: Sequence[Entry], rounds: int) -> dict[str, object]:
 def markdown(entries: Sequence[Entry]) -> str:
     """The table; `ratio` is against our first runtime, or the fastest contestant where ours is absent."""
     lines = [
-        "| row | contestant | ms | ratio | Mrays/s | Miterations/s | steps/ray | FMA peak |",
-        "|---|---|--:|--:|--:|--:|--:|--:|",
+        "| row | contestant | median ms | best ms | ratio | Mrays/s | Miterations/s | steps/ray | FMA peak |",
+        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
     ]
     for row in row_names(entries):
         base = reference(entries, row)
@@ -160,6 +160,7 @@ def markdown(entries: Sequence[Entry]) -> str:
                 row,
                 entry.contestant.name,
                 f"{milliseconds:.0f}",
+                f"{min(one.milliseconds for one in entry.samples[row]):.0f}",
                 f"{milliseconds / _milliseconds(base, row):.2f}",
                 _cell(sample.rays_per_second, 1e-6, "{:.2f}"),
                 _cell(sample.iterations_per_second, 1e-6, "{:.1f}"),
@@ -168,7 +169,7 @@ def markdown(entries: Sequence[Entry]) -> str:
             ]
             lines.append(f"| {' | '.join(cells)} |")
     lines += [
-        f"| - | {entry.contestant.name} | missing: {entry.missing} ||||||"
+        f"| - | {entry.contestant.name} | missing: {entry.missing} |||||||"
         for entry in entries
         if entry.missing
     ]

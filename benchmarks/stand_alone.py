@@ -42,7 +42,7 @@ class StandAloneKernel:
         if not times:
             raise reason
         self._lanes = min(times, key=times.__getitem__)
-        self.name = f"{self._file.name} alone, {self._lanes} lanes ({self._runtime.name})"
+        self.name = f"{self._file.name} alone, lanes={self._lanes} ({self._runtime.name})"
 
     def measure(self) -> list[Sample]:
         milliseconds = self._milliseconds(self._lanes)
