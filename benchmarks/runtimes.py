@@ -20,9 +20,12 @@ class Runtime:
     library_folder: Path | None = None
 
     def environment(self) -> dict[str, str | None]:
-        """Changes to the environment under which a program sees this implementation and no other."""
-        changes: dict[str, str | None] = {"OCL_ICD_VENDORS": str(self.icd_folder)}
-        changes |= dict.fromkeys(("OCL_ICD_FILENAMES", "CLFRACTAL_DEVICE", "PYOPENCL_CTX"))
+        """Changes to the environment under which this implementation is the first platform.
+
+        The pyopencl wheel adds its own PoCL behind whatever the folder names, so the device is named too.
+        """
+        changes: dict[str, str | None] = {"OCL_ICD_VENDORS": str(self.icd_folder), "CLFRACTAL_DEVICE": "0:0"}
+        changes |= dict.fromkeys(("OCL_ICD_FILENAMES", "PYOPENCL_CTX"))
         if self.library_folder:
             changes["LD_LIBRARY_PATH"] = str(self.library_folder)
         return changes
