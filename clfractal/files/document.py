@@ -126,7 +126,7 @@ class _Builder:
         raise self.error(message, Where(self.file, line, column, path or None))
 
     def fail_at(self, message: str, event: Any) -> NoReturn:
-        self.fail(message, event.start_mark.line + 1, event.start_mark.column + 1)
+        self.fail(message, *_start(event))
 
     def build(self, text: str) -> Node:
         try:
@@ -135,6 +135,7 @@ class _Builder:
         except UnicodeEncodeError as error:
             raise self.error("is not UTF-8 text", Where(self.file)) from error
         documents = 0
+        event: Any
         for event in self._events(text):
             if isinstance(event, yaml.DocumentStartEvent):
                 documents += 1
@@ -174,7 +175,7 @@ class _Builder:
             self.fail_at(f"tags are not allowed, got {event.tag[:60]!r}", event)
         if len(self.stack) >= MAX_DEPTH:
             self.fail_at(f"nested more than {MAX_DEPTH} levels deep", event)
-        line, column = event.start_mark.line + 1, event.start_mark.column + 1
+        line, column = _start(event)
         node = Node(None, self.file, line, column, (event.end_mark.line + 1, event.end_mark.column + 1))
         if isinstance(event, yaml.ScalarEvent):
             node.value = self._scalar(event)
@@ -198,7 +199,7 @@ class _Builder:
             first = top.node.keys[event.value][0]
             self.fail_at(f"duplicate key {event.value[:60]!r}, first on line {first}", event)
         top.key = event.value
-        top.node.keys[event.value] = (event.start_mark.line + 1, event.start_mark.column + 1)
+        top.node.keys[event.value] = _start(event)
 
     def _alias(self, event: Any) -> Node:
         name = event.anchor
@@ -258,6 +259,10 @@ class _Builder:
 
     def _part(self, open_: _Open) -> str | int | None:
         return len(open_.node.value) if isinstance(open_.node.value, list) else open_.key
+
+
+def _start(event: Any) -> tuple[int, int]:
+    return event.start_mark.line + 1, event.start_mark.column + 1
 
 
 def _depth(node: Node) -> int:

@@ -9,6 +9,23 @@ from typing import Any
 
 from clfractal.errors import ClfractalError, SceneError, Where
 
+OPTION = "--set "
+
+
+def option(key: str) -> str:
+    """What stands for the file of a value given as an option, `--set camera.fov`."""
+    return OPTION + key
+
+
+def _below(file: str | None, shown: str) -> str:
+    """A path as shown after the option that gave the value: without the part that the option names already."""
+    if file is None or not file.startswith(OPTION):
+        return shown
+    key = file[len(OPTION) :]
+    if shown.startswith(key + "."):
+        return shown[len(key) + 1 :]
+    return "" if f"{key}.".startswith(f"{shown}.") else shown
+
 
 def dotted(path: Sequence[str | int]) -> str:
     """A path as it is shown: `lights.0.color`."""
@@ -86,16 +103,35 @@ class Document:
             if child.file != node.file:
                 start = depth
             node = child
-        line, place, shown = node.line, node.column, dotted(path[start:]) or None
-        if depth < len(path):
-            return Where(node.file, line, place, shown)
-        if key is not None and key in node.keys:
-            line, place = node.keys[key]
-        elif key is not None and (child := node.child(key)) is not None:
-            return Where(child.file, child.line, child.column, shown if child.file == node.file else None)
-        elif column is not None and node.text_column is not None:
-            place = node.text_column + column - 1
-        return Where(node.file, line, place, shown)
+        line, place = node.line, node.column
+        if depth == len(path):
+            if key is not None and key in node.keys:
+                line, place = node.keys[key]
+            elif key is not None and (child := node.child(key)) is not None:
+                node, line, place = child, child.line, child.column
+            elif column is not None and node.text_column is not None:
+                place = node.text_column + column - 1
+        shown = (
+            dotted(path) if node.file is not None and node.file.startswith(OPTION) else dotted(path[start:])
+        )
+        return Where(node.file, line, place, _below(node.file, shown) or None)
+
+    def has(self, path: Sequence[str | int]) -> bool:
+        """Whether there is a value at `path`."""
+        node: Node | None = self.root
+        for part in path:
+            node = node.child(part) if node is not None else None
+        return node is not None
+
+    def end(self, path: Sequence[str | int]) -> tuple[int, int]:
+        """Line and column after the value at `path`, or after what is left of the path."""
+        node = self.root
+        for part in path:
+            child = node.child(part)
+            if child is None:
+                break
+            node = child
+        return node.end
 
     def replaced(self, path: Sequence[str], value: Node) -> Document:
         """The document with `value` at `path`; mappings that do not exist on the way are made.

@@ -45,10 +45,8 @@ class FormulaSpec(_Source):
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         _check_source(self, ("name", "file", "inline", "chain"))
-        if self.chain is not None:
-            for key in ("parameters", "julia"):
-                if getattr(self, key):
-                    raise problem("belongs to the members of a chain, not to the chain", key)
+        if self.chain is not None and self.parameters:
+            raise problem("belongs to the members of a chain, not to the chain", "parameters")
         return self
 
     def mapping(self) -> dict[str, Any]:

@@ -1,0 +1,223 @@
+"""Turns what the schema finds wrong into our one line: what is allowed, what was given, where it stands."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, get_args, get_origin
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.files.marks import Document, dotted
+from clfractal.scene.base import Section
+from clfractal.scene.model import Scene
+
+# Words for the checks that compare with one number or a few words, filled with the check's own context.
+_ALLOWED: Mapping[str, str] = {
+    "less_than": "must be below {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "greater_than": "must be above {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "string_type": "must be text",
+    "string_too_short": "must be at least {min_length} characters long",
+    "string_too_long": "must be at most {max_length} characters long",
+    "dict_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "model_attributes_type": "must be a mapping",
+    "too_short": "must have at least {min_length} entries",
+    "too_long": "must have at most {max_length} entries",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong with plain data.
+
+    `path` leads to the value; with `key` set the problem is the key itself, of the mapping at `path`.
+    A `late` problem is found at the end of the value (something is missing in it).
+    `shown` is the path in the message, where it is not `path`.
+    """
+
+    path: tuple[str | int, ...]
+    message: str
+    key: str | None = None
+    late: bool = False
+    shown: tuple[str | int, ...] | None = None
+
+    def error(self, document: Document) -> SceneError:
+        """The error, at its place in the document."""
+        where = document.where(self.path, key=self.key)
+        if self.shown is not None:
+            where = Where(where.file, where.line, where.column, dotted(self.shown))
+        return SceneError(self.message, where)
+
+    def order(self, document: Document) -> tuple[int, int, int]:
+        """Sorts problems as one meets them in the text; those in options come last."""
+        place = document.where(self.path, key=self.key)
+        if place.line is None or place.column is None:
+            return (1, 0, 0)
+        if self.late:
+            line, column = document.end(self.path)
+            return (0, line, column)
+        return (0, place.line, place.column)
+
+
+def first_error(error: ValidationError, document: Document) -> SceneError:
+    """The first problem in the text, as an error of ours."""
+    problems = [p for details in error.errors(include_url=False) if (p := _problem(details)) is not None]
+    if not problems:
+        return SceneError("is not a scene", document.where(()))
+    return min(problems, key=lambda p: p.order(document)).error(document)
+
+
+@dataclass(slots=True)
+class _Place:
+    """Where an error's location leads: the path in the data, and the types that are allowed there."""
+
+    path: list[str | int]
+    types: list[Any]
+
+    @property
+    def models(self) -> list[type[Section]]:
+        return [t for t in self.types if isinstance(t, type) and issubclass(t, Section)]
+
+    def keys(self) -> list[str]:
+        return [name for model in self.models for name in model.model_fields]
+
+
+def _options(annotation: Any) -> list[Any]:
+    """The types of an annotation, without what decorates them."""
+    if get_origin(annotation) is Annotated:
+        return _options(get_args(annotation)[0])
+    if get_origin(annotation) in (tuple, dict, Literal) or not get_args(annotation):
+        return [annotation]
+    return [option for argument in get_args(annotation) for option in _options(argument)]
+
+
+def _place(location: Sequence[str | int]) -> _Place:
+    """Follows a location through the schema; its words that choose a class are no keys."""
+    place = _Place([], [Scene])
+    for part in location:
+        model = next((m for m in place.models if part in m.model_fields), None)
+        if isinstance(part, int):
+            items = [a for t in place.types if get_origin(t) is tuple for a in get_args(t) if a is not ...]
+            place.types = [option for item in items for option in _options(item)]
+            place.path.append(part)
+        elif model is not None:
+            place.types = _options(model.model_fields[part].annotation)
+            place.path.append(part)
+        elif any(get_origin(t) is dict for t in place.types):
+            place.path.append(part)
+            place.types = []
+        else:
+            place.types = [m for m in place.models if m.tag == part] or place.types
+    return place
+
+
+def _problem(details: ErrorDetails) -> Problem | None:
+    special: Callable[[ErrorDetails], Problem | None] | None = _SPECIAL.get(details["type"])
+    if special is not None:
+        return special(details)
+    place = _place(details["loc"])
+    if details["type"] not in _ALLOWED:
+        return Problem(tuple(place.path), details["msg"][:1].lower() + details["msg"][1:])
+    allowed = _ALLOWED[details["type"]].format(**details.get("ctx", {}))
+    return Problem(tuple(place.path), f"{allowed}, got {shown_value(details['input'])}")
+
+
+def _own(details: ErrorDetails) -> Problem:
+    location = details["loc"]
+    key = None
+    if location and location[-1] == "[key]":
+        key, location = str(location[-2]), location[:-2]
+    path = tuple(_place(location).path)
+    context = details["ctx"]
+    at = tuple(part for part in context["at"].split(".") if part)
+    return Problem(path + at, context["message"], key)
+
+
+def _unknown_key(details: ErrorDetails) -> Problem:
+    place = _place(details["loc"][:-1])
+    key = str(details["loc"][-1])
+    return Problem(tuple(place.path), unknown_name("key", key, place.keys()), key)
+
+
+def _missing(details: ErrorDetails) -> Problem:
+    place = _place(details["loc"][:-1])
+    part = details["loc"][-1]
+    if isinstance(part, int):
+        return _tuple(details, place)
+    return Problem(tuple(place.path), "is missing", late=True, shown=(*place.path, part))
+
+
+def _tuple(details: ErrorDetails, place: _Place | None = None) -> Problem:
+    place = place or _place(details["loc"])
+    fixed = next((t for t in place.types if get_origin(t) is tuple and ... not in get_args(t)), None)
+    what = f"a list of {len(get_args(fixed))} numbers" if fixed else "a list"
+    if str in place.types:
+        what = f"text or {what}"
+    return Problem(tuple(place.path), f"must be {what}, got {shown_value(details['input'])}")
+
+
+def _length(details: ErrorDetails) -> Problem | None:
+    place = _place(details["loc"])
+    if any(get_origin(t) is tuple and ... not in get_args(t) for t in place.types):
+        return _tuple(details, place)
+    # An entry that is wrong itself is not counted by the check, and is reported where it stands.
+    if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
+        return None
+    if not details["input"]:
+        return Problem(tuple(place.path), "must not be empty")
+    allowed = _ALLOWED[details["type"]].format(**details["ctx"])
+    return Problem(tuple(place.path), f"{allowed}, got {len(details['input'])}")
+
+
+def _kind(details: ErrorDetails) -> Problem:
+    """A word that should choose a class and does not."""
+    place = _place(details["loc"])
+    key = "projection" if any("projection" in m.model_fields for m in place.models) else "type"
+    given = details["input"].get(key)
+    tags = [model.tag for model in place.models]
+    path = (*place.path, key)
+    if not isinstance(given, str):
+        return Problem(path, f"must be {' or '.join(tags)}, got {shown_value(given)}")
+    return Problem(path, unknown_name(key, given, tags))
+
+
+def _word(details: ErrorDetails) -> Problem:
+    place = _place(details["loc"])
+    allowed = details["ctx"]["expected"].replace("'", "")
+    if place.models:
+        allowed += f" or a mapping with {' and '.join(place.keys())}"
+    return Problem(tuple(place.path), f"must be {allowed}, got {shown_value(details['input'])}")
+
+
+_SPECIAL: Mapping[str, Callable[[ErrorDetails], Problem | None]] = {
+    "clfractal": _own,
+    "extra_forbidden": _unknown_key,
+    "missing": _missing,
+    "tuple_type": _tuple,
+    "too_short": _length,
+    "too_long": _length,
+    "union_tag_invalid": _kind,
+    "literal_error": _word,
+}
+
+
+def shown_value(value: Any) -> str:
+    """A value as an error shows it: short, on one line."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple)):
+        return f"a list of {len(value)}"
+    if isinstance(value, Mapping):
+        return "a mapping"
+    text = repr(value) if isinstance(value, (int, float, str)) else type(value).__name__
+    return text if len(text) <= 60 else text[:57] + "..."

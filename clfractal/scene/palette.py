@@ -1,0 +1,70 @@
+"""Palettes: 256 linear colours for a scene's coloring, from a name or from stops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clfractal.errors import SceneError, Where, nearest
+from clfractal.files.srgb import decode
+
+if TYPE_CHECKING:
+    from cmap import Colormap
+
+    from clfractal.scene.parts import Coloring, Stop
+
+SIZE = 256
+_WHERE = Where(path="coloring.palette")
+
+
+def palette_table(coloring: Coloring) -> NDArray[np.float32]:
+    """The palette as an array of shape (256, 3): linear Rec. 709, entry i for place i / 255.
+
+    Raises:
+        SceneError: no palette has this name.
+    """
+    if isinstance(coloring.palette, str):
+        return _named(coloring.palette).copy()
+    return _from_stops(coloring.palette)
+
+
+def check_palette(palette: str | Sequence[Stop]) -> None:
+    """Raises SceneError, at coloring.palette, for a name that no palette has."""
+    if isinstance(palette, str):
+        _colormap(palette)
+
+
+def _from_stops(stops: Sequence[Stop]) -> NDArray[np.float32]:
+    """Mixed linearly between stops; constant before the first and after the last."""
+    places = np.linspace(0.0, 1.0, SIZE)
+    at = [stop.at for stop in stops]
+    columns = [np.interp(places, at, [stop.color[i] for stop in stops]) for i in range(3)]
+    return np.stack(columns, axis=1).astype(np.float32)
+
+
+@lru_cache(maxsize=16)
+def _named(name: str) -> NDArray[np.float32]:
+    colors = np.asarray(_colormap(name)(np.linspace(0.0, 1.0, SIZE)), dtype=np.float64)
+    return decode(colors[:, :3]).astype(np.float32)
+
+
+def _colormap(name: str) -> Colormap:
+    # Here, since it takes longer to import than a small picture to render.
+    from cmap import Colormap
+
+    try:
+        return Colormap(name)
+    except Exception as error:  # cmap raises many kinds for a name it does not know
+        guess = nearest(name, _names())
+        hint = f"; did you mean {guess!r}?" if guess else "; any name of cmap's catalog, such as 'viridis'"
+        raise SceneError(f"unknown palette {name[:60]!r}{hint}", _WHERE) from error
+
+
+def _names() -> list[str]:
+    from cmap import Catalog
+
+    return list({key for full in Catalog() for key in (full, full.split(":")[-1])})
