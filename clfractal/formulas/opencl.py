@@ -1,0 +1,272 @@
+"""Writes a chain of formulas as OpenCL C over packets: the functions that `kernels/orbit.h` iterates.
+
+The text depends on what shapes code (the expressions, baked parameters, counts); everything else is in `constants`, the
+values of the kernel argument `k`, so that dragging a parameter recompiles nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
+from clfractal.formulas.evaluate import evaluate_constant
+from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Node, Number
+
+
+@dataclass(frozen=True, slots=True)
+class FormulaText:
+    """A chain in OpenCL C.
+
+    Attributes:
+        text: the definitions that `kernels/orbit.h` expects before it.
+        constants: values of the run-time array `k`, in order; never empty.
+        logarithmic: the degree is above 1, so that distances follow |z| log|z|.
+        has_derivative: every link carries a scalar rule, so marching needs no Jacobian.
+    """
+
+    text: str
+    constants: tuple[float, ...]
+    logarithmic: bool
+    has_derivative: bool
+
+
+def write_formula(chain: Chain, *, scalar_rule: bool = True) -> FormulaText:
+    """The chain's functions over `real` and `dual`.
+
+    `scalar_rule=False` leaves out the formulas' own derivative, so that marching uses the Jacobian throughout.
+    """
+    return _ChainWriter(chain, scalar_rule).write()
+
+
+class _ChainWriter:
+    def __init__(self, chain: Chain, scalar_rule: bool) -> None:
+        self.chain = chain
+        self.links: Sequence[Link] = chain.links
+        self.size = chain.size
+        self.constants = Constants()
+        has_rule = all(link.bound.derivative is not None for link in self.links)
+        self.has_derivative = scalar_rule and has_rule
+        first = self.links[0].bound
+        self.offset = first.start if first.add == "point" else None
+        self.starts_at_zero = first.add == "point" and self.offset is None
+        # The distance of the last solid belongs to the last application's formula.
+        self.shape_link = self.links[-1] if self.links[-1].bound.formula.shape is not None else None
+
+    def write(self) -> FormulaText:
+        logarithmic = self.chain.degree > 1
+        parts = [
+            f"#define STATE_SIZE {self.size}",
+            f"#define FIRST_COUNT {1 if self.offset is not None else 0}",
+            f"#define LOGARITHMIC {int(logarithmic)}",
+            f"#define HAS_DERIVATIVE {int(self.has_derivative)}",
+            f"#define HAS_SHAPE {int(self.shape_link is not None)}",
+            _state_functions(self.size),
+        ]
+        number_types: tuple[NumberType, ...] = ("real", "dual")
+        for number_type in number_types:
+            parts.append(self._start(number_type))
+            parts.extend(self._apply(index, number_type) for index in range(len(self.links)))
+            parts.append(self._dispatch(number_type, derivative=False))
+            if self.shape_link is not None:
+                parts.append(self._solid_distance(number_type))
+        if self.has_derivative:
+            parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
+            parts.append(self._dispatch("real", derivative=True))
+        constants = tuple(self.constants.values) or (0.0,)
+        return FormulaText("\n".join(parts) + "\n", constants, logarithmic, self.has_derivative)
+
+    # --- one link ---
+
+    def _emitter(self, index: int, number_type: NumberType) -> Emitter:
+        bound = self.links[index].bound
+        bindings = {f"point_{v}": Value(f"c.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
+        bindings |= {v: Value(f"z.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
+        return Emitter(
+            number_type, bindings | _parameters(bound), self.constants, index, _evaluator(bound), lines=[]
+        )
+
+    def _map(self, emitter: Emitter, bound: BoundFormula) -> list[Value]:
+        for name, node in bound.formula.let:
+            emitter.bindings[name] = emitter.emit(node)
+        return [emitter.emit(node) for node in bound.formula.map]
+
+    def _full(self, number_type: NumberType, value: Value) -> str:
+        """A value as text of the full number type."""
+        return (
+            f"dual_constant({value.text})"
+            if number_type == "dual" and value.kind != "varying"
+            else value.text
+        )
+
+    def _add_constant(
+        self, index: int, number_type: NumberType, emitter: Emitter, mapped: list[Value]
+    ) -> list[str]:
+        """The components after adding C."""
+        bound = self.links[index].bound
+        texts = []
+        for i, value in enumerate(mapped):
+            if bound.add == "none":
+                texts.append(self._full(number_type, value))
+            elif bound.add == "constant":
+                assert bound.julia is not None
+                slot = self.constants.slot((index, "julia", i), Number(0.0), bound.julia[i])
+                added = emitter.combine("add", value, Value(slot, "flat"))
+                texts.append(self._full(number_type, added))
+            elif number_type == "dual" and i < 3:
+                # The point's own coordinate has the partials 1, 0, 0: one addition instead of four.
+                texts.append(f"dual_add_coordinate_{'xyz'[i]}({self._full('dual', value)}, c.s{i}.v)")
+            else:
+                texts.append(f"{number_type}_add({self._full(number_type, value)}, c.s{i})")
+        return texts
+
+    def _apply(self, index: int, number_type: NumberType) -> str:
+        bound = self.links[index].bound
+        state = "state" if number_type == "real" else "dual_state"
+        emitter = self._emitter(index, number_type)
+        mapped = self._map(emitter, bound)
+        head = (
+            f"INLINE {state} {number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
+        )
+        if bound.repeat == 1:
+            texts = self._add_constant(index, number_type, emitter, mapped)
+            return _function(
+                head, emitter.lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;"
+            )
+        # The map several times, then the constant: `next` names what one pass of the map gives.
+        passes = [
+            f"for (int pass = 0; pass < {bound.repeat}; ++pass) {{",
+            *("    " + line for line in emitter.lines),
+        ]
+        inner = ", ".join(self._full(number_type, value) for value in mapped)
+        passes += [f"    const {state} next = {{{inner}}};", "    z = next;", "}"]
+        plain = [Value(f"z.s{i}", "varying") for i in range(self.size)]
+        adder = Emitter(number_type, {}, self.constants, index, _evaluator(bound), prefix="u")
+        texts = self._add_constant(index, number_type, adder, plain)
+        lines = [*passes, *adder.lines]
+        return _function(head, lines, f"const {state} sum = {{{', '.join(texts)}}};\n    return sum;")
+
+    def _apply_derivative(self, index: int) -> str:
+        """One application that carries the scalar derivative along, sharing what the two have in common."""
+        bound = self.links[index].bound
+        assert bound.derivative is not None
+        emitter = self._emitter(index, "real")
+        emitter.bindings["dr"] = Value("(*growth)", "varying")
+        mapped = self._map(emitter, bound)
+        growth = emitter.emit(bound.derivative)
+        texts = self._add_constant(index, "real", emitter, mapped)
+        head = f"INLINE state derivative_apply_{index}(state z, state c, real *growth, __constant const scalar *k) {{"
+        tail = f"const state next = {{{', '.join(texts)}}};\n    *growth = {growth.text};\n    return next;"
+        return _function(head, emitter.lines, tail)
+
+    def _solid_distance(self, number_type: NumberType) -> str:
+        assert self.shape_link is not None
+        index = len(self.links) - 1
+        bound = self.shape_link.bound
+        assert bound.formula.shape is not None
+        emitter = self._emitter(index, number_type)
+        for name, node in bound.formula.let:
+            emitter.bindings[name] = emitter.emit(node)
+        value = self._full(number_type, emitter.emit(bound.formula.shape))
+        prefix, state = ("", "state") if number_type == "real" else ("dual_", "dual_state")
+        head = f"INLINE {number_type} {prefix}solid_distance({state} z, __constant const scalar *k) {{"
+        return _function(head, emitter.lines, f"return {value};")
+
+    # --- the chain ---
+
+    def _dispatch(self, number_type: NumberType, *, derivative: bool) -> str:
+        """`apply`: the link whose turn it is, the same for every lane because counts run together."""
+        prefix = "derivative" if derivative else number_type
+        name = "apply_derivative" if derivative else "apply" if number_type == "real" else "dual_apply"
+        state = "state" if number_type == "real" else "dual_state"
+        extra, passed = (", real *growth", ", growth") if derivative else ("", "")
+        lines = []
+        if len(self.links) > 1:
+            lines.append(f"const int turn = n % {self.chain.cycle_length};")
+            before = 0
+            for index, link in enumerate(self.links[:-1]):
+                before += link.count
+                lines.append(f"if (turn < {before}) return {prefix}_apply_{index}(z, c{passed}, k);")
+        head = f"INLINE {state} {name}(int n, {state} z, {state} c{extra}, __constant const scalar *k) {{"
+        return _function(head, lines, f"return {prefix}_apply_{len(self.links) - 1}(z, c{passed}, k);")
+
+    def _start(self, number_type: NumberType) -> str:
+        """The point as a state, and where the orbit begins.
+
+        With f(0) = 0 the first application gives C; dual numbers at 0 would give 0 times infinity in many formulas.
+        """
+        bound = self.links[0].bound
+        names = ["point.x", "point.y", "point.z"]
+        state = "state" if number_type == "real" else "dual_state"
+        components = names if number_type == "real" else [f"dual_coordinate_{a[-1]}({a})" for a in names]
+        bindings = {v: Value(f"c->s{i}", "varying") for i, v in enumerate(bound.formula.variables[:3])}
+        emitter = Emitter(
+            number_type, bindings | _parameters(bound), self.constants, 0, _evaluator(bound), prefix="p"
+        )
+        lines = [f"c->s{i} = {component};" for i, component in enumerate(components)]
+        if self.size == 4:
+            fourth = emitter.emit(bound.formula.slice or Number(0.0))
+            lines += [*emitter.lines, f"c->s3 = {self._full(number_type, fourth)};"]
+        if self.starts_at_zero:
+            zero = "R(0.0)" if number_type == "real" else "dual_constant(R(0.0))"
+            lines += [f"z->s{i} = {zero};" for i in range(self.size)]
+        else:
+            lines.append("*z = *c;")
+            for i, value in enumerate(self.offset or ()):
+                if value != 0:
+                    slot = self.constants.slot((0, "start", i), Number(0.0), value)
+                    component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
+                    lines.append(f"{component} += {slot};")
+        name = "start" if number_type == "real" else "dual_start"
+        head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
+        return _function(head, lines, None)
+
+
+def _parameters(bound: BoundFormula) -> dict[str, Value]:
+    """Baked parameters as literals, the others as names that `Emitter` turns into slots of `k`."""
+    baked = bound.baked
+    return {
+        name: literal(value) if name in baked else Value("", "constant", Name(name))
+        for name, value in bound.values.items()
+    }
+
+
+def _evaluator(bound: BoundFormula) -> Callable[[Node], float]:
+    values: Mapping[str, float] = dict(bound.values)
+    return lambda node: float(evaluate_constant(node, values))
+
+
+def _function(head: str, lines: Sequence[str], tail: str | None) -> str:
+    body = "".join(f"    {line}\n" for line in lines)
+    return f"{head}\n{body}" + (f"    {tail}\n" if tail else "") + "}\n"
+
+
+def _state_functions(size: int) -> str:
+    """The state of an orbit, by components so that every one can live in a register."""
+    fields = [f"s{i}" for i in range(size)]
+
+    def each(text: str, join: str = ", ") -> str:
+        return join.join(text.replace("@", field) for field in fields)
+
+    return f"""\
+typedef struct {{
+    real {", ".join(fields)};
+}} state;
+typedef struct {{
+    dual {", ".join(fields)};
+}} dual_state;
+INLINE state state_pick(mask m, state yes, state no) {{
+    const state r = {{{each("pick(m, yes.@, no.@)")}}};
+    return r;
+}}
+INLINE dual_state dual_state_pick(mask m, dual_state yes, dual_state no) {{
+    const dual_state r = {{{each("dual_where(m, yes.@, no.@)")}}};
+    return r;
+}}
+INLINE real state_square(state z) {{ return {each("z.@ * z.@", " + ")}; }}
+INLINE real dual_state_square(dual_state z) {{ return {each("z.@.v * z.@.v", " + ")}; }}
+// J^T z times a factor: half the gradient of |z|^2 by the point.
+INLINE vec dual_state_gradient(dual_state z, real factor) {{
+    return vec_of({", ".join(each(f"(factor * z.@.v) * z.@.d{axis}", " + ") for axis in "xyz")});
+}}
+"""

@@ -1,0 +1,109 @@
+"""The plan: everything a renderer decides before it touches a device. Plain data, so that it can travel to a worker."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from clfractal.device.structs import Precision
+from clfractal.errors import SceneError, Where
+from clfractal.files.channels import check_channels
+from clfractal.render.tiles import Region
+from clfractal.render.view import View, camera_view
+from clfractal.scene.model import Scene
+
+PrecisionChoice = Literal["auto", "float32", "float64"]
+
+# float32 is given up where a pixel is less than this many of its steps wide: distances are differences of coordinates,
+# and hits, normals and shadow starts work at fractions of a pixel.
+FLOAT32_STEPS_PER_PIXEL = 64.0
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """How a scene is rendered.
+
+    Attributes:
+        precision: the number type of every ray.
+        lanes: rays a work-item carries.
+        samples: rays per pixel.
+        region: the part of the picture to render, in pixels.
+        channels: what the film holds, in order.
+    """
+
+    precision: Precision
+    lanes: int
+    samples: int
+    region: Region
+    channels: tuple[str, ...]
+
+
+def finest_steps(scene: Scene, view: View) -> float:
+    """Width of the narrowest pixel footprint that the picture may show, in float32 steps of the coordinates there."""
+    chain = scene.chain
+    bounds = scene.renderer.bounds
+    center = np.array(bounds.center if bounds else chain.center)
+    radius = bounds.radius if bounds else chain.radius
+    footprint = view.pixel_size(scene.image.height)
+    if view.eye is not None:
+        plane = float((view.center - view.eye) @ view.axis)
+        # Inside the bounds the surface may be anywhere; what the camera is aimed at sets the scale.
+        nearest = float(np.linalg.norm(center - view.eye)) - radius
+        footprint *= min(nearest, plane) / plane if nearest > 0 else 1.0
+    magnitude = max(float(np.abs(view.center).max()), float(np.abs(view.origin).max()), 1e-30)
+    return scene.renderer.detail * footprint / (magnitude * float(np.finfo(np.float32).eps))
+
+
+def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool) -> tuple[Precision, str]:
+    """The number type for a scene, and a remark for the user (empty if there is nothing to remark).
+
+    Raises:
+        SceneError: float64 is asked for on a device without it.
+    """
+    if wanted == "float64" and not has_float64:
+        raise SceneError("the device has no float64; use float32", Where("--precision"))
+    if wanted != "auto":
+        return wanted, ""
+    view = camera_view(scene.camera, scene.image.width, scene.image.height)
+    if finest_steps(scene, view) >= FLOAT32_STEPS_PER_PIXEL:
+        return "float32", ""
+    if has_float64:
+        return "float64", ""
+    return "float32", "pixels are finer than float32 resolves here, and the device has no float64"
+
+
+def make_region(scene: Scene, region: tuple[int, int, int, int] | None) -> Region:
+    """The region `x, y, width, height` of a scene's picture, or all of it.
+
+    Raises:
+        SceneError: it is empty or does not lie inside the picture.
+    """
+    width, height = scene.image.width, scene.image.height
+    if region is None:
+        return Region(0, 0, width, height)
+    x, y, w, h = region
+    if w < 1 or h < 1 or x < 0 or y < 0 or x + w > width or y + h > height:
+        got = ",".join(str(value) for value in region)
+        raise SceneError(f"must lie inside the picture of {width} x {height} pixels, got {got}", Where("--region"))
+    return Region(x, y, w, h)
+
+
+def make_plan(
+    scene: Scene,
+    *,
+    precision: Precision,
+    lanes: int,
+    samples: int | None = None,
+    region: tuple[int, int, int, int] | None = None,
+    channels: tuple[str, ...] | None = None,
+) -> Plan:
+    """A plan for a scene; what is None is taken from the scene."""
+    return Plan(
+        precision,
+        lanes,
+        samples if samples is not None else scene.renderer.samples,
+        make_region(scene, region),
+        check_channels(channels if channels is not None else scene.output.channels),
+    )

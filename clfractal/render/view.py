@@ -1,0 +1,91 @@
+"""The View: a plane in space and an eye, from which every ray of a picture follows.
+
+Space is right-handed, z up, in scene units. The plane faces the viewer; an eye at infinity makes an orthographic view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+
+Vector = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """A rectangle in space, seen from an eye.
+
+    Attributes:
+        center: the plane's middle, shape (3,), scene units.
+        side, up: unit vectors to the picture's right and top; with `axis` they are perpendicular to each other.
+        axis: unit vector from the viewer to the plane, the view direction.
+        width, height: of the plane, scene units.
+        eye: shape (3,), or None for an eye at infinity (orthographic).
+        origin: the point from which depth (channel Z) is measured along `axis`: the eye, or the orthographic camera.
+    """
+
+    center: Vector
+    side: Vector
+    up: Vector
+    axis: Vector
+    width: float
+    height: float
+    eye: Vector | None
+    origin: Vector
+
+    def pixel_size(self, image_height: int) -> float:
+        """Height of a pixel on the plane, scene units."""
+        return self.height / image_height
+
+    def world_to_camera(self) -> Vector:
+        """4 x 4, for row vectors as OpenEXR has them: camera space looks along -z, x to the right, y up."""
+        rotation = np.stack([self.side, self.up, -self.axis], axis=1)
+        matrix = np.eye(4)
+        matrix[:3, :3] = rotation
+        matrix[3, :3] = -self.origin @ rotation
+        return matrix
+
+    def world_to_ndc(self) -> Vector:
+        """4 x 4, for row vectors: x and y from 0 (left, bottom) to 1 across the picture after division by w; z is the
+        distance along the axis divided by w."""
+        projection = np.zeros((4, 4))
+        if self.eye is None:
+            offset = (self.center - self.origin) @ np.stack([self.side, self.up], axis=1)
+            projection[0, 0], projection[1, 1] = 1 / self.width, 1 / self.height
+            projection[3, 0] = 0.5 - offset[0] / self.width
+            projection[3, 1] = 0.5 - offset[1] / self.height
+            projection[2, 2], projection[3, 3] = -1.0, 1.0
+        else:
+            distance = float((self.center - self.eye) @ self.axis)
+            offset = (self.center - self.eye) @ np.stack([self.side, self.up], axis=1)
+            # A point at camera (x, y, -d) meets the plane at x * distance / d; w = d.
+            projection[0, 0], projection[1, 1] = distance / self.width, distance / self.height
+            projection[2, 0] = -(0.5 - offset[0] / self.width)
+            projection[2, 1] = -(0.5 - offset[1] / self.height)
+            projection[2, 2], projection[2, 3] = -1.0, -1.0
+        return self.world_to_camera() @ projection
+
+
+def camera_view(camera: PerspectiveCamera | OrthographicCamera, width: int, height: int) -> View:
+    """The view of a scene's camera for a picture of `width` x `height` pixels.
+
+    A perspective camera's plane lies through its target and is as large as the camera sees there; an orthographic
+    camera's plane lies at its position.
+    """
+    position, target = np.array(camera.position, float), np.array(camera.target, float)
+    axis = target - position
+    distance = float(np.linalg.norm(axis))
+    axis /= distance
+    side = np.cross(axis, np.array(camera.up, float))
+    side /= np.linalg.norm(side)
+    up = np.cross(side, axis)
+    if isinstance(camera, PerspectiveCamera):
+        plane_height = 2.0 * distance * float(np.tan(np.radians(camera.fov) / 2))
+        center, eye = target, position
+    else:
+        plane_height, center, eye = camera.height, position, None
+    return View(center, side, up, axis, plane_height * width / height, plane_height, eye, position)

@@ -1,0 +1,66 @@
+// A packet of LANES rays carried by one work-item. On a CPU driver that does not vectorise divergent loops a packet fills
+// the vector unit; where work-items are vectorised already (GPUs, Intel's CPU runtime) LANES is 1 and everything is scalar.
+//
+// The build defines LANES (1, 4, 8 or 16) and REAL_IS_DOUBLE (0 or 1). From there on:
+//   scalar   one number, real   one number per lane, mask   per lane 0 (false) or -1 (all bits, true),
+//   R(1.5)   a literal of the right precision in every lane.
+#if REAL_IS_DOUBLE
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+typedef double scalar;
+#define R(x) ((real)(x))
+#define S(x) (x)
+#define REAL_SMALLEST 2.2250738585072014e-308
+#define REAL_LARGEST 1.7976931348623157e308
+#define REAL_EPSILON 2.220446049250313e-16
+#else
+typedef float scalar;
+#define R(x) ((real)(x##f))
+#define S(x) (x##f)
+#define REAL_SMALLEST 1.17549435e-38f
+#define REAL_LARGEST 3.40282347e38f
+#define REAL_EPSILON 1.1920929e-7f
+#endif
+
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+
+#if LANES == 1
+typedef scalar real;
+typedef int mask;
+#define any_lane(m) ((m) != 0)
+#define less(a, b) (-((a) < (b)))
+#define less_equal(a, b) (-((a) <= (b)))
+#define equal(a, b) (-((a) == (b)))
+#define is_nan(a) (-((a) != (a)))
+#define pick(m, yes, no) ((m) ? (yes) : (no))
+#define lanes_store(value, array) ((array)[0] = (value))
+#define lanes_load(array) ((array)[0])
+#else
+#if REAL_IS_DOUBLE
+typedef JOIN(double, LANES) real;
+typedef JOIN(long, LANES) mask;
+#else
+typedef JOIN(float, LANES) real;
+typedef JOIN(int, LANES) mask;
+#endif
+#define any_lane(m) any(m)
+#define less(a, b) ((real)(a) < (real)(b))
+#define less_equal(a, b) ((real)(a) <= (real)(b))
+#define equal(a, b) ((real)(a) == (real)(b))
+#define is_nan(a) ((a) != (a))
+#define pick(m, yes, no) select((real)(no), (real)(yes), m)
+#define lanes_store(value, array) JOIN(vstore, LANES)(value, 0, array)
+#define lanes_load(array) JOIN(vload, LANES)(0, array)
+#endif
+
+// Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.
+#define INLINE static inline __attribute__((always_inline))
+
+// Sum of a quantity over the lanes of a packet.
+INLINE scalar lanes_sum(real value) {
+    scalar each[LANES];
+    lanes_store(value, each);
+    scalar sum = 0;
+    for (int lane = 0; lane < LANES; ++lane) sum += each[lane];
+    return sum;
+}

@@ -1,0 +1,163 @@
+// The number type `dual`: a value and its three partial derivatives by the coordinates of the point in space.
+// Forward-mode differentiation: Griewank & Walther, Evaluating Derivatives, 2nd ed. (SIAM 2008), ch. 3.
+// An operation whose other operand is constant in space takes it as a plain `real` and spends no partials on it.
+typedef struct {
+    real v;           // value
+    real dx, dy, dz;  // partials by x, y and z of the point
+} dual;
+
+// The dual number with value `v` whose partials are those of `a`, scaled: the chain rule for a function of one number.
+INLINE dual dual_chain(real v, real slope, dual a) {
+    const dual r = {v, slope * a.dx, slope * a.dy, slope * a.dz};
+    return r;
+}
+
+// The chain rule for a function of two numbers with partials `fa` and `fb`.
+INLINE dual dual_chain2(real v, real fa, dual a, real fb, dual b) {
+    const dual r = {v, fa * a.dx + fb * b.dx, fa * a.dy + fb * b.dy, fa * a.dz + fb * b.dz};
+    return r;
+}
+
+INLINE dual dual_constant(real v) {
+    const dual r = {v, R(0.0), R(0.0), R(0.0)};
+    return r;
+}
+
+// The coordinates of the point themselves, and adding one of them: partials 1, 0, 0 and so on.
+INLINE dual dual_coordinate_x(real v) {
+    const dual r = {v, R(1.0), R(0.0), R(0.0)};
+    return r;
+}
+INLINE dual dual_coordinate_y(real v) {
+    const dual r = {v, R(0.0), R(1.0), R(0.0)};
+    return r;
+}
+INLINE dual dual_coordinate_z(real v) {
+    const dual r = {v, R(0.0), R(0.0), R(1.0)};
+    return r;
+}
+INLINE dual dual_add_coordinate_x(dual a, real v) {
+    const dual r = {a.v + v, a.dx + R(1.0), a.dy, a.dz};
+    return r;
+}
+INLINE dual dual_add_coordinate_y(dual a, real v) {
+    const dual r = {a.v + v, a.dx, a.dy + R(1.0), a.dz};
+    return r;
+}
+INLINE dual dual_add_coordinate_z(dual a, real v) {
+    const dual r = {a.v + v, a.dx, a.dy, a.dz + R(1.0)};
+    return r;
+}
+
+INLINE dual dual_add(dual a, dual b) {
+    const dual r = {a.v + b.v, a.dx + b.dx, a.dy + b.dy, a.dz + b.dz};
+    return r;
+}
+
+INLINE dual dual_sub(dual a, dual b) {
+    const dual r = {a.v - b.v, a.dx - b.dx, a.dy - b.dy, a.dz - b.dz};
+    return r;
+}
+
+INLINE dual dual_mul(dual a, dual b) { return dual_chain2(a.v * b.v, b.v, a, a.v, b); }
+INLINE dual dual_neg(dual a) {
+    const dual r = {-a.v, -a.dx, -a.dy, -a.dz};
+    return r;
+}
+
+INLINE dual dual_div(dual a, dual b) {
+    const real inverse = R(1.0) / b.v;
+    const real quotient = a.v / b.v;
+    return dual_chain2(quotient, inverse, a, -quotient * inverse, b);
+}
+
+INLINE dual dual_add_real(dual a, real b) {
+    const dual r = {a.v + b, a.dx, a.dy, a.dz};
+    return r;
+}
+
+INLINE dual dual_sub_real(dual a, real b) {
+    const dual r = {a.v - b, a.dx, a.dy, a.dz};
+    return r;
+}
+
+INLINE dual real_sub_dual(real a, dual b) {
+    const dual r = {a - b.v, -b.dx, -b.dy, -b.dz};
+    return r;
+}
+
+INLINE dual dual_mul_real(dual a, real b) { return dual_chain(a.v * b, b, a); }
+INLINE dual dual_div_real(dual a, real b) { return dual_chain(a.v / b, R(1.0) / b, a); }
+INLINE dual real_div_dual(real a, dual b) {
+    const real quotient = a / b.v;
+    return dual_chain(quotient, -quotient / b.v, b);
+}
+
+// A square costs fewer multiplications than a product of two different numbers.
+INLINE dual dual_square(dual a) { return dual_chain(a.v * a.v, a.v + a.v, a); }
+
+INLINE dual dual_where(mask m, dual yes, dual no) {
+    const dual r = {pick(m, yes.v, no.v), pick(m, yes.dx, no.dx), pick(m, yes.dy, no.dy), pick(m, yes.dz, no.dz)};
+    return r;
+}
+
+// Slopes at a kink are one-sided or 0: anything finite is right there, NaN is not.
+INLINE dual dual_abs(dual a) { return dual_chain(fabs(a.v), real_sign(a.v), a); }
+INLINE dual dual_sign(dual a) { return dual_constant(real_sign(a.v)); }
+INLINE dual dual_floor(dual a) { return dual_constant(floor(a.v)); }
+INLINE dual dual_min(dual a, dual b) { return dual_where(less_equal(a.v, b.v) | is_nan(b.v), a, b); }
+INLINE dual dual_max(dual a, dual b) { return dual_where(less_equal(b.v, a.v) | is_nan(b.v), a, b); }
+INLINE dual dual_clamp(dual a, dual low, dual high) { return dual_min(dual_max(a, low), high); }
+INLINE dual dual_mod(dual a, dual b) {
+    const real turns = floor(a.v / b.v);
+    return dual_chain2(a.v - b.v * turns, R(1.0), a, -turns, b);
+}
+
+// 0 with slope 0 at and below 0: the slope of the square root is infinite at 0.
+INLINE dual dual_sqrt(dual a) {
+    const real root = real_sqrt(a.v);
+    return dual_chain(root, pick(less(R(0.0), root), R(0.5) / root, R(0.0)), a);
+}
+
+INLINE dual dual_exp(dual a) {
+    const real value = exp(a.v);
+    return dual_chain(value, value, a);
+}
+
+INLINE dual dual_log(dual a) {
+    return dual_chain(real_log(a.v), pick(less((real)(REAL_SMALLEST), a.v), R(1.0) / a.v, R(0.0)), a);
+}
+
+INLINE dual dual_sin(dual a) { return dual_chain(sin(a.v), cos(a.v), a); }
+INLINE dual dual_cos(dual a) { return dual_chain(cos(a.v), -sin(a.v), a); }
+INLINE dual dual_tan(dual a) {
+    const real value = tan(a.v);
+    return dual_chain(value, R(1.0) + value * value, a);
+}
+
+// Slope 0 at and beyond the ends of [-1, 1], where the true one is infinite or does not exist.
+INLINE real arc_slope(real a) {
+    const real square = (R(1.0) - a) * (R(1.0) + a);
+    return pick(less(R(0.0), square), R(1.0) / sqrt(square), R(0.0));
+}
+INLINE dual dual_asin(dual a) { return dual_chain(real_asin(a.v), arc_slope(a.v), a); }
+INLINE dual dual_acos(dual a) { return dual_chain(real_acos(a.v), -arc_slope(a.v), a); }
+INLINE dual dual_atan(dual a) { return dual_chain(atan(a.v), R(1.0) / (R(1.0) + a.v * a.v), a); }
+
+// 0 with slope 0 at the origin.
+INLINE dual dual_atan2(dual y, dual x) {
+    const real square = x.v * x.v + y.v * y.v;
+    const real inverse = pick(less(R(0.0), square), R(1.0) / square, R(0.0));
+    return dual_chain2(real_atan2(y.v, x.v), x.v * inverse, y, -y.v * inverse, x);
+}
+
+// d(x^y) = y x^(y-1) dx + x^y log x dy; both slopes count as 0 where they are not finite.
+INLINE real finite_or_zero(real a) { return pick(less_equal(fabs(a), (real)(REAL_LARGEST)), a, R(0.0)); }
+INLINE dual dual_pow_real(dual x, real y) {
+    return dual_chain(real_pow(x.v, y), finite_or_zero(y * real_pow(x.v, y - R(1.0))), x);
+}
+INLINE dual dual_pow(dual x, dual y) {
+    const real value = real_pow(x.v, y.v);
+    const real by_base = finite_or_zero(y.v * real_pow(x.v, y.v - R(1.0)));
+    return dual_chain2(value, by_base, x, finite_or_zero(value * real_log(x.v)), y);
+}

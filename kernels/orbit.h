@@ -1,0 +1,170 @@
+// Orbits of points under the formula, as one loop over a packet: escape counts, inside tests, distances and gradients.
+//
+// From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
+// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, start, apply, apply_derivative, dual_start, dual_apply,
+// state_pick, dual_state_pick, state_values, state_square, solid_distance.
+//
+// A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
+// `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
+
+typedef struct {
+    real step;   // distance that is safe to go, in scene units; 0 inside
+    real count;  // applications until |z| > distance bailout
+    mask inside;
+} sphere;
+
+// Distance to the solid from the last |z|, its count and the growth of |z| per scene unit, g = |J^T z / |z||, given relative
+// to |z|: `relative` = |z| / g.
+//
+// Degree > 1: |z_n| grows like exp(G degree^n) with G the potential, so |z| log|z| / (2 g) is half of G / |grad G| (Hart,
+// Sandin, Kauffman 1989; the half makes it a lower bound for conformal maps). The solid of `iterations` applications is the
+// level set of G at log(bailout) / degree^iterations: subtracting it matters in the last few counts only.
+INLINE real distance_from_growth(real square, real relative, real count, __constant const struct Orbit *orbit) {
+#if LOGARITHMIC
+    real height = R(0.5) * log(square);
+    const real counts_left = (real)((scalar)orbit->iterations) - count;
+    if (any_lane(less(counts_left, R(12.0)))) {
+        height -= (real)(orbit->log_bailout) * exp2(-counts_left * (real)(orbit->log2_degree));
+    }
+    const real distance = R(0.5) * height * relative;
+#else
+    const real radius = sqrt(square);
+    const real distance = (R(1.0) - (real)(orbit->solid_radius) / radius) * relative;
+#endif
+    // A derivative that overflowed says that the surface is nearer than the number type can tell.
+    return fmax(pick(is_nan(distance), R(0.0), distance), R(0.0));
+}
+
+// Lanes that end the orbit inside at the iteration limit: true for those still within the bailout.
+INLINE mask settled(real square, __constant const struct Orbit *orbit) {
+    return less_equal(square, (real)(orbit->bailout_square));
+}
+
+// Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
+INLINE sphere orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    state c, z;
+    start(point, k, &c, &z);
+    real square = state_square(z);
+    real count = R(0.0) + (real)((scalar)min(FIRST_COUNT, orbit->iterations));
+    mask alive = active & less_equal(square, (real)(orbit->bailout_square));
+    for (int n = FIRST_COUNT; n < orbit->iterations; ++n) {
+        if (!any_lane(alive)) break;
+        const state next = apply(n, z, c, k);
+        z = state_pick(alive, next, z);
+        square = pick(alive, state_square(next), square);
+        count = pick(alive, (real)((scalar)(n + 1)), count);
+        alive &= less_equal(square, (real)(orbit->bailout_square));
+    }
+    const sphere result = {R(0.0), count, alive};
+    return result;
+}
+
+#if HAS_DERIVATIVE
+// Distance by the formula's own scalar derivative: |z| / g with g carried as one number.
+INLINE sphere orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    state c, z;
+    start(point, k, &c, &z);
+    real growth = R(1.0);
+    real square = state_square(z);
+    real count = (real)((scalar)FIRST_COUNT);
+    mask alive = active & less_equal(square, (real)(orbit->distance_square));
+    mask inside = alive & ~alive;
+    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
+        if (n == orbit->iterations) {
+            inside = alive & settled(square, orbit);
+            alive &= ~inside;
+        }
+        if (!any_lane(alive)) break;
+        real next_growth = growth;
+        const state next = apply_derivative(n, z, c, &next_growth, k);
+        z = state_pick(alive, next, z);
+        growth = pick(alive, next_growth, growth);
+        square = pick(alive, state_square(next), square);
+        count = pick(alive, (real)((scalar)(n + 1)), count);
+        alive &= less_equal(square, (real)(orbit->distance_square));
+    }
+    if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
+#if HAS_SHAPE
+    const real solid = solid_distance(z, k);
+    const real distance = fmax(solid / growth, R(0.0));
+    inside = active & less_equal(solid, R(0.0));
+#else
+    const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
+#endif
+    const sphere result = {pick(inside, R(0.0), distance), count, inside};
+    return result;
+}
+#endif
+
+// What is known of a point on the surface, from one orbit over dual numbers.
+typedef struct {
+    vec gradient;      // of the distance, not normalised: points away from the solid
+    real smooth;       // smooth escape count
+    real trap;         // smallest |z| of the orbit
+} surface_point;
+
+// Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
+INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
+                                  surface_point *surface) {
+    dual_state c, z;
+    dual_start(point, k, &c, &z);
+    real square = dual_state_square(z);
+    real square_before = square;
+    real trap = square;
+    real count = (real)((scalar)FIRST_COUNT);
+    mask alive = active & less_equal(square, (real)(orbit->distance_square));
+    mask inside = alive & ~alive;
+    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
+        if (n == orbit->iterations) {
+            inside = alive & settled(square, orbit);
+            alive &= ~inside;
+        }
+        if (!any_lane(alive)) break;
+        const dual_state next = dual_apply(n, z, c, k);
+        z = dual_state_pick(alive, next, z);
+        square_before = pick(alive, square, square_before);
+        square = pick(alive, dual_state_square(next), square);
+        trap = fmin(trap, square);
+        count = pick(alive, (real)((scalar)(n + 1)), count);
+        alive &= less_equal(square, (real)(orbit->distance_square));
+    }
+    if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
+#if HAS_SHAPE
+    // The last solid's distance in z, over how fast it changes per scene unit.
+    const dual solid = dual_solid_distance(z, k);
+    surface->gradient = vec_of(solid.dx, solid.dy, solid.dz);
+    const real solid_growth = vec_dot(surface->gradient, surface->gradient);
+    const real distance = fmax(solid.v * pick(less(R(0.0), solid_growth), R(1.0) / sqrt(solid_growth), R(0.0)), R(0.0));
+    inside = active & less_equal(solid.v, R(0.0));
+#else
+    // J^T z / |z|^2: dividing by |z|^2 first keeps the squares within range.
+    const vec relative = dual_state_gradient(z, R(1.0) / square);
+    const real relative_square = vec_dot(relative, relative);
+    surface->gradient = relative;
+    const real distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
+#endif
+    surface->trap = sqrt(trap);
+    // Smooth count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
+    // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
+    const real log_radius = (real)(orbit->log_distance_bailout);
+#if LOGARITHMIC
+    const real over = log2(R(0.5) * log(fmax(square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
+#else
+    const real over = (R(0.5) * log(square) - log_radius) / (R(0.5) * log(square / square_before));
+#endif
+    const real limit = (real)((scalar)orbit->iterations);
+    const real smooth = count - pick(is_nan(over), R(0.0), clamp(over, R(0.0), R(1.0)));
+    surface->smooth = pick(inside, limit, smooth);
+    const sphere result = {pick(inside, R(0.0), distance), count, inside};
+    return result;
+}
+
+// The distance used for marching: the cheapest that the formula offers.
+INLINE sphere orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+#if HAS_DERIVATIVE
+    return orbit_scalar_distance(point, active, orbit, k);
+#else
+    surface_point ignored;
+    return orbit_dual_distance(point, active, orbit, k, &ignored);
+#endif
+}

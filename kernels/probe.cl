@@ -1,0 +1,53 @@
+// Asked of every driver before anything else runs on it: does it compile packets of LANES lanes, are the results right, and
+// how fast are loops whose lanes leave at different times? Each work-item takes LANES points of a plane through the
+// Mandelbulb of power 8 (White and Nylander's rule, polynomial form) and counts applications until it escapes; the second
+// kernel calls every built-in function that the number types use, because some drivers lack a few for wide vectors.
+
+__kernel void escape_counts(__global scalar *counts, int width, int limit) {
+    const int first = (int)get_global_id(0) * LANES;
+    scalar across[LANES];
+    for (int lane = 0; lane < LANES; ++lane) across[lane] = (scalar)(first % width + lane);
+    const scalar scale = S(2.5) / (scalar)width;
+    const real cx = lanes_load(across) * (real)(scale) - R(1.25);
+    const real cy = R(0.0) + (real)((scalar)(first / width) * scale - S(1.25));
+    const real cz = R(0.3);
+    real x = cx, y = cy, z = cz, count = R(0.0);
+    mask alive = less_equal(x * x + y * y + z * z, R(4.0));
+    for (int n = 0; n < limit; ++n) {
+        if (!any_lane(alive)) break;
+        // (z + i rho)^8 and (x + i y)^8 by squaring three times; rho^8 scales the latter to length rho.
+        const real rho_square = x * x + y * y;
+        real a = z, b = sqrt(rho_square), u = x, v = y;
+        for (int squaring = 0; squaring < 3; ++squaring) {
+            const real next_a = a * a - b * b, next_u = u * u - v * v;
+            b = R(2.0) * a * b;
+            v = R(2.0) * u * v;
+            a = next_a;
+            u = next_u;
+        }
+        const real fourth = rho_square * rho_square;
+        const real shrink = pick(less(R(0.0), fourth), b / (fourth * fourth), R(0.0));
+        const real next_x = u * shrink + cx, next_y = v * shrink + cy, next_z = a + cz;
+        x = pick(alive, next_x, x);
+        y = pick(alive, next_y, y);
+        z = pick(alive, next_z, z);
+        count = pick(alive, (real)((scalar)(n + 1)), count);
+        alive &= less_equal(x * x + y * y + z * z, R(4.0));
+    }
+    scalar each[LANES];
+    lanes_store(count, each);
+    for (int lane = 0; lane < LANES; ++lane) counts[first + lane] = each[lane];
+}
+
+__kernel void built_ins(__global scalar *sums, __global const scalar *arguments) {
+    const int first = (int)get_global_id(0) * LANES;
+    scalar each[LANES];
+    for (int lane = 0; lane < LANES; ++lane) each[lane] = arguments[first + lane];
+    const real t = lanes_load(each);  // between 0 and 1
+    real sum = sqrt(t) + exp(t) + log(t + R(0.5)) + exp2(t) + log2(t + R(0.5)) + sin(t) + cos(t) + tan(t);
+    sum += asin(t) + acos(t) + atan(t) + atan2(t, R(0.7)) + pow(t + R(0.5), R(1.7)) + floor(t * R(8.0)) + fabs(t - R(0.5));
+    sum += fmin(t, R(0.4)) + fmax(t, R(0.6)) + clamp(t, R(0.3), R(0.7));
+    sum += pick(less(t, R(0.5)), R(1.0), R(2.0)) + pick(equal(t, t) & ~is_nan(t), R(4.0), R(8.0));
+    lanes_store(sum, each);
+    for (int lane = 0; lane < LANES; ++lane) sums[first + lane] = each[lane];
+}

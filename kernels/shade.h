@@ -1,0 +1,86 @@
+// Shading after the thesis's Eq. 5: for each light
+//   colour * intensity * (ambient * M + s * (diffuse * M * max(0, N.L) + specular * max(0, R.V)^shininess)),
+// M the surface's colour, s 0 in shadow and 1 outside. Colours are linear Rec. 709.
+typedef struct {
+    real r, g, b;
+} color;
+
+INLINE color color_of(real r, real g, real b) {
+    const color c = {r, g, b};
+    return c;
+}
+INLINE color color_splat(__constant const scalar *c) { return color_of((real)(c[0]), (real)(c[1]), (real)(c[2])); }
+INLINE color color_pick(mask m, color yes, color no) {
+    return color_of(pick(m, yes.r, no.r), pick(m, yes.g, no.g), pick(m, yes.b, no.b));
+}
+INLINE color color_mix(color a, color b, real share) {
+    return color_of(a.r + (b.r - a.r) * share, a.g + (b.g - a.g) * share, a.b + (b.b - a.b) * share);
+}
+
+// A light as seen from a point of the surface.
+typedef struct {
+    vec toward;      // direction to the light, length 1
+    real distance;   // to a point light; largest number for a directional one
+    real strength;   // intensity after falloff
+} incidence;
+
+INLINE incidence light_at(__constant const struct Light *light, vec point) {
+    incidence in;
+    in.strength = (real)(light->intensity);
+    if (light->kind == LIGHT_DIRECTIONAL) {
+        in.toward = vec_scale(vec_splat(light->vector), R(-1.0));
+        in.distance = (real)(REAL_LARGEST);
+    } else {
+        const vec offset = vec_sub(vec_splat(light->vector), point);
+        const real square = fmax(vec_dot(offset, offset), (real)(REAL_SMALLEST));
+        in.toward = vec_normalize(offset);
+        in.distance = sqrt(square);
+        if (light->inverse_square) in.strength /= square;
+    }
+    return in;
+}
+
+// What one light adds. `lit` is s of Eq. 5; `to_viewer` has length 1.
+INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, __constant const struct Light *light,
+                   __constant const struct Material *material) {
+    const real facing = vec_dot(normal, in.toward);
+    const mask front = lit & less(R(0.0), facing);
+    const real diffuse = pick(front, (real)(material->diffuse) * facing, R(0.0));
+    // R = 2 (N.L) N - L, the light's direction mirrored at the normal.
+    const vec mirrored = vec_sub(vec_scale(normal, R(2.0) * facing), in.toward);
+    const real toward_viewer = fmax(vec_dot(mirrored, to_viewer), R(0.0));
+    const real highlight = (real)(material->specular) * pow(toward_viewer, (real)(material->shininess));
+    const real specular = pick(front & less(R(0.0), toward_viewer), highlight, R(0.0));
+    const real body = (real)(material->ambient) + diffuse;
+    return color_of(in.strength * (real)(light->color[0]) * (body * surface.r + specular),
+                    in.strength * (real)(light->color[1]) * (body * surface.g + specular),
+                    in.strength * (real)(light->color[2]) * (body * surface.b + specular));
+}
+
+// A palette of PALETTE_SIZE colours over [0, 1), repeating, blended linearly between neighbours.
+INLINE color palette_color(real where, __global const float *palette) {
+    scalar at[LANES], red[LANES], green[LANES], blue[LANES];
+    lanes_store((where - floor(where)) * R(256.0), at);
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int first = clamp((int)at[lane], 0, PALETTE_SIZE - 1);
+        const int second = (first + 1) & (PALETTE_SIZE - 1);
+        const float share = (float)at[lane] - (float)first;
+        red[lane] = mix(palette[3 * first], palette[3 * second], share);
+        green[lane] = mix(palette[3 * first + 1], palette[3 * second + 1], share);
+        blue[lane] = mix(palette[3 * first + 2], palette[3 * second + 2], share);
+    }
+    return color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
+}
+
+// The surface's own colour M.
+INLINE color surface_color(vec normal, surface_point surface, __constant const struct Material *material,
+                           __global const float *palette) {
+#if COLORING == COLORING_NORMAL
+    // The thesis stores normals as (n + 1) / 2 in RGB (sec. 3.2.1).
+    return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
+#elif COLORING == COLORING_ITERATIONS
+    return palette_color(surface.smooth * (real)(material->palette_scale) + (real)(material->palette_offset), palette);
+#else
+    return color_splat(material->color);
+#endif
+}
