@@ -28,7 +28,7 @@ _PR_SET_PDEATHSIG = 1  # <sys/prctl.h>
 
 
 def main() -> None:
-    """Do what the request asks and leave at once, without a driver's clean-up (which may hang or crash, too)."""
+    """Do what the request asks and leave at once, without a driver's clean-up, which may hang or crash."""
     folder = Path(sys.argv[1])
     text = (folder / REQUEST).read_text(encoding="utf-8")
     request: dict[str, Any] = json.loads(text)

@@ -123,7 +123,7 @@ def warm_up(device: Device, program: Any, warm: Warm) -> None:
 
 
 def compile_job(request: Mapping[str, Any]) -> str | None:
-    """Compile and warm up in a child process; leaves the binary in the folder, or returns the compiler's log."""
+    """Compile and warm up in a child: leaves the binary in the folder, or returns the compiler's log."""
     device = by_key(*request["device"])
     try:
         program = compile_source(device, request["text"], request["flags"])

@@ -1,0 +1,122 @@
+"""The job that finds out, in a child process, whether a lane count works on a device and how fast it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.program import Program, build, math_flags
+from clfractal.device.select import Device, by_key, is_simulator
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+
+_WIDTH, _ROWS, _LIMIT = 512, 256, 40
+_WIDTH_SIMULATED, _ROWS_SIMULATED = 16, 1
+_LAUNCHES = 5
+_CHECKED = 4  # of the points every fourth in both directions
+
+# A driver is right if its built-in functions are within some units in the last place of ours and all but a
+# few of the chaotic counts agree: fused and separate roundings part near the set's surface.
+_TOLERANCE: dict[Precision, float] = {"float32": 3e-6, "float64": 1e-14}
+_COUNTS_MAY_DIFFER = 0.01
+
+_HEADERS = '#include "lanes.h"\n#include "probe.cl"\n'
+
+
+def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
+    """Try `request["lanes"]` in `request["precision"]`.
+
+    Returns `milliseconds` (of the fastest of some launches), `points_per_second` and `fault`, a text that is
+    empty if the results are right.
+    """
+    device = by_key(*request["device"])
+    precision: Precision = request["precision"]
+    lanes = int(request["lanes"])
+    flat = flatten(
+        "probe_entry.cl",
+        generated={"probe_entry.cl": _HEADERS},
+        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
+    )
+    program = build(device, flat.text, flags=math_flags(precision), sources=flat.sources, isolated=False)
+    fault = _built_ins_fault(program, precision, lanes)
+    width, rows = (_WIDTH_SIMULATED, _ROWS_SIMULATED) if is_simulator(device.info) else (_WIDTH, _ROWS)
+    counts, milliseconds = _escape_counts(program, precision, lanes, width, rows)
+    differing = np.mean(counts[::_CHECKED, ::_CHECKED] != _expected_counts(width, rows))
+    if differing > _COUNTS_MAY_DIFFER:
+        fault = fault or f"{differing:.0%} of the escape counts are wrong"
+    return {
+        "milliseconds": milliseconds,
+        "points_per_second": 1e3 * width * rows / milliseconds,
+        "fault": fault,
+    }
+
+
+def _built_ins_fault(program: Program, precision: Precision, lanes: int) -> str:
+    t = np.linspace(0.01, 0.99, 64).astype(precision)
+    arguments, sums = _buffer(program.device, t), _buffer(program.device, np.zeros_like(t))
+    kernel = program.kernel("built_ins")
+    kernel.set_args(sums, arguments)
+    result = np.empty_like(t)
+    with program.device.failures("trying the built-in functions"):
+        cl.enqueue_nd_range_kernel(program.device.queue, kernel, (len(t) // lanes,), (1,))
+        cl.enqueue_copy(program.device.queue, result, sums)
+    expected = _expected_sums(t.astype(np.float64))
+    error = float(np.max(np.abs(result - expected) / expected))
+    return "" if error <= _TOLERANCE[precision] else f"built-in functions are wrong by {error:.1e}"
+
+
+def _escape_counts(
+    program: Program, precision: Precision, lanes: int, width: int, rows: int
+) -> tuple[npt.NDArray[Any], float]:
+    device = program.device
+    counts = np.empty((rows, width), precision)
+    buffer = _buffer(device, counts)
+    kernel = program.kernel("escape_counts")
+    kernel.set_args(buffer, np.int32(width), np.int32(_LIMIT))
+    times = []
+    with device.failures("counting escapes"):
+        for _ in range(1 if is_simulator(device.info) else _LAUNCHES):
+            event = cl.enqueue_nd_range_kernel(device.queue, kernel, (counts.size // lanes,), None)
+            event.wait()
+            times.append(1e-6 * (event.profile.end - event.profile.start))
+        cl.enqueue_copy(device.queue, counts, buffer)
+    return counts, max(min(times), 1e-3)
+
+
+def _buffer(device: Device, values: npt.NDArray[Any]) -> cl.Buffer:
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    return cl.Buffer(device.context, flags, hostbuf=values)
+
+
+def _expected_sums(t: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    total = np.sqrt(t) + np.exp(t) + np.log(t + 0.5) + np.exp2(t) + np.log2(t + 0.5) + np.sin(t) + np.cos(t)
+    total += np.tan(t) + np.arcsin(t) + np.arccos(t) + np.arctan(t) + np.arctan2(t, 0.7) + (t + 0.5) ** 1.7
+    total += np.floor(t * 8) + np.abs(t - 0.5) + np.minimum(t, 0.4) + np.maximum(t, 0.6)
+    total += np.clip(t, 0.3, 0.7) + np.where(t < 0.5, 1, 2) + 4
+    return np.asarray(total, np.float64)
+
+
+def _expected_counts(width: int, rows: int) -> npt.NDArray[np.float64]:
+    """The counts of `escape_counts` at the checked points, by the polar form of the rule."""
+    scale = 2.5 / width
+    columns, checked_rows = np.arange(0, width, _CHECKED), np.arange(0, rows, _CHECKED)
+    cx, cy = np.meshgrid(columns * scale - 1.25, checked_rows * scale - 1.25)
+    cz = np.full_like(cx, 0.3)
+    x, y, z = cx.copy(), cy.copy(), cz.copy()
+    count: npt.NDArray[np.float64] = np.zeros_like(cx)
+    alive = x * x + y * y + z * z <= 4
+    for n in range(_LIMIT):
+        px, py, pz = x[alive], y[alive], z[alive]
+        rho = np.hypot(px, py)
+        polar, azimuth = 8 * np.arctan2(rho, pz), 8 * np.arctan2(py, px)
+        radius = np.hypot(rho, pz) ** 8
+        x[alive] = radius * np.sin(polar) * np.cos(azimuth) + cx[alive]
+        y[alive] = radius * np.sin(polar) * np.sin(azimuth) + cy[alive]
+        z[alive] = radius * np.cos(polar) + cz[alive]
+        count[alive] = n + 1
+        alive &= np.asarray(x * x + y * y + z * z <= 4)
+    return count
