@@ -11,6 +11,7 @@ from clfractal.formulas.model import MAX_REPEAT, BoundFormula, Formula, inside
 from clfractal.formulas.nodes import Call, Node, names_in, walk
 
 MAX_RADIUS = 1e6
+MAX_BAILOUT = 1e12
 
 
 def bind(
@@ -57,8 +58,8 @@ def check_radius(value: object, where: Where) -> float | None:
     """A radius given by the user as a positive finite float (None stays None); FormulaError otherwise."""
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 1e9:
-        raise FormulaError(f"must be a number above 0 and at most 1e9, got {str(value)[:60]}", where)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= MAX_BAILOUT:
+        raise FormulaError(f"must be a number above 0 and at most {MAX_BAILOUT:g}, got {str(value)[:60]}", where)
     return float(value)
 
 
@@ -92,8 +93,8 @@ def check_constant(julia: object, size: int, where: Where) -> tuple[float, ...]:
 _DERIVED: tuple[tuple[str, Callable[[float], bool], str], ...] = (
     ("repeat", lambda v: 0.5 <= v <= MAX_REPEAT + 0.5, f"must be 1 to {MAX_REPEAT}"),
     ("degree", lambda v: 1 <= v <= 1000, "must be 1 to 1000"),
-    ("bailout", lambda v: 0 < v <= 1e9, "must be above 0 and at most 1e9"),
-    ("distance_bailout", lambda v: 0 < v <= 1e9, "must be above 0 and at most 1e9"),
+    ("bailout", lambda v: 0 < v <= MAX_BAILOUT, f"must be above 0 and at most {MAX_BAILOUT:g}"),
+    ("distance_bailout", lambda v: 0 < v <= MAX_BAILOUT, f"must be above 0 and at most {MAX_BAILOUT:g}"),
     ("step_scale", lambda v: 0 < v <= 1, "must be above 0 and at most 1"),
 )
 

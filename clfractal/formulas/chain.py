@@ -11,7 +11,7 @@ from typing import Any
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.model import Add, BoundFormula
 
-MAX_LINKS = 32
+MAX_LINKS = 64
 MAX_COUNT = 1000
 
 

@@ -5,8 +5,8 @@ because of an argument outside a function's domain:
 
 - sqrt of a negative number is 0; asin and acos clamp their argument to [-1, 1]; log(x) is log(max(x, TINY)).
 - atan2(0, 0) = 0, sign(0) = 0, mod(x, y) = x - y*floor(x/y); min and max take the first of equal arguments.
-- x**n with a constant whole n multiplies (a negative n: the reciprocal); otherwise it is exp(n*log(x)) for x > 0,
-  0 for x < 0, and at x = 0: 0 for n > 0, 1 for n = 0, infinity for n < 0.
+- x**n with a constant whole n multiplies (a negative n: the reciprocal). Otherwise it is exp(n*log(x)) for x > 0; for
+  x < 0 the signed power where n happens to be whole, else 0; at x = 0: 0 for n > 0, 1 for n = 0, infinity for n < 0.
 - cpow_re and cpow_im are 0 at x = y = 0 for n other than 0, and (1, 0) for n = 0.
 - x/0 is IEEE's: an infinity, or NaN for 0/0.
 - `where` never lets the branch that is not taken into the result.
@@ -54,11 +54,12 @@ def evaluate(node: Node, names: Mapping[str, Any], backend: Backend | None = Non
         if isinstance(condition, bool):
             return evaluate(node.arguments[1 if condition else 2], names, backend)
         branches = [evaluate(argument, names, backend) for argument in node.arguments[1:]]
-        return _call("where", [condition, *branches], backend)
-    return _call(node.function, [evaluate(argument, names, backend) for argument in node.arguments], backend)
+        return call_any("where", [condition, *branches], backend)
+    return call_any(node.function, [evaluate(argument, names, backend) for argument in node.arguments], backend)
 
 
-def _call(function: str, arguments: list[Any], backend: Backend | None) -> Any:
+def call_any(function: str, arguments: list[Any], backend: Backend | None) -> Any:
+    """One function on numbers of the backend, or on Python floats alone."""
     # type() and not isinstance(): numpy.float64 is a subclass of float but is not a constant of the formula.
     if all(type(argument) in (float, int, bool) for argument in arguments):
         return call_float(function, arguments)
@@ -116,9 +117,13 @@ def _pow(x: float, n: float) -> float:
     if exponent is not None and abs(exponent) <= MAX_EXPONENT:
         power: float = power_by_squaring(x, abs(exponent), lambda a, b: a * b, 1.0)
         return power if exponent >= 0 else _divide(1.0, power)
+    if math.isnan(x) or math.isnan(n):
+        return math.nan
     if x > 0:
         return _exp(n * math.log(x))
-    return 0.0 if x < 0 or n > 0 else math.inf
+    if x < 0:
+        return 0.0 if exponent is None else _exp(n * math.log(-x)) * (-1.0 if exponent % 2 else 1.0)
+    return 0.0 if n > 0 else math.inf
 
 
 def _cpow(x: float, y: float, n: float) -> tuple[float, float]:
@@ -186,7 +191,7 @@ _FLOAT_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "asin": lambda a: math.asin(min(max(a, -1.0), 1.0)),
     "acos": lambda a: math.acos(min(max(a, -1.0), 1.0)),
     "atan": math.atan,
-    "atan2": math.atan2,
+    "atan2": lambda y, x: 0.0 if x == 0 and y == 0 else math.atan2(y, x),
     "min": lambda a, b: a if a <= b else b,
     "max": lambda a, b: a if a >= b else b,
     "clamp": lambda a, low, high: min(max(a, low), high),

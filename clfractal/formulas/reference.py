@@ -1,0 +1,257 @@
+"""The oracle: escape counts and distances with NumPy in float64, and orbits and Jacobians with mpmath at any precision.
+
+Written for clarity, straight from the definitions in the design: what the kernels compute is compared with this.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clfractal.formulas.backends import (
+    DualBackend,
+    MpmathBackend,
+    NumpyBackend,
+    constant_dual,
+    seeded,
+)
+from clfractal.formulas.backends import (
+    Dual as Dual,
+)
+from clfractal.formulas.chain import Chain
+from clfractal.formulas.evaluate import Backend, evaluate
+from clfractal.formulas.evaluate import evaluate_constant as evaluate_constant
+from clfractal.formulas.model import BoundFormula, point_name
+
+Float = NDArray[np.float64]
+
+# Applications beyond the limit, for points outside that have not reached the distance bailout at the limit.
+EXTRA_APPLICATIONS = 64
+
+
+def apply(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
+    """One application: the map with its repeats, then the addition of `constant` (C) unless the formula adds nothing."""
+    formula = bound.formula
+    fixed = {name: float(value) for name, value in bound.values.items()}
+    names: dict[str, Any] = {
+        **fixed,
+        **{point_name(v): c for v, c in zip(formula.variables, constant, strict=True)},
+    }
+    for _ in range(bound.repeat):
+        names.update(zip(formula.variables, state, strict=True))
+        for name, node in formula.let:
+            names[name] = evaluate(node, names, backend)
+        state = [evaluate(node, names, backend) for node in formula.map]
+    if bound.add == "none":
+        return list(state)
+    return [backend.call("add", [z, c]) for z, c in zip(state, constant, strict=True)]
+
+
+def space_to_state(chain: Chain, point: Sequence[Any], backend: Backend) -> list[Any]:
+    """A point in space as a state: with the slice's fourth coordinate for four variables."""
+    if chain.size == 3:
+        return list(point)
+    formula = chain.first.formula
+    if formula.slice is None:
+        return [*point, 0.0]
+    names = {**chain.first.values, **dict(zip(formula.variables, point, strict=False))}
+    return [*point, evaluate(formula.slice, names, backend)]
+
+
+def constant_of(bound: BoundFormula, point: Sequence[Any]) -> Sequence[Any]:
+    """C: the Julia constant, or the point in space as a state."""
+    return list(bound.julia) if bound.julia is not None else point
+
+
+def escape(
+    chain: Chain, points: Float, iterations: int, bailout: float | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Escape counts of points, shape (n, 3), in scene units.
+
+    Returns:
+        The number of applications until |z| > bailout (at most `iterations`), and whether it never was.
+    """
+    radius = chain.bailout if bailout is None else bailout
+    backend = NumpyBackend()
+    with np.errstate(all="ignore"):
+        state, point = _start(chain, points, backend)
+        count = np.zeros(len(points), dtype=np.int64)
+        alive = _norm(state) <= radius
+        for application in range(iterations):
+            index = np.flatnonzero(alive)
+            if not len(index):
+                break
+            bound = chain.link_at(application).bound
+            here = [p[index] for p in point]
+            new = apply(bound, [z[index] for z in state], constant_of(bound, here), backend)
+            for component, value in zip(state, new, strict=True):
+                component[index] = value
+            count[index] += 1
+            # A NaN is no small number: such a point has escaped.
+            alive[index] = _norm([z[index] for z in state]) <= radius
+    return count, alive
+
+
+def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float]:
+    """Estimated distance to the solid (0 inside), in scene units, and the gradient of the last potential.
+
+    The solid is the set of points with |z| <= bailout after `iterations` applications. With J the Jacobian of the last z
+    and g = |J^T z/|z||: for a degree above 1 (|z| log|z| - what is left of the bailout's) / (2 g), for degree 1
+    (|z| - R) / g with R the chain's `solid_radius`, or the last formula's `shape` over its own gradient. Iteration stops
+    beyond the distance bailout. No step scale is applied.
+
+    Returns:
+        Distances of shape (n,); gradients of shape (n, 3), which point out of the solid and are not normalised.
+    """
+    backend = DualBackend(NumpyBackend())
+    with np.errstate(all="ignore"):
+        state, point, count, inside = _dual_orbit(chain, points, iterations, backend)
+        shape = chain.links[-1].bound.formula.shape if chain.degree <= 1 else None
+        radius = _norm([z.value for z in state])
+        gradient = _gradient(state, radius)
+        if shape is not None:
+            bound = chain.links[-1].bound
+            names = {**bound.values, **dict(zip(bound.formula.variables, state, strict=True))}
+            for name, node in bound.formula.let:
+                names[name] = evaluate(node, names, backend)
+            solid = constant_dual(evaluate(shape, names, backend), 3)
+            gradient = np.stack([np.broadcast_to(p, radius.shape) for p in solid.partials], axis=1)
+            inside = solid.value <= 0
+            growth = np.linalg.norm(gradient, axis=1)
+            result = np.where(growth > 0, solid.value / growth, 0.0)
+        elif chain.degree > 1:
+            # The solid of few iterations is the level set of the potential at the bailout.
+            left = (iterations - count) / chain.cycle_length
+            height = np.log(radius) - math.log(chain.bailout) * chain.degree**-left
+            result = 0.5 * radius * height / np.linalg.norm(gradient, axis=1)
+        else:
+            result = (radius - chain.solid_radius) / np.linalg.norm(gradient, axis=1)
+        result = np.where(inside | ~(result > 0), 0.0, result)
+    return result, gradient
+
+
+def _start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], list[Float]]:
+    """The state before the first application and the point as a state."""
+    columns = np.array(points, dtype=float).reshape(-1, 3).T
+    raw = space_to_state(chain, list(columns), backend)
+    point = [np.array(np.broadcast_to(p, columns[0].shape), dtype=float) for p in raw]
+    state = [np.zeros_like(p) if chain.add == "point" else p.copy() for p in point]
+    return state, point
+
+
+def _norm(state: Sequence[Float]) -> Float:
+    square: Float = np.sqrt(sum((z * z for z in state[1:]), start=state[0] * state[0]))
+    return square
+
+
+def _gradient(state: Sequence[Any], radius: Float) -> Float:
+    """J^T z/|z|, shape (n, 3)."""
+    return np.stack([sum(z.value / radius * z.partials[j] for z in state) for j in range(3)], axis=1)
+
+
+def _dual_orbit(
+    chain: Chain, points: Float, iterations: int, backend: DualBackend
+) -> tuple[list[Any], list[Any], NDArray[np.int64], NDArray[np.bool_]]:
+    """Orbits over duals until |z| > distance bailout: last states, points, counts, and which are inside."""
+    columns = np.array(points, dtype=float).reshape(-1, 3).T
+    shape = columns[0].shape
+    point = [_full(p, shape) for p in space_to_state(chain, seeded(list(columns)), backend)]
+    zero = _full(0.0, shape)
+    state = [zero] * chain.size if chain.add == "point" else list(point)
+    count = np.zeros(shape, dtype=np.int64)
+    inside = np.zeros(shape, dtype=bool)
+    alive = _norm([z.value for z in state]) <= chain.distance_bailout
+    for application in range(iterations + EXTRA_APPLICATIONS):
+        if application >= iterations:
+            # Only points that have left the bailout go on.
+            settled = alive & (_norm([z.value for z in state]) <= chain.bailout)
+            if application == iterations:
+                inside = settled
+            alive &= ~settled
+        if not alive.any():
+            break
+        bound = chain.link_at(application).bound
+        new = apply(bound, state, constant_of(bound, point), backend)
+        state = [_select(alive, _full(n, shape), z) for n, z in zip(new, state, strict=True)]
+        count += alive
+        alive = alive & (_norm([z.value for z in state]) <= chain.distance_bailout)
+    return state, point, count, inside
+
+
+def _full(value: Any, shape: tuple[int, ...]) -> Dual:
+    """A dual whose value and partials are arrays."""
+    dual = constant_dual(value, 3)
+    parts = tuple(np.array(np.broadcast_to(p, shape), dtype=float) for p in dual.partials)
+    return Dual(np.array(np.broadcast_to(dual.value, shape), dtype=float), parts)
+
+
+def _select(mask: NDArray[np.bool_], yes: Dual, no: Dual) -> Dual:
+    pairs = zip(yes.partials, no.partials, strict=True)
+    return Dual(np.where(mask, yes.value, no.value), tuple(np.where(mask, p, q) for p, q in pairs))
+
+
+# --- mpmath ---
+
+
+def mp_orbit(chain: Chain, point: Sequence[Any], applications: int, digits: int = 40) -> list[tuple[Any, ...]]:
+    """The states after 0, 1, ... applications, as mpmath numbers computed with `digits` digits."""
+    import mpmath
+
+    with mpmath.workdps(digits):
+        backend = MpmathBackend()
+        here = [mpmath.mpf(p) for p in point]
+        c = [mpmath.mpf(p) for p in space_to_state(chain, here, backend)]
+        state: list[Any] = [mpmath.mpf(0)] * chain.size if chain.add == "point" else c
+        states = [tuple(state)]
+        for application in range(applications):
+            bound = chain.link_at(application).bound
+            constant = [mpmath.mpf(p) for p in constant_of(bound, c)]
+            state = [mpmath.mpf(z) for z in apply(bound, state, constant, backend)]
+            states.append(tuple(state))
+    return states
+
+
+def mp_escape(chain: Chain, point: Sequence[Any], iterations: int, digits: int = 40) -> tuple[int, bool]:
+    """One point's escape count and whether it never escapes, with `digits` digits."""
+    import mpmath
+
+    with mpmath.workdps(digits):
+        backend = MpmathBackend()
+        c = [mpmath.mpf(p) for p in space_to_state(chain, [mpmath.mpf(p) for p in point], backend)]
+        state: list[Any] = [mpmath.mpf(0)] * chain.size if chain.add == "point" else c
+        limit = mpmath.mpf(chain.bailout) ** 2
+        for application in range(iterations + 1):
+            square = mpmath.fsum(z * z for z in state)
+            if not square <= limit:
+                return application, False
+            if application < iterations:
+                bound = chain.link_at(application).bound
+                state = apply(bound, state, [mpmath.mpf(p) for p in constant_of(bound, c)], backend)
+    return iterations, True
+
+
+def mp_jacobian(chain: Chain, point: Sequence[Any], applications: int, digits: int = 40) -> list[list[Any]]:
+    """dz_i/dp_j after some applications, by the point's three coordinates, exact but for rounding."""
+    import mpmath
+
+    with mpmath.workdps(digits):
+        backend = DualBackend(MpmathBackend())
+        here = seeded([mpmath.mpf(p) for p in point])
+        c = [_mp_dual(p) for p in space_to_state(chain, here, backend)]
+        state: list[Any] = [_mp_dual(0.0)] * chain.size if chain.add == "point" else c
+        for application in range(applications):
+            bound = chain.link_at(application).bound
+            constant = [_mp_dual(p) for p in constant_of(bound, c)]
+            state = [_mp_dual(z) for z in apply(bound, state, constant, backend)]
+        return [list(z.partials) for z in state]
+
+
+def _mp_dual(value: Any) -> Dual:
+    import mpmath
+
+    dual = constant_dual(value, 3)
+    return Dual(mpmath.mpf(dual.value), tuple(mpmath.mpf(p) for p in dual.partials))
