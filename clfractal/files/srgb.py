@@ -1,21 +1,21 @@
 """Linear light to and from the numbers a screen wants: the sRGB transfer function, IEC 61966-2-1, clause 5.2.
 
-Eight bits are too few for a smooth dark gradient: rounding alone would show it as bands. So the rounding to 8 bits is
-dithered with a fixed pattern that depends on the pixel's place in the picture only: a crop of a picture equals the
-crop's own render. A value that 8 bits hold exactly stays what it is.
+Eight bits are too few for a smooth dark gradient: rounding alone would show it as bands. So the
+rounding to 8 bits is dithered with a fixed pattern that depends on the pixel's place in the picture
+only: a crop of a picture equals the crop's own render. A value that 8 bits hold exactly stays so.
 """
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float32]
 
-# The table for 8 bits is indexed by the leading bits of the float itself (exponent and 13 bits of the fraction):
-# equally fine, relative to the value, in the shadows and in the lights, and no arithmetic is spent on the index.
+# The table for 8 bits is indexed by the leading bits of the float itself (exponent and 13 bits of the
+# fraction): equally fine, relative to the value, in shadows and lights, and the index costs no arithmetic.
 _SHIFT = 23 - 13
 _LOWEST = int(np.float32(2.0**-16).view(np.int32)) >> _SHIFT  # below: code 0.05 of 255, taken as 0
 _ONE = int(np.float32(1.0).view(np.int32)) >> _SHIFT
@@ -43,12 +43,12 @@ def _table8() -> npt.NDArray[np.uint16]:
     return table
 
 
-@cache
+@lru_cache(maxsize=4)
 def _pattern(columns: int, components: int, left: int) -> npt.NDArray[np.uint16]:
-    """Bayer's 16 x 16 ordered dither (Bayer 1973): thresholds for 32 rows, from column `left` of the pattern on.
+    """Bayer's 16 x 16 ordered dither (Bayer 1973): thresholds for 32 rows, from column `left` on.
 
-    The thresholds, 4 to 251 of 256, keep away from both ends by more than the table's error of 2 at most, so
-    exact values stay exact. They are repeated for each component because adding arrays of one shape is faster.
+    The thresholds, 4 to 251 of 256, keep away from both ends by more than the table's error (below 3),
+    so exact values stay exact. Repeated for each component: adding arrays of one shape is faster.
     """
     order = np.zeros((1, 1), dtype=np.int64)
     for _ in range(4):

@@ -1,0 +1,132 @@
+"""Files appear whole or not at all: written beside their place, brought to the disk, then renamed.
+
+Also the one place where opening and writing files turns the system's errors into one clear line.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from clfractal.errors import FileError, Where
+
+PICTURES = (".exr", ".png")
+"""Extensions of the picture formats that can be written, in lower case."""
+
+
+def file_error(path: str | Path, what: str, error: Exception | str) -> FileError:
+    """One line such as `out.exr: cannot be written: No space left on device`."""
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return FileError(f"{what}: {reason}" if reason else what, Where(str(path)))
+
+
+def _target(path: str | Path) -> Path:
+    """The file that a name leads to: a symbolic link stays one and the file behind it is replaced."""
+    return Path(os.path.realpath(path))
+
+
+def _open_beside(target: Path) -> tuple[int, Path]:
+    """A new hidden file in the folder of `target`, with the permissions that a plain new file would have."""
+    # A name as long as the file system allows has no room for ours beside it: only its beginning is kept.
+    beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
+    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
+    return os.open(beside, flags, 0o666), beside
+
+
+def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> None:
+    """Makes sure, before anything expensive begins, that a file can be written.
+
+    Raises:
+        FileError: unknown extension; its folder is missing, no folder, or not writable; it is a folder, a
+            device or write-protected.
+    """
+    shown = Path(path)
+    suffix = shown.suffix.lower()
+    if suffix not in extensions:
+        known = ", ".join(extensions)
+        raise file_error(
+            path,
+            f"unknown extension {suffix!r}; known: {known}" if suffix else f"needs an extension: {known}",
+            "",
+        )
+    try:
+        target = _target(path)
+        if not target.parent.exists():
+            raise file_error(path, f"cannot be written: there is no folder {str(shown.parent)!r}", "")
+        if not target.parent.is_dir():
+            raise file_error(path, f"cannot be written: {str(shown.parent)!r} is not a folder", "")
+        if target.is_dir():
+            raise file_error(path, "cannot be written: it is a folder", "")
+        if target.exists():
+            if not target.is_file():
+                raise file_error(path, "cannot be written: it is not a regular file", "")
+            if not os.access(target, os.W_OK):
+                raise file_error(path, "cannot be written: it is write-protected", "")
+        # Access rights, read-only file systems, quotas: only trying answers for all of them.
+        descriptor, beside = _open_beside(target)
+        os.close(descriptor)
+        beside.unlink()
+    except (OSError, ValueError) as error:
+        raise file_error(path, "cannot be written", error) from error
+
+
+@contextmanager
+def atomic_writer(path: str | Path) -> Iterator[Path]:
+    """Gives the path of an empty hidden file beside `path`; renames it to `path` if all went well.
+
+    On any exception (also an interrupt) the hidden file is removed and an earlier file stays untouched.
+
+    Raises:
+        FileError: any OSError inside the block, while bringing the file to the disk, or while renaming.
+    """
+    try:
+        target = _target(path)
+        descriptor, beside = _open_beside(target)
+    except (OSError, ValueError) as error:
+        raise file_error(path, "cannot be written", error) from error
+    try:
+        yield beside
+        os.fsync(descriptor)
+        with suppress(FileNotFoundError):
+            os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
+        os.replace(beside, target)
+        sync_folder(target.parent)
+    except OSError as error:
+        raise file_error(path, "cannot be written", error) from error
+    finally:
+        os.close(descriptor)
+        with suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Brings a rename to the disk; file systems that cannot do this for folders are left alone."""
+    with suppress(OSError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+
+def open_regular(path: str | Path) -> BinaryIO:
+    """Opens a regular file for reading; never waits for a pipe, never reads a device.
+
+    Raises:
+        FileError: there is none, or it cannot be read.
+    """
+    try:
+        # Without O_NONBLOCK, opening a pipe would wait for somebody to write into it.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+        mode = os.fstat(descriptor).st_mode
+        if stat.S_ISREG(mode):
+            return os.fdopen(descriptor, "rb")
+        os.close(descriptor)
+    except (OSError, ValueError) as error:
+        raise file_error(path, "cannot be read", error) from error
+    raise file_error(path, "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file", "")

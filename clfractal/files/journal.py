@@ -1,0 +1,280 @@
+"""Work in progress: finished tiles, appended to a file that survives the death of its writer at any moment.
+
+Layout, little-endian:
+
+    8 bytes   "CLFJRNL1"
+    uint32    length of the identity
+    uint32    CRC-32 of the identity
+    bytes     the identity: JSON, the keys sorted
+    records   uint32 tile index, uint32 CRC-32 of index and payload, payload: float32 [channels, 32, 32]
+
+All records have one size, so a damaged one spoils no other, and the k-th one is found without an index.
+The header appears whole or not at all (by renaming); a record that was cut short by the writer's death is
+at the end of the file and is overwritten by the next one. Nothing is brought to the disk record by record:
+a killed process loses nothing that it wrote, and after a power failure the check sums tell which tiles to
+render again.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import secrets
+import stat
+import struct
+import zlib
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.errors import FileError, Where
+from clfractal.files.atomic import file_error
+
+Floats = npt.NDArray[np.float32]
+
+MAGIC = b"CLFJRNL1"
+SIDE = 32
+"""Side of a stored tile, in pixels; smaller tiles are stored in the top left corner of one."""
+
+_HEAD = struct.Struct("<8sII")
+_RECORD = struct.Struct("<II")
+_LARGEST_IDENTITY = 16 << 20  # bytes
+
+
+class Journal:
+    """An open journal; made by `create` or `resume`. One process at a time may have it open."""
+
+    def __init__(
+        self, path: Path, descriptor: int, start: int, channels: tuple[str, ...], tile_count: int
+    ) -> None:
+        self.path = path
+        self.channels = channels
+        self._descriptor = descriptor
+        self._start = start  # bytes before the first record
+        self._payload = len(channels) * SIDE * SIDE * 4
+        self._size = _RECORD.size + self._payload
+        self._records = 0
+        self._place = np.full(tile_count, -1, dtype=np.int64)  # record number of each tile
+        self._done = np.zeros(tile_count, dtype=np.bool_)
+
+    @classmethod
+    def create(
+        cls, path: str | Path, identity: Mapping[str, Any], channels: Sequence[str], tile_count: int
+    ) -> Journal:
+        """A new, empty journal; one that lies there already is replaced.
+
+        Args:
+            identity: what has to be the same for a tile to be the same (JSON values).
+
+        Raises:
+            FileError: it cannot be written; another process has it open; what lies there is no journal.
+        """
+        target = Path(path)
+        with suppress(FileNotFoundError):
+            earlier = _open_locked(target)
+            try:
+                if not stat.S_ISREG(os.fstat(earlier).st_mode) or os.pread(earlier, 8, 0) != MAGIC:
+                    raise file_error(target, "is in the way and holds no work in progress; move it away", "")
+            finally:
+                os.close(earlier)
+        text = _identity_text(identity, channels, tile_count)
+        beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
+        try:
+            descriptor = os.open(beside, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+        except (OSError, ValueError) as error:
+            raise file_error(target, "cannot be written", error) from error
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _write_all(descriptor, [_HEAD.pack(MAGIC, len(text), zlib.crc32(text)), text], 0)
+            os.fsync(descriptor)
+            os.replace(beside, target)
+        except BaseException as error:
+            os.close(descriptor)
+            with suppress(OSError):
+                beside.unlink()
+            if isinstance(error, OSError):
+                raise file_error(target, "cannot be written", error) from error
+            raise
+        return cls(target, descriptor, _HEAD.size + len(text), tuple(channels), tile_count)
+
+    @classmethod
+    def resume(
+        cls, path: str | Path, identity: Mapping[str, Any], channels: Sequence[str], tile_count: int
+    ) -> Journal:
+        """Opens an earlier journal of the same work; a missing one is created.
+
+        Raises:
+            FileError: it belongs to other work (the message names what differs), is no journal, cannot be
+                read or written, or another process has it open.
+        """
+        target = Path(path)
+        try:
+            descriptor = _open_locked(target)
+        except FileNotFoundError:
+            return cls.create(path, identity, channels, tile_count)
+        try:
+            start = _check_identity(target, descriptor, _identity_text(identity, channels, tile_count))
+            journal = cls(target, descriptor, start, tuple(channels), tile_count)
+            journal._scan()
+        except BaseException as error:
+            os.close(descriptor)
+            if isinstance(error, OSError):
+                raise file_error(target, "cannot be read", error) from error
+            raise
+        return journal
+
+    @property
+    def done(self) -> npt.NDArray[np.bool_]:
+        """For each tile whether it is there; not to be written to."""
+        return self._done
+
+    def append(self, tile_index: int, array: Floats) -> None:
+        """Stores a tile: float32 of shape (channels, rows, columns), at most `SIDE` rows and columns.
+
+        Raises:
+            FileError: it cannot be written (a full disk); what was there before is still whole.
+        """
+        planes, rows, columns = array.shape
+        if planes != len(self.channels) or rows > SIDE or columns > SIDE:
+            raise ValueError(f"a tile of shape {array.shape} in a journal of {len(self.channels)} channels")
+        if (rows, columns) == (SIDE, SIDE):
+            stored = np.ascontiguousarray(array, dtype="<f4")
+        else:
+            stored = np.zeros((planes, SIDE, SIDE), dtype="<f4")
+            stored[:, :rows, :columns] = array
+        payload = stored.tobytes()
+        check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", tile_index)))
+        offset = self._start + self._records * self._size
+        try:
+            _write_all(self._descriptor, [_RECORD.pack(tile_index, check), payload], offset)
+        except OSError as error:
+            raise file_error(self.path, "cannot be written", error) from error
+        self._place[tile_index] = self._records
+        self._done[tile_index] = True
+        self._records += 1
+
+    def tile(self, tile_index: int) -> Floats:
+        """A stored tile: float32 of shape (channels, `SIDE`, `SIDE`).
+
+        Raises:
+            KeyError: it is not there.
+            FileError: it cannot be read, or has been damaged since it was written.
+        """
+        place = int(self._place[tile_index])
+        if place < 0:
+            raise KeyError(tile_index)
+        try:
+            found = self._record(place)
+        except OSError as error:
+            raise file_error(self.path, "cannot be read", error) from error
+        if found is None or found[0] != tile_index:
+            raise file_error(self.path, f"is damaged: tile {tile_index} has changed since it was written", "")
+        return found[1].reshape(len(self.channels), SIDE, SIDE)
+
+    def close(self) -> None:
+        """Closes the file and leaves it for a later `resume`."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+    def discard(self) -> None:
+        """Removes the file: the work is done."""
+        with suppress(FileNotFoundError):
+            self.path.unlink()
+        self.close()
+
+    def _record(self, number: int) -> tuple[int, Floats] | None:
+        """Tile index and payload of a record; None if it is damaged or not all there."""
+        data = os.pread(self._descriptor, self._size, self._start + number * self._size)
+        if len(data) < self._size:
+            return None
+        index, check = _RECORD.unpack_from(data)
+        payload = memoryview(data)[_RECORD.size :]
+        if zlib.crc32(payload, zlib.crc32(data[:4])) != check:
+            return None
+        return index, np.frombuffer(payload, dtype="<f4")
+
+    def _scan(self) -> None:
+        """Finds the tiles of an earlier run."""
+        length = os.fstat(self._descriptor).st_size - self._start
+        self._records = max(0, length // self._size)
+        for number in range(self._records):
+            found = self._record(number)
+            if found is not None and found[0] < len(self._place):
+                self._place[found[0]] = number
+                self._done[found[0]] = True
+
+
+def _open_locked(path: Path) -> int:
+    """Opens a file that may be a journal, and locks it against other processes.
+
+    Raises:
+        FileNotFoundError: there is none.
+        FileError: it cannot be opened, or another process has it open.
+    """
+    try:
+        # Without O_NONBLOCK, opening a pipe would wait for its other end.
+        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NONBLOCK)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError) as error:
+        raise file_error(path, "cannot be opened", error) from error
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        raise file_error(path, "is in use: another process renders this picture", "") from error
+    except OSError:
+        pass  # a file system without locks: nothing can be said
+    return descriptor
+
+
+def _identity_text(identity: Mapping[str, Any], channels: Sequence[str], tile_count: int) -> bytes:
+    whole = {**identity, "channels": list(channels), "tiles": tile_count, "side": SIDE}
+    return json.dumps(whole, sort_keys=True, ensure_ascii=False).encode()
+
+
+def _check_identity(path: Path, descriptor: int, wanted: bytes) -> int:
+    """Where the records of a journal begin; FileError if it is another one's."""
+    head = os.pread(descriptor, _HEAD.size, 0)
+    not_one = file_error(path, "holds no work in progress that could be resumed", "")
+    if len(head) < _HEAD.size or head[:8] != MAGIC:
+        raise not_one
+    _, length, check = _HEAD.unpack(head)
+    if length > _LARGEST_IDENTITY:
+        raise not_one
+    text = os.pread(descriptor, length, _HEAD.size)
+    if zlib.crc32(text) != check or len(text) != length:
+        raise not_one
+    if text != wanted:
+        raise FileError(f"cannot be resumed: {_differences(text, wanted)}", Where(str(path)))
+    return _HEAD.size + int(length)
+
+
+def _differences(found: bytes, wanted: bytes) -> str:
+    """`the version was "0.1.0" and is "0.2.0", the scene is another one`."""
+    before, now = json.loads(found), json.loads(wanted)
+    told = []
+    for key in sorted(set(before) | set(now)):
+        old, new = (json.dumps(side.get(key), ensure_ascii=False) for side in (before, now))
+        if old != new:
+            short = max(len(old), len(new)) <= 60
+            told.append(f"the {key} was {old} and is {new}" if short else f"the {key} has changed")
+    return ", ".join(told)
+
+
+def _write_all(descriptor: int, parts: Sequence[bytes], offset: int) -> None:
+    """Writes all bytes at `offset`; the system may take them in pieces."""
+    waiting = [memoryview(part) for part in parts]
+    while waiting:
+        written = os.pwritev(descriptor, waiting, offset)
+        offset += written
+        while waiting and written >= len(waiting[0]):
+            written -= len(waiting.pop(0))
+        if waiting:
+            waiting[0] = waiting[0][written:]

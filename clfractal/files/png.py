@@ -1,0 +1,200 @@
+"""PNG pictures, 8 or 16 bits a component, written row by row; the scene travels in a text chunk.
+
+Chunk layout: PNG specification, third edition (W3C 2025), sections 5.3 and 11.3.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import BinaryIO, Literal
+
+import numpy as np
+import numpy.typing as npt
+import png
+
+from clfractal.files.atomic import atomic_writer, file_error, open_regular
+from clfractal.files.srgb import encode8, encode16
+
+Floats = npt.NDArray[np.float32]
+Bits = Literal[8, 16]
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+SCENE_KEY = "clfractal"
+"""Keyword of the text chunk that holds the scene."""
+
+_LARGEST_TEXT = 16 << 20  # bytes; a scene with a formula library inlined has some ten thousand
+
+
+class _Writer(png.Writer):  # type: ignore[misc]
+    """pypng's writer, with the colour space and text chunks between the header and the pixels."""
+
+    def __init__(self, *, texts: Mapping[str, str], **settings: object) -> None:
+        super().__init__(**settings)
+        self.texts = texts
+
+    def write_preamble(self, outfile: BinaryIO) -> None:
+        super().write_preamble(outfile)
+        png.write_chunk(outfile, b"sRGB", b"\0")  # perceptual, the intent for pictures
+        for key, text in self.texts.items():
+            # keyword, then: not compressed, no language, no translated keyword
+            png.write_chunk(outfile, b"iTXt", key.encode("latin-1") + b"\0\0\0\0\0" + text.encode())
+
+
+def write_png(
+    path: str | Path,
+    bands: Iterable[Floats],
+    *,
+    width: int,
+    height: int,
+    bits: Bits = 8,
+    alpha: bool = False,
+    texts: Mapping[str, str] | None = None,
+    origin: tuple[int, int] = (0, 0),
+) -> None:
+    """Writes a PNG file; it appears whole or not at all.
+
+    Args:
+        bands: arrays (rows, width, 3), or 4 with `alpha`, from top to bottom: linear Rec. 709, and with
+            `alpha` premultiplied by the fourth component. All bands together have `height` rows.
+        bits: per component; 8 bits are dithered (see `srgb.encode8`).
+        texts: text chunks by keyword (1 to 79 Latin-1 characters), the scene under `SCENE_KEY`.
+        origin: picture coordinates (x, y) of the first pixel, for the dither pattern.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    with atomic_writer(path) as beside, open(beside, "wb", buffering=1 << 20) as stream:
+        stream_png(
+            stream, bands, width=width, height=height, bits=bits, alpha=alpha, texts=texts, origin=origin
+        )
+
+
+def stream_png(
+    stream: BinaryIO,
+    bands: Iterable[Floats],
+    *,
+    width: int,
+    height: int,
+    bits: Bits = 8,
+    alpha: bool = False,
+    texts: Mapping[str, str] | None = None,
+    origin: tuple[int, int] = (0, 0),
+) -> None:
+    """As `write_png`, into a stream that is open."""
+    # zlib's level 1 without filters: for dithered pictures filters make files larger, and level 6 takes
+    # three times as long for 1 % (measured on a smooth background with a textured disc).
+    writer = _Writer(
+        width=width,
+        height=height,
+        greyscale=False,
+        alpha=alpha,
+        bitdepth=bits,
+        compression=1,
+        texts=texts or {},
+    )
+    written = writer.write_packed(stream, _rows(bands, bits, alpha, origin))
+    if written != height:
+        raise ValueError(f"a picture of {height} rows got {written}")
+
+
+def _rows(bands: Iterable[Floats], bits: Bits, alpha: bool, origin: tuple[int, int]) -> Iterator[bytes]:
+    """The rows as the file's bytes."""
+    left, top = origin
+    for band in bands:
+        straight = _straight(band) if alpha else band
+        if bits == 8:
+            code: npt.NDArray[np.unsignedinteger] = encode8(straight, origin=(left, top))
+        else:
+            code = encode16(straight)
+        if alpha:
+            # Coverage is no light: it is stored as it is, and nothing would be gained by dithering it.
+            largest = np.float32((1 << bits) - 1)
+            code[..., 3] = np.rint(np.fmin(np.fmax(band[..., 3], 0), 1) * largest)
+        if bits == 16:
+            code = code.astype(">u2")
+        for row in code:
+            yield row.tobytes()
+        top += len(band)
+
+
+def _straight(band: Floats) -> Floats:
+    """Colours divided by their coverage, as PNG wants them (section 12.4.1 of the specification)."""
+    result = band.copy()
+    coverage = np.fmin(band[..., 3:], np.float32(1))
+    with np.errstate(over="ignore"):  # by almost nothing: infinite, which is limited to 1 later
+        np.divide(band[..., :3], coverage, out=result[..., :3], where=coverage > 0)
+    return result
+
+
+def read_texts(path: str | Path) -> dict[str, str]:
+    """The text chunks of a PNG file by keyword.
+
+    Raises:
+        FileError: it cannot be read, is no PNG file, or is damaged or cut short.
+    """
+    with open_regular(path) as stream:
+        try:
+            return _read_texts(stream)
+        except OSError as error:
+            raise file_error(path, "cannot be read", error) from error
+        except _DamagedError as damage:
+            raise file_error(path, str(damage), "") from None
+
+
+def read_scene_text(path: str | Path) -> str | None:
+    """The scene in a PNG file's header, None if it has none.
+
+    Raises:
+        FileError: as for `read_texts`.
+    """
+    return read_texts(path).get(SCENE_KEY)
+
+
+class _DamagedError(Exception):
+    """Why a file is not a whole PNG file."""
+
+
+def _read_texts(stream: BinaryIO) -> dict[str, str]:
+    size = os.fstat(stream.fileno()).st_size
+    if stream.read(8) != SIGNATURE:
+        raise _DamagedError("is not a PNG file")
+    texts: dict[str, str] = {}
+    place = 8
+    # All chunks are walked to the last: what was cut short while copied is refused, wherever it was cut.
+    while True:
+        head = stream.read(8)
+        length, tag = int.from_bytes(head[:4], "big"), head[4:]
+        if len(head) < 8 or place + 12 + length > size:
+            raise _DamagedError("is cut short: the file ends inside its data")
+        if place == 8 and tag != b"IHDR":
+            raise _DamagedError("is not a PNG file: it does not begin with a header")
+        if tag in (b"IHDR", b"IEND", b"tEXt", b"iTXt"):
+            if length > _LARGEST_TEXT:
+                raise _DamagedError(f"is damaged: a text of {length:,} bytes")
+            data, check = stream.read(length), stream.read(4)
+            if zlib.crc32(tag + data).to_bytes(4, "big") != check:
+                raise _DamagedError(f"is damaged: wrong check sum of its {tag.decode('ascii')} part")
+            if tag in (b"tEXt", b"iTXt"):
+                texts.update(_text(tag, data))
+            if tag == b"IEND":
+                return texts
+        place += 12 + length
+        stream.seek(place)
+
+
+def _text(tag: bytes, data: bytes) -> dict[str, str]:
+    """One text chunk; none if it is compressed (ours are not) or malformed."""
+    key, _, rest = data.partition(b"\0")
+    name = key.decode("latin-1")
+    if tag == b"tEXt":
+        return {name: rest.decode("latin-1")}
+    parts = rest[2:].split(b"\0", 2)
+    if rest[:1] != b"\0" or len(parts) != 3:
+        return {}
+    try:
+        return {name: parts[2].decode()}
+    except UnicodeDecodeError:
+        return {}
