@@ -16,13 +16,12 @@ from typing import Any, NoReturn
 import yaml
 
 from clfractal.errors import ClfractalError, SceneError, Where
-from clfractal.files.marks import Document, Node, dotted, node_from_plain
+from clfractal.files.marks import MAX_DEPTH, Document, Node, dotted, node_from_plain
 from clfractal.files.regular import MAX_BYTES, read_text_file
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "read_document", "read_text_file", "read_value", "write_document"]
 
 MAX_NODES = 100_000
-MAX_DEPTH = 100
 MAX_NUMBER_LENGTH = 40
 
 _Parser = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -95,6 +94,12 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
+def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    # Only double quotes keep every character: elsewhere YAML folds line breaks, of which it knows five.
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=None if text.isprintable() else '"')
+
+
+_Dumper.add_representer(str, _represent_text)
 for _pattern in (_INT, _FLOAT, _NON_FINITE):
     _Dumper.add_implicit_resolver(
         "tag:yaml.org,2002:float", re.compile(f"(?:{_pattern.pattern})$"), list("-+.0123456789")

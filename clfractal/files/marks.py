@@ -9,6 +9,7 @@ from typing import Any
 
 from clfractal.errors import ClfractalError, SceneError, Where
 
+MAX_DEPTH = 100
 OPTION = "--set "
 
 
@@ -18,7 +19,7 @@ def option(key: str) -> str:
 
 
 def _below(file: str | None, shown: str) -> str:
-    """A path as shown after the option that gave the value: without the part that the option names already."""
+    """A path as shown after the option that gave the value: without what the option names already."""
     if file is None or not file.startswith(OPTION):
         return shown
     key = file[len(OPTION) :]
@@ -28,8 +29,13 @@ def _below(file: str | None, shown: str) -> str:
 
 
 def dotted(path: Sequence[str | int]) -> str:
-    """A path as it is shown: `lights.0.color`."""
-    return ".".join(str(part) for part in path)
+    """A path as it is shown: `lights.0.color`; on one line, whatever the keys are."""
+    return ".".join(_printable(str(part)) for part in path)
+
+
+def _printable(part: str) -> str:
+    part = part if len(part) <= 60 else part[:57] + "..."
+    return part if part.isprintable() else ascii(part)
 
 
 def split_path(text: str) -> tuple[str, ...]:
@@ -181,12 +187,13 @@ def _replaced(node: Node, path: Sequence[str], depth: int, value: Node) -> Node:
     return replace(node, value=inner)
 
 
-def node_from_plain(value: Any, file: str | None) -> Node:
-    """Plain data as nodes that stand at no line of `file`."""
+def node_from_plain(value: Any, file: str | None, *, depth: int = 0) -> Node:
+    """Plain data as nodes that stand at no line of `file`; SceneError beyond MAX_DEPTH levels."""
+    if depth > MAX_DEPTH:
+        raise SceneError(f"nested more than {MAX_DEPTH} levels deep", Where(file))
+    inner: Any = value
     if isinstance(value, Mapping):
-        return Node(
-            {str(key): node_from_plain(child, file) for key, child in value.items()}, file, None, None
-        )
-    if isinstance(value, (list, tuple)):
-        return Node([node_from_plain(child, file) for child in value], file, None, None)
-    return Node(value, file, None, None)
+        inner = {str(key): node_from_plain(child, file, depth=depth + 1) for key, child in value.items()}
+    elif isinstance(value, (list, tuple)):
+        inner = [node_from_plain(child, file, depth=depth + 1) for child in value]
+    return Node(inner, file, None, None)
