@@ -1,0 +1,89 @@
+"""The cache folder: whole entries or none, and never an error for the state of the disk."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from clfractal.device import cache
+
+
+def test_what_is_stored_comes_back(empty_cache: Path) -> None:
+    cache.store_blob("a", b"binary")
+    assert cache.load_blob("a") == b"binary"
+    assert cache.load_blob("b") is None
+
+
+@pytest.mark.parametrize("damage", [b"", b"x", b"clfractal-blob-1\n"])
+def test_a_damaged_entry_is_none_and_goes(empty_cache: Path, damage: bytes) -> None:
+    cache.store_blob("a", b"binary")
+    (entry,) = empty_cache.rglob("a.bin")
+    entry.write_bytes(damage)
+    assert cache.load_blob("a") is None
+    assert not entry.exists()
+
+
+def test_one_changed_byte_is_noticed(empty_cache: Path) -> None:
+    cache.store_blob("a", b"binary")
+    (entry,) = empty_cache.rglob("a.bin")
+    stored = bytearray(entry.read_bytes())
+    for position in range(len(stored)):
+        changed = bytearray(stored)
+        changed[position] ^= 1
+        entry.write_bytes(changed)
+        assert cache.load_blob("a") is None, position
+
+
+def test_the_oldest_entries_go(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cache, "MAXIMUM_BLOBS", 8)
+    for number in range(12):
+        cache.store_blob(f"{number:02d}", b"binary")
+    kept = list(empty_cache.rglob("*.bin"))
+    assert len(kept) <= 8
+    assert cache.load_blob("11") == b"binary"
+
+
+def test_facts_add_up(empty_cache: Path) -> None:
+    cache.remember("facts", "a", 1)
+    cache.remember("facts", "b", [2.5, "x"])
+    cache.remember("facts", "a", 3)
+    assert cache.recall("facts") == {"a": 3, "b": [2.5, "x"]}
+
+
+def test_processes_do_not_lose_each_others_facts(empty_cache: Path) -> None:
+    code = (
+        "import sys; from clfractal.device import cache\n"
+        "for i in range(20): cache.remember('facts', sys.argv[1] + str(i), i)"
+    )
+    children = [subprocess.Popen([sys.executable, "-c", code, name]) for name in "ab"]
+    assert [child.wait() for child in children] == [0, 0]
+    assert len(cache.recall("facts")) == 40
+
+
+def test_damaged_facts_are_no_facts(empty_cache: Path) -> None:
+    empty_cache.mkdir()
+    (empty_cache / "facts.json").write_text("{")
+    assert cache.recall("facts") == {}
+    (empty_cache / "facts.json").write_text("[1]")
+    assert cache.recall("facts") == {}
+
+
+def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "file"
+    file.touch()
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(file / "cache"))
+    cache.store_blob("a", b"binary")
+    cache.remember("facts", "a", 1)
+    cache.drop_blob("a")
+    assert cache.load_blob("a") is None
+    assert cache.recall("facts") == {}
+
+
+def test_keys_tell_everything_apart() -> None:
+    keys = {
+        cache.key_of(*parts) for parts in [(), ("a",), ("a", "b"), ("ab",), (["a", "b"],), ("b", "a"), (1,)]
+    }
+    assert len(keys) == 7

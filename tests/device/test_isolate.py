@@ -1,0 +1,136 @@
+"""A driver that aborts, hangs or prints takes nothing with it; the child ends with its parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from clfractal.device import child, isolate
+from clfractal.device.program import build, math_flags
+from clfractal.device.select import Device
+from clfractal.errors import DeviceError, FormulaError
+
+_HERE = "tests.device.test_isolate"
+
+
+def echo_job(request: dict[str, Any]) -> list[Any]:
+    """Jobs must be importable, so the tests' own live here."""
+    print("noise on stdout")
+    return [request["number"] + 1, os.getpid()]
+
+
+def sleep_job(request: dict[str, Any]) -> None:
+    (Path(request["mark"])).write_text(str(os.getpid()))
+    time.sleep(600)
+
+
+def raise_job(request: dict[str, Any]) -> None:
+    raise FormulaError("wrong formula", details="why")
+
+
+def fail_job(request: dict[str, Any]) -> None:
+    raise RuntimeError("a fault of ours")
+
+
+def kill_job(request: dict[str, Any]) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+def _run(device: Device, job: str, timeout_s: float = 60.0, **arguments: Any) -> Any:
+    return isolate.run(f"{_HERE}:{job}", device, arguments, doing="testing", timeout_s=timeout_s)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def _wait(condition: Any) -> bool:
+    end = time.monotonic() + 30
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return bool(condition())
+
+
+def test_a_value_comes_back_and_noise_does_not(device: Device, capfd: pytest.CaptureFixture[str]) -> None:
+    number, process = _run(device, "echo_job", number=41)
+    assert number == 42
+    assert process != os.getpid()
+    assert capfd.readouterr() == ("", "")
+
+
+def test_our_errors_pass_through(device: Device) -> None:
+    with pytest.raises(FormulaError, match=r"^wrong formula$") as caught:
+        _run(device, "raise_job")
+    assert caught.value.status == 2
+    assert caught.value.details == "why"
+
+
+def test_a_failing_job_shows_its_cause_in_the_details(device: Device) -> None:
+    with pytest.raises(DeviceError, match=r"the driver failed \(status 1\) while testing") as caught:
+        _run(device, "fail_job")
+    assert caught.value.status == 3
+    assert "a fault of ours" in caught.value.details
+    assert "Traceback" not in str(caught.value)
+
+
+def test_a_crash_names_its_signal(device: Device) -> None:
+    with pytest.raises(DeviceError, match=r"the driver aborted \(signal 11\) while testing"):
+        _run(device, "kill_job")
+
+
+def test_a_child_that_hangs_is_ended(device: Device, tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    with pytest.raises(DeviceError, match=r"took more than 3 s while testing"):
+        _run(device, "sleep_job", timeout_s=3, mark=str(mark))
+    assert not _is_running(int(mark.read_text()))
+
+
+def test_a_driver_that_aborts_while_building(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(child.TEST_ABORT, "building")
+    text = "__kernel void k(__global int *a) { a[0] = 1; }"
+    with pytest.raises(
+        DeviceError, match=r": the driver aborted \(signal 6\) while building a program$"
+    ) as caught:
+        build(device, text, flags=math_flags("float32"))
+    assert caught.value.status == 3
+    assert "LLVM ERROR: Cannot select" in caught.value.details
+    assert capfd.readouterr() == ("", "")
+    monkeypatch.delenv(child.TEST_ABORT)
+    assert not build(device, text, flags=math_flags("float32")).cached
+
+
+_PARENT = """
+import sys
+from clfractal.device import isolate
+from clfractal.device.select import choose
+try:
+    job = "tests.device.test_isolate:sleep_job"
+    isolate.run(job, choose(), {"mark": sys.argv[1]}, doing="x", timeout_s=600)
+except KeyboardInterrupt:
+    sys.exit(130)
+"""
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL, signal.SIGTERM])
+def test_the_child_ends_with_its_parent(tmp_path: Path, end: signal.Signals) -> None:
+    mark = tmp_path / "mark"
+    parent = subprocess.Popen([sys.executable, "-c", _PARENT, str(mark)], cwd=Path(__file__).parents[2])
+    assert _wait(lambda: mark.exists() and mark.read_text())
+    process = int(mark.read_text())
+    assert _is_running(process)
+    parent.send_signal(end)
+    assert parent.wait(20) == (130 if end == signal.SIGINT else -end)
+    assert _wait(lambda: not _is_running(process))

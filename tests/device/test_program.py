@@ -1,0 +1,159 @@
+"""Programs: built once, kept with their machine code, and errors that know our own files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyopencl as cl
+import pytest
+
+from clfractal.device import compiler
+from clfractal.device.compiler import Argument, Warm
+from clfractal.device.program import Program, build, math_flags
+from clfractal.device.select import Device
+from clfractal.device.source import flatten
+from clfractal.errors import DeviceError, KernelBuildError
+
+_TRIPLE = "__kernel void triple(__global float *a, float by) { a[get_global_id(0)] *= by; }\n"
+_FLAGS = math_flags("float32")
+_WARM = Warm("triple", (8,), (1,), (Argument("buffer", 32), Argument("scalar", dtype="float32", value=2.0)))
+
+
+def _triples(program: Program) -> bool:
+    device = program.device
+    values = np.arange(8, dtype=np.float32)
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    buffer = cl.Buffer(device.context, flags, hostbuf=values)
+    kernel = program.kernel("triple")
+    kernel.set_args(buffer, np.float32(3))
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (8,), (1,))
+    result = np.empty_like(values)
+    cl.enqueue_copy(device.queue, result, buffer)
+    return bool(np.array_equal(result, 3 * values))
+
+
+@pytest.mark.parametrize("isolated", [False, True])
+@pytest.mark.parametrize("warm", [None, _WARM])
+def test_built_then_found(device: Device, empty_cache: Path, isolated: bool, warm: Warm | None) -> None:
+    first = build(device, _TRIPLE, flags=_FLAGS, warm=warm, isolated=isolated)
+    assert not first.cached
+    assert _triples(first)
+    second = build(device, _TRIPLE, flags=_FLAGS, warm=warm, isolated=isolated)
+    assert second.cached
+    assert _triples(second)
+    assert second.build_ms >= 0
+
+
+def test_text_flags_and_launch_are_the_key(device: Device, empty_cache: Path) -> None:
+    def cached(text: str = _TRIPLE, flags: Sequence[str] = _FLAGS, warm: Warm | None = None) -> bool:
+        return build(device, text, flags=flags, warm=warm, isolated=False).cached
+
+    assert [cached(), cached()] == [False, True]
+    assert [cached(_TRIPLE + "\n"), cached(_TRIPLE + "\n")] == [False, True]
+    assert [cached(flags=[*_FLAGS, "-DX"]), cached(flags=[*_FLAGS, "-DX"])] == [False, True]
+    assert [cached(warm=_WARM), cached(warm=_WARM)] == [False, True]
+    other_values = Warm(
+        "triple", (16,), (1,), (Argument("buffer", 64), Argument("scalar", 0, "float32", 9.0))
+    )
+    assert cached(warm=other_values), "the values of a first launch do not change the machine code"
+
+
+@pytest.mark.parametrize("damage", [b"", b"nonsense"])
+def test_a_binary_that_the_driver_refuses_is_built_again(
+    device: Device, empty_cache: Path, damage: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build(device, _TRIPLE, flags=_FLAGS, isolated=False)
+    (entry,) = empty_cache.rglob("*.bin")
+    entry.write_bytes(damage)
+    again = build(device, _TRIPLE, flags=_FLAGS, isolated=False)
+    assert not again.cached
+    assert _triples(again)
+    monkeypatch.setattr(compiler, "load_binary", lambda *_: None)
+    assert _triples(build(device, _TRIPLE, flags=_FLAGS, isolated=False))
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path / "file" / "cache"))
+    assert _triples(build(device, _TRIPLE, flags=_FLAGS))
+
+
+@pytest.mark.parametrize("isolated", [False, True])
+def test_a_build_failure_knows_our_file_and_line(
+    device: Device, empty_cache: Path, tmp_path: Path, isolated: bool, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "entry.cl").write_text(
+        '#include "part.h"\n__kernel void k(__global float *a) { a[0] = f(); }\n'
+    )
+    (tmp_path / "part.h").write_text("// a comment\nfloat f() {\n    return undeclared;\n}\n")
+    flat = flatten("entry.cl", kernels=tmp_path)
+    with pytest.raises(KernelBuildError, match="undeclared") as caught:
+        build(device, flat.text, flags=_FLAGS, sources=flat.sources, isolated=isolated)
+    assert str(caught.value).startswith("kernels/part.h:3:12: the kernel does not build on ")
+    assert (
+        "    2 | float f() {\n    3 |     return undeclared;\n      |            ^\n    4 | }"
+        in caught.value.details
+    )
+    assert caught.value.status == 3
+    if isolated:
+        assert capfd.readouterr().err == "", "what the driver prints is for the details only"
+    assert not list(empty_cache.rglob("*.bin"))
+
+
+def test_a_faulty_formula_is_the_users(device: Device, empty_cache: Path) -> None:
+    flat = flatten(
+        "entry",
+        generated={"entry": '#include "formula.h"', "formula.h": "float f() { return y; }"},
+        user=["formula.h"],
+    )
+    with pytest.raises(KernelBuildError) as caught:
+        build(device, flat.text, flags=_FLAGS, sources=flat.sources, isolated=False)
+    assert str(caught.value).startswith("generated/formula.h:1:20: ")
+    assert caught.value.status == 2
+
+
+def test_a_kernel_that_is_not_there(device: Device, empty_cache: Path) -> None:
+    program = build(device, _TRIPLE, flags=_FLAGS, isolated=False)
+    with pytest.raises(DeviceError, match="making the kernel quadruple") as caught:
+        program.kernel("quadruple")
+    assert caught.value.status == 3
+
+
+def test_a_recipe_survives_the_way_to_the_child(device: Device, empty_cache: Path) -> None:
+    recipe = Warm(
+        "k",
+        (4, 2),
+        None,
+        (Argument("buffer", 64), Argument("bytes", dtype="0000803f02000000"), Argument("local", 16)),
+    )
+    assert Warm.from_data(recipe.as_data()) == recipe
+    text = (
+        "typedef struct { float a; int b; } pair;\n"
+        "__kernel void k(__global float *out, pair p, __local float *scratch) {\n"
+        "    scratch[0] = p.a;\n    out[get_global_id(0)] = scratch[0] * p.b;\n}\n"
+    )
+    assert not build(device, text, flags=_FLAGS, warm=recipe).cached
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_no_flag_assumes_finite_numbers(device: Device, empty_cache: Path, precision: str) -> None:
+    flags = math_flags("float64" if precision == "float64" else "float32")
+    assert "-cl-fast-relaxed-math" not in flags
+    assert "-cl-finite-math-only" not in flags
+    assert "-cl-unsafe-math-optimizations" not in flags
+    text = (
+        "__kernel void k(__global int *out, float zero) {\n"
+        "    const float huge = 1.0f / zero, none = zero / zero;\n"
+        "    out[0] = isinf(huge); out[1] = isnan(none); out[2] = none != none; out[3] = huge > 3e38f;\n}\n"
+    )
+    kernel = build(device, text, flags=flags, isolated=False).kernel("k")
+    out = device.buffer(16, "answers")
+    kernel.set_args(out, np.float32(0))
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (1,), (1,))
+    answers = np.empty(4, np.int32)
+    cl.enqueue_copy(device.queue, answers, out)
+    assert answers.tolist() == [1, 1, 1, 1]

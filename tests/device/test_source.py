@@ -1,0 +1,98 @@
+"""One flat text, with every line's origin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from clfractal.device.source import SourceMap, flatten, origin
+from clfractal.errors import KernelBuildError
+
+
+@pytest.fixture
+def kernels(tmp_path: Path) -> Path:
+    (tmp_path / "numbers").mkdir()
+    (tmp_path / "main.cl").write_text('#include "a.h"\n#include "numbers/n.h"\nmain\n')
+    (tmp_path / "a.h").write_text("a1\na2\n")
+    (tmp_path / "numbers" / "n.h").write_text('n1\n# include "m.h"\n#include "a.h"\nn4\n')
+    (tmp_path / "numbers" / "m.h").write_text("m1\n")
+    return tmp_path
+
+
+def test_every_text_is_taken_in_once_and_lines_keep_their_origin(kernels: Path) -> None:
+    flat = flatten("main.cl", kernels=kernels)
+    assert flat.text.splitlines() == [
+        '#line 1 "kernels/main.cl"',
+        '#line 1 "kernels/a.h"',
+        "a1",
+        "a2",
+        '#line 2 "kernels/main.cl"',
+        '#line 1 "kernels/numbers/n.h"',
+        "n1",
+        '#line 1 "kernels/numbers/m.h"',
+        "m1",
+        '#line 3 "kernels/numbers/n.h"',
+        '#line 4 "kernels/numbers/n.h"',
+        "n4",
+        '#line 3 "kernels/main.cl"',
+        "main",
+    ]
+    assert sorted(flat.sources.texts) == [
+        "kernels/a.h",
+        "kernels/main.cl",
+        "kernels/numbers/m.h",
+        "kernels/numbers/n.h",
+    ]
+
+
+def test_the_origin_of_every_line_is_right(kernels: Path) -> None:
+    flat = flatten("main.cl", kernels=kernels, generated={"a.h": "g1\ng2"}, defines={"LANES": 8})
+    for number, line in enumerate(flat.text.splitlines(), start=1):
+        if line.startswith("#"):
+            continue
+        place = origin(flat.text, number)
+        assert place is not None
+        name, original = place
+        assert flat.sources.texts[name].splitlines()[original - 1] == line
+    assert origin(flat.text, 1) is None
+
+
+def test_generated_texts_and_defines(kernels: Path) -> None:
+    flat = flatten(
+        "entry",
+        kernels=kernels,
+        generated={"entry": '#include "a.h"\n', "a.h": "mine"},
+        defines={"LANES": 8},
+        user=["a.h"],
+    )
+    assert flat.text.splitlines()[0] == "#define LANES 8"
+    assert "mine" in flat.text.splitlines()
+    assert flat.sources.texts["generated/a.h"] == "mine"
+    assert flat.sources.user == {"a.h"}
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('#include "aa.h"', r"^generated/entry:2: there is no kernel file 'aa.h'; did you mean 'a.h'\?$"),
+        ('#include "../outside.h"', "^generated/entry:2: there is no kernel file"),
+        ('#include "/etc/passwd"', "^generated/entry:2: there is no kernel file"),
+        ("#include <math.h>", "^generated/entry:2: only #include \"...\" is possible, got '<math.h>'$"),
+    ],
+)
+def test_includes_that_cannot_be(kernels: Path, line: str, message: str) -> None:
+    (kernels.parent / "outside.h").write_text("outside")
+    with pytest.raises(KernelBuildError, match=message) as caught:
+        flatten("entry", kernels=kernels, generated={"entry": "first\n" + line})
+    assert caught.value.status == 3
+
+
+def test_an_excerpt_shows_the_line_between_its_neighbours() -> None:
+    sources = SourceMap({"f": "one\n\ttwo = x;\nthree\nfour"})
+    assert sources.excerpt("f", 2, 8) == (
+        "    1 | one\n    2 |     two = x;\n      |           ^\n    3 | three"
+    )
+    assert sources.excerpt("f", 1) == "    1 | one\n    2 |     two = x;"
+    assert sources.excerpt("f", 9) == ""
+    assert sources.excerpt("g", 1) == ""
