@@ -75,9 +75,9 @@ def _text(path: Path) -> str:
     start = read_bytes(path, prefix=len(_PNG))
     found: str | None
     if start.startswith(_EXR):
-        from clfractal.files import exr
+        from clfractal.files import exr_header
 
-        found = exr.read_scene_text(path)
+        found = exr_header.read_scene_text(path)
     elif start == _PNG:
         from clfractal.files import png
 

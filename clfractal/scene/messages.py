@@ -14,17 +14,17 @@ from clfractal.scene.model import Scene
 
 # Words for the checks that compare with one number or a few words, filled with the check's own context.
 _ALLOWED: Mapping[str, str] = {
-    "less_than": "must be below {lt:g}",
-    "less_than_equal": "must be at most {le:g}",
-    "greater_than": "must be above {gt:g}",
-    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be below {lt}",
+    "less_than_equal": "must be at most {le}",
+    "greater_than": "must be above {gt}",
+    "greater_than_equal": "must be at least {ge}",
     "finite_number": "must be a finite number",
     "float_type": "must be a number",
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
     "bool_type": "must be true or false",
     "string_type": "must be text",
-    "string_too_short": "must be at least {min_length} characters long",
+    "string_too_short": "must not be empty",
     "string_too_long": "must be at most {max_length} characters long",
     "dict_type": "must be a mapping",
     "model_type": "must be a mapping",
@@ -126,8 +126,16 @@ def _problem(details: ErrorDetails) -> Problem | None:
     place = _place(details["loc"])
     if details["type"] not in _ALLOWED:
         return Problem(tuple(place.path), details["msg"][:1].lower() + details["msg"][1:])
-    allowed = _ALLOWED[details["type"]].format(**details.get("ctx", {}))
+    allowed = _allowed(details)
     return Problem(tuple(place.path), f"{allowed}, got {shown_value(details['input'])}")
+
+
+def _allowed(details: ErrorDetails) -> str:
+    context = {
+        key: int(value) if isinstance(value, float) and value.is_integer() else value
+        for key, value in details.get("ctx", {}).items()
+    }
+    return _ALLOWED[details["type"]].format(**context)
 
 
 def _own(details: ErrorDetails) -> Problem:
@@ -173,7 +181,7 @@ def _length(details: ErrorDetails) -> Problem | None:
         return None
     if not details["input"]:
         return Problem(tuple(place.path), "must not be empty")
-    allowed = _ALLOWED[details["type"]].format(**details["ctx"])
+    allowed = _allowed(details)
     return Problem(tuple(place.path), f"{allowed}, got {len(details['input'])}")
 
 

@@ -1,0 +1,251 @@
+"""What a wrong scene gets: the exact line, at the exact place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from clfractal.errors import ClfractalError, FileError, FormulaError, SceneError
+from clfractal.scene.load import load_scene, with_overrides
+
+HEAD = "version: 1\nformula: {name: mandelbulb}\n"
+
+
+def error_of(text: str, *overrides: str, folder: Path | None = None) -> str:
+    with pytest.raises((SceneError, FormulaError, FileError)) as caught:
+        load_scene(text, overrides=overrides, folder=folder)
+    assert "\n" not in str(caught.value)
+    assert caught.value.status == 2
+    return str(caught.value)
+
+
+# In the texts below the sign § stands where the message must point to.
+CASES = [
+    # The camera.
+    ("camera:\n  fov: §400", "camera.fov: must be below 180, got 400"),
+    ("camera: {fov: §0}", "camera.fov: must be at least 1e-06, got 0"),
+    ("camera: {fov: §wide}", "camera.fov: must be a number, got 'wide'"),
+    ("camera: {fov: §true}", "camera.fov: must be a number, got true"),
+    ("camera: {fov: §.nan}", "camera.fov: must be a finite number, got .nan"),
+    ("camera: {§fow: 40}", "camera: unknown key 'fow'; did you mean 'fov'?"),
+    ("camera: {position: §[0, 1]}", "camera.position: must be a list of 3 numbers, got a list of 2"),
+    ("camera: {position: §[0, 1, 2, 3]}", "camera.position: must be a list of 3 numbers, got a list of 4"),
+    ("camera: {position: [0, 1, §a]}", "camera.position.2: must be a number, got 'a'"),
+    ("camera: {position: [0, 1, §1e7]}", "camera.position.2: must be at most 1000000, got 10000000.0"),
+    ("camera: {position: §3}", "camera.position: must be a list of 3 numbers, got 3"),
+    ("camera: {target: §[0, -3, 0]}", "camera.target: must differ from camera.position"),
+    ("camera: {up: §[0, 0, 0]}", "camera.up: must not be zero"),
+    (
+        "camera: {up: §[0, 5, 0]}",
+        "camera.up: must not be parallel to the view, from camera.position to camera.target",
+    ),
+    (
+        "camera: {projection: §ortographic}",
+        "camera.projection: unknown projection 'ortographic'; did you mean 'orthographic'?",
+    ),
+    ("camera: {projection: §3}", "camera.projection: must be perspective or orthographic, got 3"),
+    (
+        "camera: {projection: orthographic, §fov: 45}",
+        "camera: unknown key 'fov'; known: height, position, projection, target, up",
+    ),
+    ("camera: §3", "camera: must be a mapping, got 3"),
+    ("camera:§", "camera: must be a mapping, got nothing"),
+    ("§camra: {}", "unknown key 'camra'; did you mean 'camera'?"),
+    # The rest.
+    ("image: {width: §0}", "image.width: must be at least 1, got 0"),
+    ("image: {width: §1.5}", "image.width: must be a whole number, got 1.5"),
+    ("image: {width: §1000000}", "image.width: must be at most 65536, got 1000000"),
+    (
+        "image: §{width: 65536, height: 65536}",
+        "image: must be at most 1,073,741,824 pixels, got 65536 x 65536",
+    ),
+    ("renderer: {type: §surfase}", "renderer.type: unknown type 'surfase'; did you mean 'surface'?"),
+    ("renderer: {samples: §0}", "renderer.samples: must be at least 1, got 0"),
+    ("renderer: {bounds: §{center: [0, 0, 0]}}", "renderer.bounds.radius: is missing"),
+    ("lights:\n  - {type: §pont}", "lights.0.type: unknown type 'pont'; did you mean 'point'?"),
+    ("lights: [{}, §{type: point}]", "lights.1.position: is missing"),
+    ("lights: [{direction: §[0, 0, 0]}]", "lights.0.direction: must not be zero"),
+    ("lights: [{shadow: §yes}]", "lights.0.shadow: must be true or false, got 'yes'"),
+    ("lights: §bright", "lights: must be a list, got 'bright'"),
+    ("lights: [§bright]", "lights.0: must be a mapping, got 'bright'"),
+    ("lights: §[" + "{}, " * 65 + "]", "lights: must have at most 64 entries, got 65"),
+    ("material: {color: [1, §2, 3]}", "material.color.1: must be at most 1, got 2"),
+    ("material: {color: [1, §.inf, 3]}", "material.color.1: must be a finite number, got .inf"),
+    ("background: §black", "background: must be transparent or a mapping with top and bottom, got 'black'"),
+    ("background: {§tpo: 1}", "background: unknown key 'tpo'; did you mean 'top'?"),
+    ("coloring: {by: §depth}", "coloring.by: must be solid, normal or iterations, got 'depth'"),
+    (
+        "coloring: {by: iterations, palette: §viridiss}",
+        "coloring.palette: unknown palette 'viridiss'; did you mean 'viridis'?",
+    ),
+    ("coloring: {palette: §[]}", "coloring.palette: must not be empty"),
+    ("coloring: {palette: §7}", "coloring.palette: must be text or a list, got 7"),
+    (
+        "coloring: {palette: [{at: 1, color: [0, 0, 0]}, {at: §0.5, color: [0, 0, 0]}]}",
+        "coloring.palette.1.at: must not be below the stop before it",
+    ),
+    ("output: {channels: [R, §Zed]}", "output.channels.1: unknown channel 'Zed'; did you mean 'Z'?"),
+    ("output: {channels: [R, §R]}", "output.channels.1: channel 'R' is given twice"),
+    ("output: {channels: §[]}", "output.channels: must not be empty"),
+    ("output: {precision: {§Zed: half}}", "output.precision: unknown channel 'Zed'; did you mean 'Z'?"),
+    ("output: {precision: {R: §quarter}}", "output.precision.R: must be half or float, got 'quarter'"),
+    ("output: {png_bits: §12}", "output.png_bits: must be 8 or 16, got 12"),
+    ("§backgruond: {}", "unknown key 'backgruond'; did you mean 'background'?"),
+    # The first one in the text, whatever the order of the schema.
+    ("lights: §3\nimage: {width: 0}", "lights: must be a list, got 3"),
+    ("camera: {up: §1, fov: 400, fow: 1}", "camera.up: must be a list of 3 numbers, got 1"),
+]
+
+
+def marked(text: str) -> tuple[str, str]:
+    """The text without its mark, and the mark's place as messages show it."""
+    before, _, after = text.partition("§")
+    return before + after, f"scene:{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
+
+
+@pytest.mark.parametrize(("lines", "message"), CASES)
+def test_scene(lines: str, message: str) -> None:
+    whole = HEAD + lines + ("" if "cam" in lines else "\ncamera: {}")
+    text, place = marked(whole)
+    assert error_of(text) == f"{place}: {message}"
+
+
+def test_a_missing_key_is_reported_after_what_is_wrong_in_the_text() -> None:
+    assert error_of(HEAD) == "scene:1:1: camera: is missing"
+    assert error_of("formula: {name: hast}\ncamera: {fow: 1}\n").startswith("scene:2:10: camera: unknown key")
+
+
+@pytest.mark.parametrize(
+    ("formula", "message"),
+    [
+        ("§{}", "formula: needs one of name, file, inline or chain"),
+        ("§mandelbulb", "formula: must be a mapping, got 'mandelbulb'"),
+        ("{name: §mandelbul}", "formula.name: unknown formula 'mandelbul'; did you mean 'mandelbulb'?"),
+        ("{name: hast, inline: §{}}", "formula.inline: cannot stand beside name"),
+        ("{name: hast, iterations: §0}", "formula.iterations: must be at least 1, got 0"),
+        ("{name: hast, iterations: §2000000}", "formula.iterations: must be at most 1000000, got 2000000"),
+        ("{name: hast, parameters: {§powr: 2}}", "formula.parameters.powr: unknown parameter 'powr'"),
+        ("{name: hast, parameters: {power: §3}}", "formula.parameters.power: must be one of"),
+        (
+            "{name: hast, parameters: {power: §many}}",
+            "formula.parameters.power: must be a number, got 'many'",
+        ),
+        ("{name: hast, julia: §[1, 2]}", "formula.julia: must have at least 3 entries, got 2"),
+        ("{name: hast, julia: §[1, 2, 3, 4]}", "formula.julia: must have 3 numbers"),
+        ("{name: hast, bailout: §0}", "formula.bailout: must be above 0, got 0"),
+        ("{chain: §[]}", "formula.chain: must not be empty"),
+        ("{chain: [{name: hast}, {§nme: hast}]}", "formula.chain.1: unknown key 'nme'; did you mean 'name'?"),
+        ("{chain: [{name: hast}, {name: §hats}]}", "formula.chain.1.name: unknown formula 'hats'"),
+        ("{chain: [{name: hast, count: §0}]}", "formula.chain.0.count: must be at least 1, got 0"),
+        ("{chain: [{name: hast}], parameters: §{a: 1}}", "formula.parameters: belongs to the members"),
+        ("{file: §''}", "formula.file: must not be empty"),
+    ],
+)
+def test_formula(formula: str, message: str) -> None:
+    text, place = marked(f"version: 1\nformula: {formula}\ncamera: {{}}\n")
+    assert error_of(text).startswith(f"{place}: {message}")
+
+
+INLINE = """version: 1
+formula:
+  inline:
+    variables: [x, y, z]
+    let: {r: "sqrt(x*x + y*y)"}
+    map:
+      - x*x - y*y
+      - "2*x*y"
+      - z*r
+    degree: 2
+    bounds: {radius: 2}
+camera: {}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("x*x - y*y", "x*x - §q*y", "formula.inline.map.0: unknown name 'q'"),
+        ('"2*x*y"', '"2*x*§yy"', "formula.inline.map.1: unknown name 'yy'; did you mean 'y'?"),
+        ("z*r", "z*r/§0", "formula.inline.map.2: division by zero"),
+        ("z*r", "z*§sine(r)", "formula.inline.map.2: unknown function 'sine'"),
+        ("sqrt(x*x + y*y)", "sqrt(x*x + §r)", "formula.inline.let.r: 'r' uses itself"),
+        ("- x*x - y*y\n      - z*r\n", "§- x*x\n", "formula.inline.map: must have 3 expressions"),
+        ("degree: 2", "§degre: 2", "formula.inline: unknown key 'degre'; did you mean 'degree'?"),
+        ("z*r", "§" + "(" * 10_000 + "z" + ")" * 10_000, "formula.inline.map.2: is too long"),
+        ("z*r", "(" * 100 + "§" + "(" * 900 + "z" + ")" * 1000, "formula.inline.map.2: nested more than 100"),
+        ("z*r", "__import__(§'os').system('ls')", "formula.inline.map.2: unexpected character"),
+    ],
+)
+def test_inline_formula(old: str, new: str, message: str) -> None:
+    whole = INLINE.replace('      - "2*x*y"\n', "") if "\n" in old else INLINE
+    assert old in whole
+    text, place = marked(whole.replace(old, new))
+    assert error_of(text).startswith(f"{place}: {message}")
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("camera.fov=400", "--set camera.fov: must be below 180, got 400"),
+        ("camera.fow=40", "--set camera.fow: unknown key 'fow'; did you mean 'fov'?"),
+        ("camera={fov: 400}", "--set camera: fov: must be below 180, got 400"),
+        ("camera.fov=.inf", "--set camera.fov: must be a finite number, got .inf"),
+        ("camera.fov=", "--set camera.fov: is empty"),
+        ("camera.fov=[1", "--set camera.fov: not valid YAML: did not find expected ',' or ']'"),
+        ("camera.fov", "--set camera.fov: must be KEY=VALUE, such as camera.fov=30"),
+        ("camera..fov=3", "--set camera..fov=3: must be KEY=VALUE, such as camera.fov=30"),
+        ("version.x=1", "--set version.x: version is a single value, so it has no key 'x'"),
+        ("lights.1.color=2", "--set lights.1.color: lights.1 does not exist: the list has entries 0 to 0"),
+        ("lights.0.intensty=2", "--set lights.0.intensty: unknown key 'intensty'; did you mean 'intensity'?"),
+        ("formula.parameters.powr=2", "--set formula.parameters.powr: unknown parameter 'powr'"),
+        ("formula.name=hats", "--set formula.name: unknown formula 'hats'; did you mean 'hast'?"),
+        ("camera.up=[0, 1, 0]", "--set camera.up: must not be parallel to the view"),
+    ],
+)
+def test_override(override: str, message: str) -> None:
+    assert error_of(HEAD + "camera: {}\n", override).startswith(message)
+
+
+def test_overrides_replace_values() -> None:
+    scene = load_scene(
+        HEAD + "camera: {}\n",
+        overrides=[
+            "camera.fov=30",
+            "camera.position.0=0.5",
+            "lights.0.intensity=2",
+            "formula.parameters.power=4",
+            "background=transparent",
+            "renderer.bounds.radius=3",
+        ],
+    )
+    assert scene.camera.projection == "perspective"
+    assert scene.camera.fov == 30
+    assert scene.camera.position == (0.5, -3, 0)
+    assert scene.lights[0].intensity == 2
+    assert scene.formula.parameters == {"power": 4}
+    assert scene.background == "transparent"
+    assert scene.renderer.bounds is not None
+    assert scene.renderer.bounds.radius == 3
+    assert with_overrides(scene, ["camera.fov=45"]).camera == scene.camera.model_copy(update={"fov": 45})
+
+
+def test_an_override_does_not_reach_through_an_alias() -> None:
+    text = HEAD + "camera: {}\nbackground: {top: &c [1, 1, 1], bottom: *c}\n"
+    scene = load_scene(text, overrides=["background.top.0=0.5"])
+    assert scene.background != "transparent"
+    assert scene.background.top == (0.5, 1, 1)
+    assert scene.background.bottom == (1, 1, 1)
+
+
+def test_the_file_is_named_as_it_was_given(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text("\n" * 11 + "version: 1\nformula: {name: hast}\ncamera: {fov: 400}\n")
+    with pytest.raises(SceneError) as caught:
+        load_scene("scene.yaml")
+    assert str(caught.value) == "scene.yaml:14:15: camera.fov: must be below 180, got 400"
+
+
+def test_every_error_is_one_of_ours() -> None:
+    with pytest.raises(ClfractalError):
+        load_scene({"version": 1, "formula": {"name": "hast"}, "camera": {"fov": float("nan")}})

@@ -1,0 +1,76 @@
+"""Palettes: 256 colours in linear light."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from clfractal.errors import SceneError
+from clfractal.scene.palette import palette_table
+from clfractal.scene.parts import Coloring
+
+
+def coloring(palette: object) -> Coloring:
+    return Coloring.model_validate({"by": "iterations", "palette": palette})
+
+
+def test_stops_are_mixed_in_linear_light() -> None:
+    table = palette_table(
+        coloring(
+            [
+                {"at": 0.2, "color": [0, 1, 0]},
+                {"at": 0.6, "color": [1, 0, 4]},
+                {"at": 0.6, "color": [0, 0, 0]},
+            ]
+        )
+    )
+    assert table.shape == (256, 3)
+    assert table.dtype == np.float32
+    place = np.arange(256) / 255
+    inside = (place > 0.2) & (place < 0.6)
+    mix = (place[inside] - 0.2) / 0.4
+    expected = np.stack([mix, 1 - mix, 4 * mix], axis=1)
+    np.testing.assert_allclose(table[inside], expected, atol=1e-6)
+    np.testing.assert_array_equal(table[place <= 0.2], np.tile([0, 1, 0], (52, 1)))
+    assert not table[place > 0.6].any()
+
+
+def test_one_stop_is_one_colour() -> None:
+    assert (palette_table(coloring([{"at": 0.5, "color": [1, 2, 3]}])) == [1, 2, 3]).all()
+
+
+def test_a_named_palette_is_turned_into_linear_light() -> None:
+    table = palette_table(coloring("gray"))
+    # sRGB 188/255 is linear 0.5029 (IEC 61966-2-1), and 10/255 lies on the straight part: (10/255)/12.92.
+    np.testing.assert_allclose(table[188], 0.50289, atol=2e-3)
+    np.testing.assert_allclose(table[10], 10 / 255 / 12.92, rtol=2e-2)
+    assert (table[0] == 0).all()
+    np.testing.assert_allclose(table[255], 1, atol=1e-6)
+    assert (np.diff(table[:, 0]) > 0).all()
+
+
+def test_the_table_is_the_callers_own() -> None:
+    palette_table(coloring("viridis"))[:] = 0
+    assert palette_table(coloring("viridis")).any()
+
+
+def test_an_unknown_name() -> None:
+    with pytest.raises(SceneError) as caught:
+        palette_table(coloring("infernoo"))
+    assert str(caught.value) == "coloring.palette: unknown palette 'infernoo'; did you mean 'inferno'?"
+
+
+@pytest.mark.parametrize("by", ["solid", "normal"])
+def test_no_palette_is_loaded_when_none_is_needed(by: str) -> None:
+    """Loading cmap, yaml's writer or OpenEXR would cost a plain render its start-up time."""
+    code = f"""
+import sys
+from clfractal.scene.load import load_scene
+load_scene({{"version": 1, "formula": {{"name": "hast"}}, "camera": {{}}, "coloring": {{"by": "{by}"}}}})
+print([name for name in ("cmap", "OpenEXR", "pyopencl", "mpmath", "png") if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

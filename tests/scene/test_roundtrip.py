@@ -1,0 +1,167 @@
+"""A scene that is written is the scene that is read: as YAML, as JSON and as plain data."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from clfractal.errors import SceneError
+from clfractal.files.channels import CHANNELS
+from clfractal.formulas import catalog
+from clfractal.scene.load import dump_scene, load_scene, schema
+from clfractal.scene.model import Scene
+
+
+def optional(**values: st.SearchStrategy[Any]) -> st.SearchStrategy[dict[str, Any]]:
+    """A mapping with any part of the keys."""
+    return st.fixed_dictionaries({}, optional=values)
+
+
+coordinate = st.floats(-1e6, 1e6) | st.integers(-1000, 1000) | st.sampled_from([1e-300, -0.0, 5e-324])
+amount = st.floats(0, 1e6)
+fraction = st.floats(0, 1)
+vector = st.lists(coordinate, min_size=3, max_size=3)
+color = st.lists(amount, min_size=3, max_size=3)
+direction = vector.filter(lambda v: sum(x * x for x in v) > 1e-6)
+places = {"position": vector, "target": vector, "up": direction}
+cameras = optional(
+    **places, projection=st.just("perspective"), fov=st.floats(1e-6, 179.999)
+) | st.fixed_dictionaries(
+    {"projection": st.just("orthographic")}, optional={**places, "height": st.floats(1e-12, 1e6)}
+)
+common = {"color": color, "intensity": amount, "shadow": st.booleans()}
+lights = optional(**common, type=st.just("directional"), direction=direction) | st.fixed_dictionaries(
+    {"type": st.just("point"), "position": vector},
+    optional={**common, "falloff": st.sampled_from(["none", "inverse_square"])},
+)
+stops = st.lists(st.tuples(fraction, color), min_size=1, max_size=4).map(
+    lambda found: [{"at": at, "color": c} for at, c in sorted(found, key=lambda stop: stop[0])]
+)
+inline = st.fixed_dictionaries(
+    {
+        "variables": st.just(["x", "y", "z"]),
+        "map": st.just(["x*x - y*y + 1e-3", "2*x*y", "z*z"]),
+        "degree": st.just(2),
+        "bounds": st.fixed_dictionaries({"radius": st.floats(0.1, 10)}),
+    },
+    optional={"title": st.text(max_size=20), "description": st.text(max_size=20)},
+)
+SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
+TRIPLE = [name for name in SINGLE if len(catalog.load(name).variables) == 3]
+
+
+def sources(names: list[str]) -> st.SearchStrategy[dict[str, Any]]:
+    """A formula of the library or one written in the scene."""
+    named = st.sampled_from(names).map(lambda name: {"name": name})
+    return named | inline.map(lambda mapping: {"inline": mapping})
+
+
+links = st.builds(lambda s, count: {**s, "count": count}, sources(TRIPLE), st.integers(1, 5))
+formulas = st.builds(
+    lambda s, rest: {**s, **rest},
+    sources(SINGLE) | st.fixed_dictionaries({"chain": st.lists(links, min_size=1, max_size=3)}),
+    optional(
+        iterations=st.integers(1, 1_000_000), bailout=st.floats(1, 100), distance_bailout=st.floats(1, 1e6)
+    ),
+)
+sections = optional(
+    image=optional(width=st.integers(1, 16384), height=st.integers(1, 16384)),
+    renderer=optional(
+        type=st.just("surface"),
+        detail=st.floats(0.01, 100),
+        max_steps=st.integers(1, 100_000),
+        over_relaxation=st.floats(1, 1.99),
+        step_scale=st.none() | st.floats(0.01, 1),
+        bounds=st.none() | st.fixed_dictionaries({"center": vector, "radius": st.floats(1e-6, 1e6)}),
+        samples=st.integers(1, 65_536),
+        seed=st.integers(0, 2**32 - 1),
+    ),
+    lights=st.lists(lights, max_size=4),
+    material=optional(
+        color=st.lists(fraction, min_size=3, max_size=3),
+        ambient=amount,
+        diffuse=amount,
+        specular=amount,
+        shininess=st.floats(0.1, 1e5),
+    ),
+    coloring=optional(
+        by=st.sampled_from(["solid", "normal", "iterations"]),
+        palette=st.sampled_from(["viridis", "magma"]) | stops,
+        scale=coordinate,
+        offset=coordinate,
+    ),
+    background=st.just("transparent") | optional(top=color, bottom=color),
+    output=optional(
+        exposure=st.floats(-100, 100),
+        channels=st.lists(st.sampled_from(list(CHANNELS)), min_size=1, unique=True),
+        precision=st.dictionaries(st.sampled_from(list(CHANNELS)), st.sampled_from(["half", "float"])),
+        png_bits=st.sampled_from([8, 16]),
+    ),
+)
+
+
+@given(formulas, cameras, sections)
+def test_what_is_dumped_loads_back(
+    formula: dict[str, Any], camera: dict[str, Any], rest: dict[str, Any]
+) -> None:
+    data = {"version": 1, "formula": formula, "camera": camera, **rest}
+    try:
+        scene = load_scene(data)
+    except SceneError as error:
+        # Two random points may coincide, or look along `up`.
+        assume(error.where.path not in ("camera.target", "camera.up"))
+        raise
+    assert load_scene(dump_scene(scene)) == scene
+    assert load_scene(scene.resolved()) == scene
+    assert json.loads(json.dumps(scene.resolved())) == scene.resolved()
+    assert load_scene(scene.resolved()).resolved() == scene.resolved()
+
+
+@pytest.mark.parametrize("name", catalog.names())
+def test_every_formula_of_the_library(name: str) -> None:
+    scene = load_scene({"version": 1, "formula": {"name": name}, "camera": {}})
+    again = load_scene(dump_scene(scene))
+    assert again == scene
+    assert again.chain.degree == scene.chain.degree
+
+
+def test_every_key_but_three_has_a_default() -> None:
+    scene = load_scene("{version: 1, formula: {name: mandelbulb}, camera: {}}")
+    assert (scene.image.width, scene.image.height) == (1024, 1024)
+    assert scene.camera.projection == "perspective"
+    assert (scene.camera.position, scene.camera.target, scene.camera.up) == ((0, -3, 0), (0, 0, 0), (0, 0, 1))
+    assert [light.type for light in scene.lights] == ["directional"]
+    assert scene.output.half_channels >= {"R", "G", "B", "A"}
+    assert "Z" not in scene.output.half_channels
+    assert set(schema()["required"]) == {"version", "formula", "camera"}
+
+
+def test_a_scene_does_not_change() -> None:
+    scene = load_scene("{version: 1, formula: {name: mandelbulb}, camera: {}}")
+    with pytest.raises(ValueError, match="frozen"):
+        scene.version = 1
+    with pytest.raises(ValueError, match="less than 180"):
+        scene.camera.model_copy(update={"fov": 400})
+    other = scene.model_copy(update={"formula": scene.formula.model_copy(update={"name": "hast"})})
+    assert other.chain.links[0].bound.formula.name == "hast"
+    assert scene.chain.links[0].bound.formula.name == "mandelbulb"
+
+
+def test_the_schema_describes_every_key() -> None:
+    """An editor can complete and explain each key, and refuses others."""
+    found = schema()
+    assert set(found["properties"]) == set(Scene.model_fields)
+    json.dumps(found)
+    for name, model in found["$defs"].items():
+        assert model["additionalProperties"] is False, name
+        for key, entry in model["properties"].items():
+            assert "description" in entry or "const" in entry, f"{name}.{key}"
+    assert found["$defs"]["PerspectiveCamera"]["properties"]["fov"]["exclusiveMaximum"] == 180
+    assert found["properties"]["background"]["default"] == {
+        "top": [0.25, 0.35, 0.5],
+        "bottom": [0.02, 0.02, 0.03],
+    }
