@@ -1,8 +1,9 @@
-"""Kinds of number that a tree can be evaluated with, besides Python's floats: NumPy arrays, mpmath, and duals of both.
+"""Kinds of number that a tree can be evaluated with, besides Python's floats: NumPy arrays, mpmath, and duals
+of both.
 
-All follow the conventions of `evaluate.py`. Duals carry partial derivatives forward (Griewank and Walther, Evaluating
-Derivatives, 2nd ed., SIAM 2008, ch. 3); at a kink or a pole of a derivative the partial is one-sided or 0, never NaN
-because of it.
+All follow the conventions of `evaluate.py`. Duals carry partial derivatives forward (Griewank and Walther,
+Evaluating Derivatives, 2nd ed., SIAM 2008, ch. 3); at a kink or a pole of a derivative the partial is
+one-sided or 0, never NaN because of it.
 """
 
 from __future__ import annotations
@@ -13,11 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.formulas.evaluate import MAX_EXPONENT, TINY, Backend, call_any, complex_multiply, power_by_squaring, whole
+from clfractal.formulas.evaluate import (
+    MAX_EXPONENT,
+    TINY,
+    Backend,
+    call_any,
+    complex_multiply,
+    power_by_squaring,
+    whole,
+)
 
 
 class NumpyBackend:
-    """float64 arrays, element by element; booleans are boolean arrays. Overflow is silent: run under `np.errstate`."""
+    """float64 arrays, element by element; truth values are boolean arrays. Use it under `np.errstate`."""
 
     def call(self, function: str, arguments: list[Any]) -> Any:
         """The function's value as an array."""
@@ -88,7 +97,7 @@ _NUMPY_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
 
 
 class MpmathBackend:
-    """mpmath numbers in mpmath's current precision; truth values are Python bools. Division by 0 gives an infinity."""
+    """mpmath numbers in mpmath's current precision; truth values are Python bools."""
 
     def __init__(self) -> None:
         import mpmath  # an optional dependency: only high-precision readers need it
@@ -188,7 +197,7 @@ class DualBackend:
         self.base = base
 
     def call(self, function: str, arguments: list[Any]) -> Any:
-        """The function's value: a Dual, or a number of the base where no argument varies or only truth is asked."""
+        """The function's value: a Dual, or a number of the base where nothing varies."""
         values = [a.value if isinstance(a, Dual) else a for a in arguments]
         varying = [(i, a) for i, a in enumerate(arguments) if isinstance(a, Dual)]
         if function in _TRUTH or function in ("sign", "floor") or not varying:
@@ -220,7 +229,11 @@ class DualBackend:
     def _where(self, condition: Any, a: Any, b: Any) -> Any:
         if isinstance(condition, bool):
             return a if condition else b
-        count = len((a if isinstance(a, Dual) else b).partials) if isinstance(a, Dual) or isinstance(b, Dual) else 0
+        count = (
+            len((a if isinstance(a, Dual) else b).partials)
+            if isinstance(a, Dual) or isinstance(b, Dual)
+            else 0
+        )
         if not count:
             return self._base("where", condition, a, b)
         left, right = (x if isinstance(x, Dual) else Dual(x, (0.0,) * count) for x in (a, b))
@@ -301,5 +314,3 @@ def constant_dual(value: Any, count: int) -> Dual:
 def seeded(values: list[Any]) -> list[Dual]:
     """Independent variables: partial i of variable i is 1."""
     return [Dual(v, tuple(1.0 if i == j else 0.0 for j in range(len(values)))) for i, v in enumerate(values)]
-
-

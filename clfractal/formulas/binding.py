@@ -28,9 +28,10 @@ def bind(
     `julia` (one number for each variable) adds this constant in place of the point.
 
     Raises:
-        FormulaError: an unknown parameter, a value out of range, a julia of the wrong length, or values that give the
-            formula no meaning (no whole repeat, a degree below 1, a division by zero). Its place is `where`'s path
-            with `.parameters.NAME`, `.julia`, `.bailout`.
+        FormulaError: an unknown parameter, a value out of range, a julia of the wrong length, or values that
+        give the
+            formula no meaning (no whole repeat, a degree below 1, a division by zero). Its place is `where`'s
+            path with `.parameters.NAME`, `.julia`, `.bailout`.
     """
     where = where or Where()
     known = [parameter.name for parameter in formula.parameters]
@@ -59,7 +60,9 @@ def check_radius(value: object, where: Where) -> float | None:
     if value is None:
         return None
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= MAX_BAILOUT:
-        raise FormulaError(f"must be a number above 0 and at most {MAX_BAILOUT:g}, got {str(value)[:60]}", where)
+        raise FormulaError(
+            f"must be a number above 0 and at most {MAX_BAILOUT:g}, got {str(value)[:60]}", where
+        )
     return float(value)
 
 
@@ -100,7 +103,7 @@ _DERIVED: tuple[tuple[str, Callable[[float], bool], str], ...] = (
 
 
 def _check_derived(bound: BoundFormula, where: Where) -> None:
-    """Checks the numbers that follow from the parameters, and names the formula's key that gives a bad one."""
+    """Checks the numbers that follow from the parameters, and names the key that gives a bad one."""
     formula = bound.formula
     for key, accepted, words in _DERIVED:
         node = getattr(formula, key)
@@ -136,7 +139,7 @@ def _with_values(bound: BoundFormula) -> str:
 
 
 def _check_constants(bound: BoundFormula, where: Where) -> None:
-    """Refuses parameter values that make a divisor zero or an exponent huge, outside the branches of a `where`."""
+    """Refuses values that make a divisor zero or an exponent huge, outside the branches of a `where`."""
     constants: dict[str, float] = dict(bound.values)
     for key, node in [
         *bound.formula.let,

@@ -1,4 +1,4 @@
-"""Builds a formula from a mapping (a YAML file's content): strict keys, every expression parsed, every error placed."""
+"""Builds a formula from a mapping (a YAML file's content): strict keys, every error with its place."""
 
 from __future__ import annotations
 
@@ -41,11 +41,13 @@ _RESERVED = frozenset({*FUNCTIONS, "log2", "pi", "dr", "added", "julia"})
 def formula_from_mapping(data: object, where: Where | None = None, *, name: str) -> Formula:
     """The formula described by a mapping with the keys of the design's formula section.
 
-    `where` is where the mapping stands; an error's place is its path with the key's appended, and where `where` names
-    no file, the column inside the expression (`Document.locate` turns both into line and column).
+    `where` is where the mapping stands; an error's place is its path with the key's appended, and where
+    `where` names no file, the column inside the expression (`Document.locate` turns both into line and
+    column).
 
     Raises:
-        FormulaError: an unknown or missing key, a value of the wrong kind, or an expression that does not parse.
+        FormulaError: an unknown or missing key, a value of the wrong kind, or an expression that does not
+        parse.
     """
     return _Builder(_mapping(data, where or Where(), "a formula"), where or Where(), name).build()
 
@@ -205,7 +207,7 @@ class _Builder:
         return check_constant(self.data["julia"], len(self.variables), where)
 
     def _check_static_exponents(self, let: tuple[tuple[str, Node], ...], maps: tuple[Node, ...]) -> None:
-        """The exponent of cpow_re and cpow_im must not depend on z: its branch of code is chosen beforehand."""
+        """The exponent of cpow_re and cpow_im must not depend on z: the way it is computed is fixed."""
         moving = {*self.variables, *(point_name(v) for v in self.variables)}
         places = [
             *((("let", name), node) for name, node in let),
@@ -227,7 +229,7 @@ class _Builder:
 def bounds_from_mapping(
     data: object, parameters: Collection[str], where: Where
 ) -> tuple[tuple[Node, Node, Node], Node]:
-    """The centre and radius of `bounds: {center: [x, y, z], radius: r}`; `julia` in them is |C| of a Julia set."""
+    """Centre and radius of `bounds: {center: [x, y, z], radius: r}`; `julia` in them is |C| of a Julia set."""
     mapping = _mapping(data, where, "bounds")
     check_keys(mapping, ("center", "radius"), where)
     if "radius" not in mapping:

@@ -77,9 +77,10 @@ def resolve(spec: Mapping[str, Any], base_folder: Path | None = None, where: Whe
     """The chain that a scene's `formula` section describes.
 
     Args:
-        spec: one of `name` (of the library), `file`, `inline` (a formula's mapping), `chain` (a list of such mappings,
-            each with a `count`), and `parameters`, `julia`, `bailout`, `distance_bailout`. For a chain `julia` goes to
-            every link that adds the point, `parameters` is not allowed.
+        spec: one of `name` (of the library), `file`, `inline` (a formula's mapping), `chain` (a list of such
+        mappings,
+            each with a `count`), and `parameters`, `julia`, `bailout`, `distance_bailout`. For a chain
+            `julia` goes to every link that adds the point, `parameters` is not allowed.
         base_folder: the folder that `file` is relative to and must stay in; None: files are not allowed.
         where: where the section stands; errors add the path below it, and the column inside an expression.
 

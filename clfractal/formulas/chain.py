@@ -17,7 +17,7 @@ MAX_COUNT = 1000
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A formula and how often it is applied (each time with its repeats and its addition) before the next link."""
+    """A formula and how often it is applied, each time with repeats and addition, before the next link."""
 
     bound: BoundFormula
     count: int = 1
@@ -31,7 +31,8 @@ class Chain:
 
     Attributes:
         bounds_override: (centre, radius) of a sphere that holds the set, in scene units.
-        source: a mapping (`name`, `inline` or `chain` with what goes with it) that `catalog.resolve` turns into an
+        source: a mapping (`name`, `inline` or `chain` with what goes with it) that `catalog.resolve` turns
+        into an
             equal chain on any machine with this version of the library.
     """
 
@@ -55,7 +56,7 @@ class Chain:
 
     @property
     def first(self) -> BoundFormula:
-        """The first link's formula: it decides where iteration starts and gives a point its fourth coordinate."""
+        """The first link's formula: it decides where iteration starts and slices a space of four."""
         return self.links[0].bound
 
     @property
@@ -110,15 +111,15 @@ class Chain:
 
     @cached_property
     def radius(self) -> float:
-        """Radius of the bounding sphere, in scene units: the smallest around `center` that holds every link's."""
+        """Radius of the bounding sphere, in scene units: it holds every link's."""
         if self.bounds_override:
             return self.bounds_override[1]
         return max(math.dist(link.bound.center, self.center) + link.bound.radius for link in self.links)
 
     @property
     def solid_radius(self) -> float:
-        """For degree 1: the radius around z = 0 of a ball that holds the last solid."""
-        return math.hypot(*self.center) + self.radius
+        """For degree 1: the last solid is the ball |z| <= solid_radius, the same that inside tests use."""
+        return self.bailout
 
     @cached_property
     def step_scale(self) -> float:

@@ -1,12 +1,14 @@
 """Evaluates a tree with any kind of number; what is constant is always evaluated here, with Python's doubles.
 
-The conventions below hold for every reader of the tree (the OpenCL writer follows them), so that a point is never NaN
-because of an argument outside a function's domain:
+The conventions below hold for every reader of the tree (the OpenCL writer follows them), so that a point is
+never NaN because of an argument outside a function's domain:
 
 - sqrt of a negative number is 0; asin and acos clamp their argument to [-1, 1]; log(x) is log(max(x, TINY)).
 - atan2(0, 0) = 0, sign(0) = 0, mod(x, y) = x - y*floor(x/y); min and max take the first of equal arguments.
-- x**n with a constant whole n multiplies (a negative n: the reciprocal). Otherwise it is exp(n*log(x)) for x > 0; for
-  x < 0 the signed power where n happens to be whole, else 0; at x = 0: 0 for n > 0, 1 for n = 0, infinity for n < 0.
+- x**n with a constant whole n multiplies (a negative n: the reciprocal). Otherwise it is exp(n*log(x)) for x
+> 0; for
+  x < 0 the signed power where n happens to be whole, else 0; at x = 0: 0 for n > 0, 1 for n = 0, infinity for
+  n < 0.
 - cpow_re and cpow_im are 0 at x = y = 0 for n other than 0, and (1, 0) for n = 0.
 - x/0 is IEEE's: an infinity, or NaN for 0/0.
 - `where` never lets the branch that is not taken into the result.
@@ -23,7 +25,8 @@ from clfractal.formulas.nodes import Name, Node, Number
 
 # The smallest normal float32: what log sees in place of 0 and below, in every precision.
 TINY = 2.0**-126
-# Whole exponents beyond this are refused: nothing useful is left of a float32 there, and every one costs code.
+# Whole exponents beyond this are refused: nothing useful is left of a float32 there, and every one costs
+# code.
 MAX_EXPONENT = 1000
 
 
@@ -31,7 +34,7 @@ class Backend(Protocol):
     """A kind of number: how to call each function on it. Constants reach it as Python floats."""
 
     def call(self, function: str, arguments: list[Any]) -> Any:
-        """The function's value; a Python bool, or the backend's own truth values, for comparisons and logic."""
+        """The function's value; for comparisons and logic a Python bool or the backend's truth values."""
 
 
 def evaluate(node: Node, names: Mapping[str, Any], backend: Backend | None = None) -> Any:
@@ -55,7 +58,9 @@ def evaluate(node: Node, names: Mapping[str, Any], backend: Backend | None = Non
             return evaluate(node.arguments[1 if condition else 2], names, backend)
         branches = [evaluate(argument, names, backend) for argument in node.arguments[1:]]
         return call_any("where", [condition, *branches], backend)
-    return call_any(node.function, [evaluate(argument, names, backend) for argument in node.arguments], backend)
+    return call_any(
+        node.function, [evaluate(argument, names, backend) for argument in node.arguments], backend
+    )
 
 
 def call_any(function: str, arguments: list[Any], backend: Backend | None) -> Any:

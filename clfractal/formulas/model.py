@@ -14,8 +14,8 @@ from clfractal.formulas.nodes import Node, Number, substitute
 Add: TypeAlias = Literal["point", "constant", "none"]
 
 DEFAULT_DISTANCE_BAILOUT = 1000.0
-# |z| after one more application than needed may be distance_bailout**degree, its Jacobian that over the distance, and
-# squares of both are taken: 1e8 leaves a float32 room for distances down to 1e-10.
+# |z| after one more application than needed may be distance_bailout**degree, its Jacobian that over the
+# distance, and squares of both are taken: 1e8 leaves a float32 room for distances down to 1e-10.
 LARGEST_POWER = 1e8
 MAX_REPEAT = 64
 
@@ -84,13 +84,15 @@ class Formula:
         map: one expression for each variable.
         repeat: how often the map is applied before C is added.
         add: `point` adds the point in space, `constant` a fixed one (a Julia set), `none` nothing (an IFS).
-        degree: |z| grows like |z|**degree far outside, for one application with all its repeats; 1 means linearly.
+        degree: |z| grows like |z|**degree far outside, for one application with all its repeats; 1 means
+        linearly.
         bounds_center, bounds_radius: a sphere that holds the set, in scene units.
         bailout, distance_bailout: |z| beyond which a point has escaped, for counts and for distances.
         step_scale: how much of an estimated distance it is safe to step.
         slice: the fourth coordinate of a point in space, for four variables.
         shape: for degree 1, the distance in z-space to the last solid; without it a ball around the origin.
-        derivative: a cheaper scalar rule for |dz/dC|: its new value from `dr`, the old one, and the state before the
+        derivative: a cheaper scalar rule for |dz/dC|: its new value from `dr`, the old one, and the state
+        before the
             application, with `added` 1 where C is the point and 0 elsewhere.
         point_map: the map or a `let` uses `point_<variable>`, the constant C.
         julia: the constant to add when none is given (only with `add: constant`).
@@ -163,7 +165,7 @@ class BoundFormula:
 
     @property
     def distance_bailout(self) -> float:
-        """|z| beyond which iteration for a distance stops: reduced with the degree, so that float32 never overflows."""
+        """|z| beyond which iteration for a distance stops; reduced with the degree, for float32's range."""
         if self.distance_bailout_override is not None:
             return max(self.distance_bailout_override, self.bailout)
         own = self.formula.distance_bailout
@@ -174,7 +176,7 @@ class BoundFormula:
 
     @property
     def center(self) -> tuple[float, float, float]:
-        """Centre of the bounding sphere, in scene units; the origin for a formula turned into its Julia set."""
+        """Centre of the bounding sphere, in scene units; the origin where a Julia set was made of `point`."""
         if self._converted:
             return 0.0, 0.0, 0.0
         x, y, z = (self.value(node) for node in self.formula.bounds_center)
@@ -184,9 +186,9 @@ class BoundFormula:
     def radius(self) -> float:
         """Radius of the bounding sphere, in scene units.
 
-        For `add: point` turned into a Julia set it is derived. Superlinear maps: with |f(z)| >= |z|**d and R the
-        radius for the set in C, |z| > max(R, |C|) escapes. Linear ones: twice that. Never beyond the bailout, since
-        a point that starts there has escaped.
+        For `add: point` turned into a Julia set it is derived. Superlinear maps: with |f(z)| >= |z|**d and R
+        the radius for the set in C, |z| > max(R, |C|) escapes. Linear ones: twice that. Never beyond the
+        bailout, since a point that starts there has escaped.
         """
         radius = self.value(self.formula.bounds_radius)
         if not self._converted or self.julia is None:
@@ -223,7 +225,8 @@ class BoundFormula:
     def start(self) -> tuple[float, ...] | None:
         """f(0), for `add: point`: iteration may begin at z = f(0) + C with count 1 and derivative identity.
 
-        None where it may not (f(0) depends on C, or is not finite): begin at z = 0 with count 0 and derivative 0.
+        None where it may not (f(0) depends on C, or is not finite): begin at z = 0 with count 0 and
+        derivative 0.
         """
         if self.formula.point_map:
             return None

@@ -18,7 +18,7 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """A variable, a parameter, a `let` name, or a name with a meaning of its own (`point_x`, `dr`, `added`)."""
+    """A variable, a parameter, a `let` name, or one with a meaning of its own (`point_x`, `dr`, `added`)."""
 
     name: str
     position: int = field(compare=False, default=0)
@@ -26,7 +26,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A function or an operator (`add sub mul div pow neg`, `lt le gt ge eq ne`, `and or not`) and its arguments."""
+    """A function or operator (`add sub mul div pow neg`, `lt le gt ge eq ne`, `and or not`) with arguments."""
 
     function: str
     arguments: tuple[Node, ...]
@@ -35,8 +35,8 @@ class Call:
 
 Node: TypeAlias = Number | Name | Call
 
-# What may be written as a call, with the number of arguments in the tree. `min` and `max` of more than two are
-# folded into calls with two by the parser.
+# What may be written as a call, with the number of arguments in the tree. `min` and `max` of more than two
+# are folded into calls with two by the parser.
 FUNCTIONS = MappingProxyType(
     {
         **dict.fromkeys(

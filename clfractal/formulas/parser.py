@@ -1,7 +1,7 @@
 """Parses an expression's text into a tree: Python's grammar, a whitelist of what may stand in it, and limits.
 
-Nothing is ever executed. Characters, length and brackets are checked before Python's parser sees the text, because
-that parser recurses; what it returns is then taken apart against the whitelist.
+Nothing is ever executed. Characters, length and brackets are checked before Python's parser sees the text,
+because that parser recurses; what it returns is then taken apart against the whitelist.
 """
 
 from __future__ import annotations
@@ -66,7 +66,8 @@ def parse(
         parameters_only: the expression is computed once, from parameters; allows `log2`.
 
     Raises:
-        FormulaError: not an expression of the language, an unknown name, a division by a constant zero, a number that
+        FormulaError: not an expression of the language, an unknown name, a division by a constant zero, a
+        number that
             is not finite, or more than MAX_TEXT characters, MAX_NODES nodes or MAX_DEPTH levels.
     """
     return _Parser(text, names, where, parameters_only).parse()
@@ -173,7 +174,7 @@ class _Parser:
             return self._compare(tree, position, depth)
         if isinstance(tree, ast.Call):
             return self._call(tree, position, depth)
-        self.fail(_HINTS.get(type(tree), "is not part of the language"), position)
+        return self.fail(_HINTS.get(type(tree), "is not part of the language"), position)
 
     def _number(self, value: object, position: int) -> Number:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -193,7 +194,7 @@ class _Parser:
             return Name(name, position)
         if name in self.functions:
             self.fail(f"{name!r} is a function and needs its arguments in brackets", position)
-        self.fail(unknown_name("name", name, {*self.names, "pi"}), position)
+        return self.fail(unknown_name("name", name, {*self.names, "pi"}), position)
 
     def _value(self, tree: ast.expr, depth: int, user: str) -> Node:
         """A number for an operator or a function."""

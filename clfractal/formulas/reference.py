@@ -1,6 +1,8 @@
-"""The oracle: escape counts and distances with NumPy in float64, and orbits and Jacobians with mpmath at any precision.
+"""The oracle: escape counts and distances with NumPy in float64, and orbits and Jacobians with mpmath at any
+precision.
 
-Written for clarity, straight from the definitions in the design: what the kernels compute is compared with this.
+Written for clarity, straight from the definitions in the design: what the kernels compute is compared with
+this.
 """
 
 from __future__ import annotations
@@ -13,19 +15,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clfractal.formulas.backends import (
+    Dual,
     DualBackend,
     MpmathBackend,
     NumpyBackend,
     constant_dual,
     seeded,
 )
-from clfractal.formulas.backends import (
-    Dual as Dual,
-)
 from clfractal.formulas.chain import Chain
-from clfractal.formulas.evaluate import Backend, evaluate
-from clfractal.formulas.evaluate import evaluate_constant as evaluate_constant
+from clfractal.formulas.evaluate import Backend, evaluate, evaluate_constant
 from clfractal.formulas.model import BoundFormula, point_name
+
+__all__ = [
+    "DualBackend",
+    "MpmathBackend",
+    "NumpyBackend",
+    "apply",
+    "distance",
+    "escape",
+    "evaluate",
+    "evaluate_constant",
+    "mp_escape",
+    "mp_jacobian",
+    "mp_orbit",
+]
 
 Float = NDArray[np.float64]
 
@@ -34,7 +47,7 @@ EXTRA_APPLICATIONS = 64
 
 
 def apply(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
-    """One application: the map with its repeats, then the addition of `constant` (C) unless the formula adds nothing."""
+    """One application: the map with its repeats, then `constant` (C) added unless the formula adds nothing."""
     formula = bound.formula
     fixed = {name: float(value) for name, value in bound.values.items()}
     names: dict[str, Any] = {
@@ -99,17 +112,18 @@ def escape(
 def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float]:
     """Estimated distance to the solid (0 inside), in scene units, and the gradient of the last potential.
 
-    The solid is the set of points with |z| <= bailout after `iterations` applications. With J the Jacobian of the last z
-    and g = |J^T z/|z||: for a degree above 1 (|z| log|z| - what is left of the bailout's) / (2 g), for degree 1
-    (|z| - R) / g with R the chain's `solid_radius`, or the last formula's `shape` over its own gradient. Iteration stops
-    beyond the distance bailout. No step scale is applied.
+    The solid is the set of points with |z| <= bailout after `iterations` applications. With J the Jacobian of
+    the last z and g = |J^T z/|z||: for a degree above 1 (|z| log|z| - what is left of the bailout's) / (2 g),
+    for degree 1 (|z| - R) / g with R the chain's `solid_radius`, or the last formula's `shape` over its own
+    gradient. Iteration stops beyond the distance bailout. No step scale is applied.
 
     Returns:
-        Distances of shape (n,); gradients of shape (n, 3), which point out of the solid and are not normalised.
+        Distances of shape (n,); gradients of shape (n, 3), which point out of the solid and are not
+        normalised.
     """
     backend = DualBackend(NumpyBackend())
     with np.errstate(all="ignore"):
-        state, point, count, inside = _dual_orbit(chain, points, iterations, backend)
+        state, count, inside = _dual_orbit(chain, points, iterations, backend)
         shape = chain.links[-1].bound.formula.shape if chain.degree <= 1 else None
         radius = _norm([z.value for z in state])
         gradient = _gradient(state, radius)
@@ -155,8 +169,8 @@ def _gradient(state: Sequence[Any], radius: Float) -> Float:
 
 def _dual_orbit(
     chain: Chain, points: Float, iterations: int, backend: DualBackend
-) -> tuple[list[Any], list[Any], NDArray[np.int64], NDArray[np.bool_]]:
-    """Orbits over duals until |z| > distance bailout: last states, points, counts, and which are inside."""
+) -> tuple[list[Any], NDArray[np.int64], NDArray[np.bool_]]:
+    """Orbits over duals until |z| > distance bailout: last states, counts, and which are inside."""
     columns = np.array(points, dtype=float).reshape(-1, 3).T
     shape = columns[0].shape
     point = [_full(p, shape) for p in space_to_state(chain, seeded(list(columns)), backend)]
@@ -165,13 +179,15 @@ def _dual_orbit(
     count = np.zeros(shape, dtype=np.int64)
     inside = np.zeros(shape, dtype=bool)
     alive = _norm([z.value for z in state]) <= chain.distance_bailout
-    for application in range(iterations + EXTRA_APPLICATIONS):
+    # For degree 1 the distance is good at any |z|; going on would measure a smaller solid.
+    extra = EXTRA_APPLICATIONS if chain.degree > 1 else 1
+    for application in range(iterations + extra):
         if application >= iterations:
             # Only points that have left the bailout go on.
             settled = alive & (_norm([z.value for z in state]) <= chain.bailout)
             if application == iterations:
                 inside = settled
-            alive &= ~settled
+            alive &= ~settled & (chain.degree > 1)
         if not alive.any():
             break
         bound = chain.link_at(application).bound
@@ -179,7 +195,7 @@ def _dual_orbit(
         state = [_select(alive, _full(n, shape), z) for n, z in zip(new, state, strict=True)]
         count += alive
         alive = alive & (_norm([z.value for z in state]) <= chain.distance_bailout)
-    return state, point, count, inside
+    return state, count, inside
 
 
 def _full(value: Any, shape: tuple[int, ...]) -> Dual:
@@ -197,7 +213,9 @@ def _select(mask: NDArray[np.bool_], yes: Dual, no: Dual) -> Dual:
 # --- mpmath ---
 
 
-def mp_orbit(chain: Chain, point: Sequence[Any], applications: int, digits: int = 40) -> list[tuple[Any, ...]]:
+def mp_orbit(
+    chain: Chain, point: Sequence[Any], applications: int, digits: int = 40
+) -> list[tuple[Any, ...]]:
     """The states after 0, 1, ... applications, as mpmath numbers computed with `digits` digits."""
     import mpmath
 
