@@ -23,6 +23,7 @@ from clfractal.errors import FileError, Where
 from clfractal.files.atomic import atomic_writer, file_error
 from clfractal.files.channels import CHANNELS
 from clfractal.files.exr_header import read_header
+from clfractal.files.exr_header import read_scene_text as read_scene_text  # part of this module's interface
 
 Floats = npt.NDArray[np.float32]
 

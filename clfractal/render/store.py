@@ -16,9 +16,9 @@ from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
 from clfractal.files.png import Bits, stream_png, write_png
 from clfractal.render.film import Bands, Film, Floats, TiledStore, check_tile
-from clfractal.render.tiles import TILE, Region, TileGrid
+from clfractal.render.tiles import Region, TileGrid
 
-# Names of the header's keys in a file: those that OpenEXR defines keep their own, ours begin with the program's.
+# Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
 _FILE_KEYS = {"scene": "clfractal", "worldToCamera": "worldToCamera", "worldToNDC": "worldToNDC"}
 
 
@@ -143,7 +143,7 @@ def save_outputs(
     transparent: bool = False,
     exposure: float = 0.0,
 ) -> None:
-    """Writes a film to files, the format of each told by its extension; each file appears whole or not at all.
+    """Writes a film to files, the format of each told by its extension; each appears whole or not at all.
 
     All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`.
 
@@ -216,7 +216,8 @@ def _colors(store: TiledStore, *, alpha: bool, exposure: float) -> Iterator[Floa
         rows, width = band["R"].shape
         pixels = np.empty((rows, width, 4 if alpha else 3), dtype=np.float32)
         for component, name in enumerate("RGB"):
-            np.multiply(band[name], gain, out=pixels[..., component])
+            with np.errstate(over="ignore"):  # infinitely light is limited to 1 later
+                np.multiply(band[name], gain, out=pixels[..., component])
         if alpha:
             pixels[..., 3] = band["A"]
         yield pixels

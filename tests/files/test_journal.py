@@ -1,0 +1,288 @@
+"""The journal keeps every whole tile, whatever happens to its writer."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clfractal.errors import FileError
+from clfractal.files.journal import MAGIC, Journal
+from tests.files.limits import file_size_limit
+
+IDENTITY = {"scene": "version: 1\n" * 20, "version": "0.1.0", "device": "PoCL cpu", "samples": 4}
+CHANNELS = ("R", "Z")
+COUNT = 300
+
+
+def content(index: int, rows: int = 32, columns: int = 32) -> np.ndarray:
+    """What a tile must hold: different in every number."""
+    numbers = np.arange(2 * rows * columns, dtype=np.float32) + index * 10000
+    return numbers.reshape(2, rows, columns)
+
+
+def filled(path: Path, indices: range) -> Path:
+    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    for index in indices:
+        journal.append(index, content(index))
+    journal.close()
+    return path
+
+
+def resumed(path: Path) -> Journal:
+    return Journal.resume(path, IDENTITY, CHANNELS, COUNT)
+
+
+def done(journal: Journal) -> list[int]:
+    return np.flatnonzero(journal.done).tolist()
+
+
+def test_tiles_come_back_in_the_same_run_and_in_the_next(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    for index in (7, 299, 0):
+        journal.append(index, content(index))
+    for _ in range(2):
+        assert done(journal) == [0, 7, 299]
+        for index in (7, 299, 0):
+            assert np.array_equal(journal.tile(index), content(index))
+        with pytest.raises(KeyError):
+            journal.tile(1)
+        journal.close()
+        journal = resumed(path)
+    journal.discard()
+    assert not list(tmp_path.iterdir())
+
+
+def test_bits_survive_also_of_infinities_and_nan(tmp_path: Path) -> None:
+    array = content(0)
+    array[0, 0, :4] = [np.inf, -np.inf, np.nan, -0.0]
+    journal = Journal.create(tmp_path / "a.partial", IDENTITY, CHANNELS, COUNT)
+    journal.append(3, array)
+    assert journal.tile(3).tobytes() == array.tobytes()
+
+
+def test_small_tiles_lie_in_the_top_left_corner(tmp_path: Path) -> None:
+    journal = Journal.create(tmp_path / "a.partial", IDENTITY, CHANNELS, COUNT)
+    journal.append(3, content(3, 5, 9))
+    journal.append(4, content(4)[:, ::-1, ::-1])
+    assert np.array_equal(journal.tile(3)[:, :5, :9], content(3, 5, 9))
+    assert np.array_equal(journal.tile(4), content(4)[:, ::-1, ::-1])
+    for wrong in ((1, 32, 32), (2, 33, 32), (2, 32, 33)):
+        with pytest.raises(ValueError, match="shape"):
+            journal.append(5, np.zeros(wrong, np.float32))
+
+
+def test_a_tile_written_twice_has_its_last_content(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    journal.append(3, content(1))
+    journal.append(3, content(3))
+    journal.close()
+    assert np.array_equal(resumed(path).tile(3), content(3))
+
+
+def test_every_truncation_keeps_the_whole_records(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.partial", range(4))
+    whole = path.read_bytes()
+    size = 8 + content(0).nbytes
+    start = len(whole) - 4 * size
+    source = random.Random(4)
+    cuts = {start + k * size + off for k in range(4) for off in (0, 1, 4, 7, 8, 9, size - 1)}
+    for length in sorted(cuts | {source.randint(start, len(whole)) for _ in range(40)}):
+        path.write_bytes(whole[:length])
+        journal = resumed(path)
+        kept = (length - start) // size
+        assert done(journal) == list(range(kept))
+        # What comes next takes the place of the torn record.
+        journal.append(200, content(200))
+        journal.close()
+        journal = resumed(path)
+        assert done(journal) == [*range(kept), 200]
+        assert np.array_equal(journal.tile(200), content(200))
+        journal.close()
+
+
+def test_a_damaged_record_costs_its_own_tile_only(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.partial", range(5))
+    whole = path.read_bytes()
+    size = 8 + content(0).nbytes
+    start = len(whole) - 5 * size
+    for place in (0, 5, 8, 100, size - 1):
+        damaged = bytearray(whole)
+        damaged[start + 2 * size + place] ^= 1
+        path.write_bytes(damaged)
+        journal = resumed(path)
+        assert done(journal) == [0, 1, 3, 4]
+        journal.close()
+
+
+def test_a_record_of_zeros_is_no_tile(tmp_path: Path) -> None:
+    # What some file systems leave of a file's end after a power failure.
+    path = filled(tmp_path / "a.partial", range(1, 3))
+    with open(path, "ab") as stream:
+        stream.write(bytes(8 + content(0).nbytes))
+    assert done(resumed(path)) == [1, 2]
+
+
+def test_damage_after_opening_is_noticed(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.partial", range(2))
+    journal = resumed(path)
+    with open(path, "r+b") as stream:
+        stream.seek(-5, os.SEEK_END)
+        stream.write(b"\xff")
+    with pytest.raises(FileError, match=r"a\.partial: is damaged: tile 1 has changed"):
+        journal.tile(1)
+
+
+def test_a_missing_journal_is_begun(tmp_path: Path) -> None:
+    journal = resumed(tmp_path / "a.partial")
+    assert not journal.done.any()
+    assert (tmp_path / "a.partial").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"version": "0.2.0"}, 'the version was "0.1.0" and is "0.2.0"'),
+        ({"scene": "version: 1\n" * 21}, "the scene has changed"),
+        (
+            {"samples": 9, "device": "GPU"},
+            'the device was "PoCL cpu" and is "GPU", the samples was 4 and is 9',
+        ),
+        ({"more": 1}, "the more was null and is 1"),
+    ],
+)
+def test_other_work_is_refused_with_what_differs(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    path = filled(tmp_path / "a.partial", range(3))
+    before = path.read_bytes()
+    with pytest.raises(FileError) as caught:
+        Journal.resume(path, {**IDENTITY, **change}, CHANNELS, COUNT)
+    assert str(caught.value) == f"{path}: cannot be resumed: {message}"
+    assert path.read_bytes() == before
+
+
+def test_other_channels_or_sizes_are_refused(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.partial", range(3))
+    with pytest.raises(FileError, match=r'the channels was \["R", "Z"\] and is \["Z", "R"\]'):
+        Journal.resume(path, IDENTITY, ("Z", "R"), COUNT)
+    with pytest.raises(FileError, match="the tiles was 300 and is 301"):
+        Journal.resume(path, IDENTITY, CHANNELS, 301)
+
+
+def test_what_is_no_journal_is_neither_resumed_nor_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    whole = filled(tmp_path / "b.partial", range(1)).read_bytes()
+    head_damaged = bytearray(whole)
+    head_damaged[30] ^= 1
+    for text in (b"", b"my precious notes", MAGIC, MAGIC + b"\xff" * 8, whole[:50], bytes(head_damaged)):
+        path.write_bytes(text)
+        with pytest.raises(FileError, match="holds no work in progress that could be resumed"):
+            resumed(path)
+        if not text.startswith(MAGIC):
+            with pytest.raises(FileError, match="is in the way"):
+                Journal.create(path, IDENTITY, CHANNELS, COUNT)
+        assert path.read_bytes() == text
+
+
+def test_two_processes_do_not_share_a_journal(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    for begin in (Journal.create, Journal.resume):
+        with pytest.raises(FileError, match=r"a\.partial: is in use"):
+            begin(path, IDENTITY, CHANNELS, COUNT)
+    journal.close()
+    resumed(path).close()
+
+
+def test_folders_pipes_and_missing_folders(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path, tmp_path / "pipe", tmp_path / "gone" / "a.partial"):
+        for begin in (Journal.create, Journal.resume):
+            with pytest.raises(FileError) as caught:
+                begin(path, IDENTITY, CHANNELS, COUNT)
+            assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_full_disk_keeps_what_was_written(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    with file_size_limit(20000):
+        journal.append(0, content(0))
+        journal.append(1, content(1))
+        with pytest.raises(FileError, match=r"a\.partial: cannot be written: File too large"):
+            journal.append(2, content(2))
+    assert done(journal) == [0, 1]
+    assert path.stat().st_size == 20000
+    # There is room again: the torn record is overwritten.
+    journal.append(9, content(9))
+    journal.close()
+    journal = resumed(path)
+    assert done(journal) == [0, 1, 9]
+    assert np.array_equal(journal.tile(9), content(9))
+
+
+def test_full_disk_at_the_start_leaves_the_earlier_journal(tmp_path: Path) -> None:
+    path = filled(tmp_path / "a.partial", range(3))
+    with pytest.raises(FileError, match="cannot be written"), file_size_limit(50):
+        Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.partial"]
+    assert done(resumed(path)) == [0, 1, 2]
+
+
+WRITER = """
+import sys
+from tests.files.test_journal import CHANNELS, COUNT, IDENTITY, content
+from clfractal.files.journal import Journal
+journal = Journal.resume(sys.argv[1], IDENTITY, CHANNELS, COUNT)
+missing = [i for i in range(COUNT) if not journal.done[i]]
+print("ready", flush=True)
+for index in missing:
+    journal.append(index, content(index))
+    if index % 2 == 0:
+        print(index, flush=True)
+print("end", flush=True)
+"""
+
+
+def test_kill_at_random_moments_loses_nothing_that_was_finished(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    source = random.Random(5)
+    kills = 0
+    finished: set[int] = set()
+    for _ in range(40):
+        with subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True
+        ) as writer:
+            assert writer.stdout is not None
+            assert writer.stdout.readline() == "ready\n"
+            # Reading slows the writer down to our pace: it is killed some tiles later.
+            told = []
+            for _ in range(source.randint(0, 25)):
+                told.append(writer.stdout.readline().strip())
+                if told[-1] in ("end", ""):
+                    break
+            time.sleep(source.random() * 1e-3)
+            writer.send_signal(signal.SIGKILL)
+            told += writer.stdout.read().split()
+            kills += writer.wait() == -signal.SIGKILL
+        finished |= {int(line) for line in told if line.isdecimal()}
+        journal = resumed(path)
+        assert finished <= set(done(journal))
+        for index in done(journal):
+            assert np.array_equal(journal.tile(index), content(index))
+        complete = bool(journal.done.all())
+        journal.close()
+        if complete:
+            break
+    assert complete
+    assert kills >= 2

@@ -1,0 +1,216 @@
+"""The film on disk, and the files that films are written to."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from clfractal.errors import FileError
+from clfractal.files.channels import CHANNELS
+from clfractal.files.exr import read_exr
+from clfractal.files.exr_header import read_scene_text
+from clfractal.files.png import read_texts
+from clfractal.files.srgb import encode8
+from clfractal.render.film import Film, TiledStore
+from clfractal.render.store import JournalFilm, check_output, save_outputs
+from clfractal.render.tiles import Region
+from tests.files.limits import file_size_limit
+
+ALL = tuple(CHANNELS)
+IDENTITY = {"scene": "abc", "version": "0.1.0"}
+HEADER: dict[str, Any] = {
+    "scene": "version: 1\n",
+    "version": "0.1.0",
+    "device": "PoCL",
+    "precision": "float32",
+    "seconds": 2.5,
+    "worldToCamera": np.arange(16.0).reshape(4, 4),
+    "worldToNDC": np.eye(4),
+}
+PART = Region(10, 20, 90, 70)
+
+
+def tile_content(store: TiledStore, index: int) -> np.ndarray:
+    tile = store.grid.tile(index)
+    shape = (len(store.channels), tile.height, tile.width)
+    return np.random.default_rng(index).random(shape, dtype=np.float32)
+
+
+def fill(store: TiledStore, indices: range | None = None) -> None:
+    for index in indices or range(store.grid.count):
+        store.put(index, tile_content(store, index))
+
+
+def whole(store: TiledStore) -> dict[str, np.ndarray]:
+    bands = [band for _, band in store.bands()]
+    return {name: np.concatenate([band[name] for band in bands]) for name in store.channels}
+
+
+@pytest.mark.parametrize("region", [None, PART])
+def test_both_stores_hold_the_same_picture(tmp_path: Path, region: Region | None) -> None:
+    memory = Film(ALL, (150, 100), region)
+    disk = JournalFilm(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), region)
+    for store in (memory, disk):
+        # Tile 5 is never rendered.
+        fill(store, range(5))
+        fill(store, range(6, store.grid.count))
+        assert np.flatnonzero(~store.done).tolist() == [5]
+    assert [first for first, _ in memory.bands()] == [first for first, _ in disk.bands()]
+    for name, plane in whole(memory).items():
+        assert np.array_equal(plane, memory[name])
+        assert np.array_equal(plane, whole(disk)[name])
+        assert np.array_equal(plane, disk.to_film()[name])
+    assert np.isinf(memory["Z"]).sum() == 32 * 32
+
+
+def test_a_resumed_picture_is_the_same(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    first = JournalFilm(path, IDENTITY, ALL, (150, 100))
+    fill(first, range(7))
+    first.close()
+    second = JournalFilm(path, IDENTITY, ALL, (150, 100), resume=True)
+    assert np.flatnonzero(second.done).tolist() == list(range(7))
+    fill(second, range(7, second.grid.count))
+    straight = Film(ALL, (150, 100))
+    fill(straight)
+    for name in ALL:
+        assert whole(second)[name].tobytes() == straight[name].tobytes()
+    second.discard()
+    assert not path.exists()
+
+
+def test_another_size_region_or_scene_is_not_resumed(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    JournalFilm(path, IDENTITY, ALL, (150, 100)).close()
+    for identity, display, region, message in (
+        (IDENTITY, (150, 101), None, r"the region was .*, the size was \[150, 100\] and is \[150, 101\]"),
+        (IDENTITY, (150, 100), PART, r"the region was \[0, 0, 150, 100\] and is \[10, 20, 90, 70\]"),
+        ({**IDENTITY, "scene": "def"}, (150, 100), None, 'the scene was "abc" and is "def"'),
+    ):
+        with pytest.raises(FileError, match=message):
+            JournalFilm(path, identity, ALL, display, region, resume=True)
+
+
+@pytest.mark.parametrize("region", [None, PART])
+def test_files_of_both_formats(tmp_path: Path, region: Region | None) -> None:
+    film = Film(ALL, (150, 100), region, HEADER)
+    fill(film)
+    save_outputs(film, [tmp_path / "a.exr", tmp_path / "a.png"])
+    planes, header = read_exr(tmp_path / "a.exr")
+    assert set(planes) == set(ALL)
+    for name in ALL:
+        assert planes[name].dtype == (np.float16 if CHANNELS[name].precision == "half" else np.float32)
+        assert np.array_equal(planes[name], film[name].astype(planes[name].dtype))
+    assert header["displayWindow"] == (0, 0, 149, 99)
+    assert header["dataWindow"] == ((10, 20, 99, 89) if region else (0, 0, 149, 99))
+    assert header["software"] == "clfractal 0.1.0"
+    assert (header["clfractalDevice"], header["clfractalPrecision"]) == ("PoCL", "float32")
+    assert (header["clfractalVersion"], header["clfractalSeconds"]) == ("0.1.0", 2.5)
+    assert np.array_equal(header["worldToCamera"], HEADER["worldToCamera"])
+    assert np.array_equal(header["worldToNDC"], np.eye(4))
+    assert read_scene_text(tmp_path / "a.exr") == "version: 1\n"
+    with Image.open(tmp_path / "a.png") as image:
+        assert np.array_equal(np.asarray(image), film.to_rgb8())
+    texts = read_texts(tmp_path / "a.png")
+    assert texts["clfractal"] == "version: 1\n"
+    assert texts["Software"] == "clfractal 0.1.0"
+    assert texts["clfractalSeconds"] == "2.5"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.exr", "a.png"]
+
+
+def test_a_film_on_disk_gives_the_same_files(tmp_path: Path) -> None:
+    memory = Film(ALL, (150, 100), PART, HEADER)
+    disk = JournalFilm(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), PART, HEADER)
+    for store, name in ((memory, "memory"), (disk, "disk")):
+        fill(store)
+        save_outputs(store, [tmp_path / f"{name}.exr", tmp_path / f"{name}.png"])
+    for suffix in ("exr", "png"):
+        assert (tmp_path / f"memory.{suffix}").read_bytes() == (tmp_path / f"disk.{suffix}").read_bytes()
+
+
+def test_settings(tmp_path: Path) -> None:
+    film = Film(("R", "G", "B", "A", "Z"), (40, 40))
+    fill(film)
+    film.save(tmp_path / "a.exr", half={"Z"}, header={"seconds": 1.0}, exposure=3)
+    planes, header = read_exr(tmp_path / "a.exr")
+    assert planes["Z"].dtype == np.float16
+    assert np.array_equal(planes["R"], film["R"])
+    assert header["clfractalSeconds"] == 1
+    film.save(tmp_path / "a.png", exposure=-2)
+    with Image.open(tmp_path / "a.png") as image:
+        colors = np.stack([film[name] for name in "RGB"], axis=-1)
+        assert np.array_equal(np.asarray(image), encode8(colors * np.float32(0.25)))
+    film.save(tmp_path / "b.png", transparent=True, bits=16)
+    with open(tmp_path / "b.png", "rb") as stream:
+        # IHDR: width, height, then bits and colour type (6: RGB with alpha)
+        assert stream.read(26)[16:] == bytes([0, 0, 0, 40, 0, 0, 0, 40, 16, 6])
+
+
+def test_extreme_pixels_make_no_trouble(tmp_path: Path) -> None:
+    film = Film(("R", "G", "B", "A", "Z"), (4, 4))
+    film["R"][:] = 3e38
+    film["G"][:] = np.inf
+    film["A"][:2] = 1e-40
+    for transparent in (False, True):
+        film.save(tmp_path / "a.png", exposure=4, transparent=transparent)
+    film.save(tmp_path / "a.exr")
+    assert (read_exr(tmp_path / "a.exr")[0]["R"] == 65504).all()
+
+
+def test_outputs_are_checked_before_anything_is_written(tmp_path: Path) -> None:
+    film = Film(("R", "G", "B"), (4, 4))
+    for bad, message in (("a.jpg", "unknown extension '.jpg'"), ("gone/a.exr", "there is no folder")):
+        with pytest.raises(FileError, match=message):
+            save_outputs(film, [tmp_path / "good.png", tmp_path / bad])
+    assert not list(tmp_path.iterdir())
+    check_output(tmp_path / "a.exr", ("Z",))
+    with pytest.raises(
+        FileError, match=r"a\.png: a PNG needs the channels R, G, B; without G, B write an EXR"
+    ):
+        check_output(tmp_path / "a.png", ("R", "Z"))
+
+
+def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:
+    film = Film(("R", "G", "B", "A", "Z"), (200, 200))
+    fill(film)
+    for name in ("a.exr", "a.png"):
+        (tmp_path / name).write_bytes(b"old")
+        with pytest.raises(FileError, match=f"{name}: cannot be written: "), file_size_limit(50_000):
+            film.save(tmp_path / name)
+        assert (tmp_path / name).read_bytes() == b"old"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.exr", "a.png"]
+
+
+MEMORY = """
+import resource, sys
+import numpy as np
+from clfractal.render.film import Film
+from clfractal.render.store import JournalFilm, save_outputs
+
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+outputs = [sys.argv[1] + "/a.png", sys.argv[1] + "/a.exr"]
+save_outputs(Film(display=(64, 64)), outputs)
+before = peak()
+film = JournalFilm(sys.argv[1] + "/a.partial", {}, display=(4096, 2048))
+tile = np.random.default_rng(0).random((5, 32, 32), dtype=np.float32)
+for index in range(film.grid.count):
+    film.put(index, tile)
+save_outputs(film, outputs)
+print(peak() - before)
+"""
+
+
+def test_memory_does_not_grow_with_the_height(tmp_path: Path) -> None:
+    # 4096 x 2048 x 5 channels are 160 MB; a small picture first takes what the libraries need once.
+    run = subprocess.run(
+        [sys.executable, "-c", MEMORY, str(tmp_path)], capture_output=True, text=True, check=True
+    )
+    assert float(run.stdout) < 80
