@@ -229,7 +229,7 @@ class _Builder:
 def bounds_from_mapping(
     data: object, parameters: Collection[str], where: Where
 ) -> tuple[tuple[Node, Node, Node], Node]:
-    """Centre and radius of `bounds: {center: [x, y, z], radius: r}`; `julia` in them is |C| of a Julia set."""
+    """Centre and radius of `bounds: {center: [x, y, z], radius: r}`; `julia` in them is a Julia set's |C|."""
     mapping = _mapping(data, where, "bounds")
     check_keys(mapping, ("center", "radius"), where)
     if "radius" not in mapping:

@@ -68,9 +68,20 @@ def load_file(path: str | Path, *, shown: str | None = None) -> Formula:
         raise document.locate(error) from None
 
 
-def load_chain(spec: str | Mapping[str, Any], base_folder: Path | None = None) -> Chain:
-    """The chain of a library name or of what a scene says (see `resolve`)."""
-    return resolve({"name": spec} if isinstance(spec, str) else spec, base_folder)
+def load_chain(formula: str | Path | Mapping[str, Any], parameters: Mapping[str, Any] | None = None) -> Chain:
+    """The chain of a library name, of a file (a Path, or a text that ends in .yaml or .yml) or of a mapping.
+
+    The mapping may be a scene's `formula` section (see `resolve`) or a formula itself.
+    """
+    spec: dict[str, Any] = {"parameters": parameters} if parameters else {}
+    if isinstance(formula, Path) or (isinstance(formula, str) and formula.endswith((".yaml", ".yml"))):
+        path = Path(formula)
+        return resolve({"file": path.name, **spec}, path.parent)
+    if isinstance(formula, str):
+        return resolve({"name": formula, **spec})
+    if any(key in formula for key in _SOURCES):
+        return resolve({**formula, **spec})
+    return resolve({"inline": formula, **spec})
 
 
 def resolve(spec: Mapping[str, Any], base_folder: Path | None = None, where: Where | None = None) -> Chain:

@@ -84,16 +84,14 @@ class Formula:
         map: one expression for each variable.
         repeat: how often the map is applied before C is added.
         add: `point` adds the point in space, `constant` a fixed one (a Julia set), `none` nothing (an IFS).
-        degree: |z| grows like |z|**degree far outside, for one application with all its repeats; 1 means
-        linearly.
+        degree: |z| grows like |z|**degree far outside, for one application with its repeats; 1: linearly.
         bounds_center, bounds_radius: a sphere that holds the set, in scene units.
         bailout, distance_bailout: |z| beyond which a point has escaped, for counts and for distances.
         step_scale: how much of an estimated distance it is safe to step.
         slice: the fourth coordinate of a point in space, for four variables.
         shape: for degree 1, the distance in z-space to the last solid; without it a ball around the origin.
         derivative: a cheaper scalar rule for |dz/dC|: its new value from `dr`, the old one, and the state
-        before the
-            application, with `added` 1 where C is the point and 0 elsewhere.
+            before the application, with `added` 1 where C is the point and 0 elsewhere.
         point_map: the map or a `let` uses `point_<variable>`, the constant C.
         julia: the constant to add when none is given (only with `add: constant`).
         source: the mapping it was read from, as plain data.

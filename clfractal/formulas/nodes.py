@@ -26,7 +26,7 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A function or operator (`add sub mul div pow neg`, `lt le gt ge eq ne`, `and or not`) with arguments."""
+    """A function or an operator (`add sub mul div pow neg`, `lt le gt ge eq ne`, `and or not`) applied."""
 
     function: str
     arguments: tuple[Node, ...]

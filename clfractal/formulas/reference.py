@@ -47,7 +47,7 @@ EXTRA_APPLICATIONS = 64
 
 
 def apply(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
-    """One application: the map with its repeats, then `constant` (C) added unless the formula adds nothing."""
+    """One application: the map with its repeats, then C (`constant`) added unless nothing is to be."""
     formula = bound.formula
     fixed = {name: float(value) for name, value in bound.values.items()}
     names: dict[str, Any] = {
