@@ -54,7 +54,10 @@ typedef JOIN(int, LANES) mask;
 #endif
 
 // Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.
+// (Where the driver cannot, it is defined before: see `cannot_run_optimised_code` in clfractal/device/select.py.)
+#ifndef INLINE
 #define INLINE static inline __attribute__((always_inline))
+#endif
 
 // Sum of a quantity over the lanes of a packet.
 INLINE scalar lanes_sum(real value) {

@@ -14,7 +14,7 @@ import pyopencl as cl
 from clfractal.device import cache, compiler, isolate
 from clfractal.device.buildlog import build_error
 from clfractal.device.compiler import BuildFailureError, Warm
-from clfractal.device.select import Device
+from clfractal.device.select import Device, cannot_run_optimised_code
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
 
@@ -81,6 +81,8 @@ def build(
         DeviceError: the driver failed or aborted.
     """
     start = time.perf_counter()
+    if cannot_run_optimised_code(device.info):
+        text, flags = "#define INLINE static inline\n" + text, [*flags, "-cl-opt-disable"]
     key = _key(device, text, flags, warm)
     binary = cache.load_blob(key)
     if binary is not None:

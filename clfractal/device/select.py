@@ -178,6 +178,15 @@ def is_intel_cpu(info: DeviceInfo) -> bool:
     return info.kind == "cpu" and info.platform.startswith("Intel(R)")
 
 
+def cannot_run_optimised_code(info: DeviceInfo) -> bool:
+    """Oclgrind's interpreter lacks intrinsics that its own compiler's optimiser and forced inlining make.
+
+    Then a kernel cannot be created: "Undefined external function: llvm.bitreverse.i32" (for shuffled bits) or
+    "llvm.experimental.noalias.scope.decl" (for `always_inline` without optimisation), Oclgrind 21.10.
+    """
+    return is_simulator(info)
+
+
 def has_float64(info: DeviceInfo) -> bool:
     """Whether `double` works: its capabilities are non-zero, or the extension is named."""
     return info.has_float64
