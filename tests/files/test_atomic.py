@@ -147,3 +147,20 @@ def test_reading_never_waits_for_a_pipe_or_reads_a_device(tmp_path: Path) -> Non
         with pytest.raises(FileError) as caught:
             open_regular(path)
         assert caught.value.message.startswith(message.strip())
+
+
+def test_a_disk_that_fails_late_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Some file systems find out that there is no room only when the data is brought to the disk.
+    def fail(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    target = tmp_path / "a.png"
+    target.write_bytes(b"old")
+    monkeypatch.setattr(os, "fsync", fail)
+    with (
+        pytest.raises(FileError, match=r"a\.png: cannot be written: No space left on device$"),
+        atomic_writer(target) as beside,
+    ):
+        beside.write_bytes(b"new")
+    assert target.read_bytes() == b"old"
+    assert contents(tmp_path) == ["a.png"]

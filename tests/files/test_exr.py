@@ -11,6 +11,7 @@ import OpenEXR
 import pytest
 
 from clfractal.errors import FileError
+from clfractal.files import exr
 from clfractal.files.exr import read_exr, to_half, write_exr
 from tests.files.limits import file_size_limit
 
@@ -182,3 +183,21 @@ def test_tiled_files_are_refused(tmp_path: Path) -> None:
         file.write(str(tmp_path / "a.exr"))
     with pytest.raises(FileError, match="holds tiles"):
         read_exr(tmp_path / "a.exr")
+
+
+def test_a_library_that_keeps_quiet_about_lost_bytes_is_found_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.exr"
+    path.write_bytes(b"old")
+    write_pixels = exr._write_pixels
+
+    def lossy(shown: Path, beside: Path, *arguments: Any) -> None:
+        write_pixels(shown, beside, *arguments)
+        with open(beside, "r+b") as stream:
+            stream.truncate(beside.stat().st_size - 1)
+
+    monkeypatch.setattr(exr, "_write_pixels", lossy)
+    with pytest.raises(FileError, match=r"a\.exr: cannot be written: the library left it incomplete"):
+        write(path, planes(40, 40))
+    assert path.read_bytes() == b"old"
