@@ -23,7 +23,8 @@ class Where:
 
     def prefix(self) -> str:
         """The place as `scene.yaml:12:9: camera.fov: `; empty when nothing is known."""
-        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        column = self.column if self.line is not None else None
+        place = ":".join(str(part) for part in (self.file, self.line, column) if part is not None)
         return "".join(f"{part}: " for part in (place, self.path) if part)
 
 
