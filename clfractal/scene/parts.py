@@ -115,6 +115,9 @@ class SurfaceRenderer(Section):
     bounds: Ball | None = Field(None, description="where to look; the formula's own if null")
     samples: int = Field(1, ge=1, le=65_536, description="rays per pixel")
     seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of the samples in a pixel")
+    precision: Literal["auto", "float32", "float64"] = Field(
+        "auto", description="number type of the rays; auto: float64 where pixels are too fine for float32"
+    )
 
 
 # With one class there is nothing to choose; a second makes this a union like Camera's.

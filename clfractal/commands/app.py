@@ -1,0 +1,190 @@
+"""The shell's commands and options. Each command's work is imported when it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import clfractal
+from clfractal.commands.shell import Shell
+from clfractal.errors import STATUS_BAD_INPUT
+
+app = typer.Typer(
+    name="clfractal",
+    help="Renders 3D fractals with OpenCL: YAML scenes in, finished pictures out.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Scene = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene file, or a picture that clfractal wrote.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value: camera.fov=30. Repeatable."),
+]
+DeviceOption = Annotated[
+    str | None,
+    typer.Option("--device", help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]"),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Show excerpts, causes and drivers' messages.")
+]
+
+
+def call(arguments: Sequence[str], shell: Shell) -> int:
+    """Runs the command that the arguments name; gives the exit status.
+
+    Raises:
+        ClfractalError: and whatever else a command raises.
+    """
+    try:
+        status = app(list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False)
+    except Exception as error:
+        # Typer's own errors: their classes move between its versions, this method of theirs stays.
+        tell = getattr(error, "format_message", None)
+        if tell is None:
+            raise
+        command = getattr(getattr(error, "ctx", None), "command_path", "clfractal")
+        text = " ".join(str(tell()).split()).rstrip(".")
+        shell.refuse(f"{command}: {text}; see {command} --help")
+        return STATUS_BAD_INPUT
+    return status if isinstance(status, int) else 0
+
+
+def _shell(context: typer.Context, *, quiet: bool = False, verbose: bool = False) -> Shell:
+    shell = context.obj
+    assert isinstance(shell, Shell)
+    shell.quiet, shell.verbose = quiet, verbose
+    return shell
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"clfractal {clfractal.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def root(
+    _version: Annotated[
+        bool, typer.Option("--version", help="Show the version.", callback=_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Renders 3D fractals with OpenCL: YAML scenes in, finished pictures out."""
+
+
+@app.command()
+def render(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o", "--output", help="An .exr or .png file; repeatable.  [default: SCENE's name, .png]"
+        ),
+    ] = None,
+    device: DeviceOption = None,
+    precision: Annotated[
+        str | None,
+        typer.Option("--precision", help="auto, float32 or float64.  [default: the scene's, auto]"),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option("--size", metavar="WxH", help="Pixels; the camera stays.")
+    ] = None,
+    overrides: Overrides = None,
+    region: Annotated[
+        str | None,
+        typer.Option("--region", metavar="X,Y,W,H", help="Only this part of the picture, in pixels."),
+    ] = None,
+    samples: Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the work kept in OUTPUT.partial.")
+    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    stats: Annotated[
+        Path | None, typer.Option("--stats", metavar="FILE.json", help="Write times and counts as JSON.")
+    ] = None,
+) -> None:
+    """Render a scene to one or more picture files."""
+    from clfractal.commands.render import Order, render_scene
+
+    order = Order(
+        scene=scene,
+        outputs=tuple(output or ()),
+        device=device,
+        precision=precision,
+        size=size,
+        overrides=tuple(overrides or ()),
+        region=region,
+        samples=samples,
+        resume=resume,
+        stats=stats,
+    )
+    render_scene(order, _shell(context, quiet=quiet, verbose=verbose))
+
+
+@app.command()
+def check(
+    context: typer.Context, scene: Scene, overrides: Overrides = None, verbose: Verbose = False
+) -> None:
+    """Check a scene and print it with every default filled in."""
+    from clfractal.scene.load import dump_scene, load_scene
+
+    shell = _shell(context, verbose=verbose)
+    shell.print(dump_scene(load_scene(Path(scene), overrides=overrides or ())))
+
+
+@app.command()
+def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = False) -> None:
+    """List every OpenCL device and how fast it is; measured once, then remembered."""
+    from clfractal.commands.devices import list_devices
+
+    list_devices(_shell(context, quiet=quiet, verbose=verbose))
+
+
+@app.command()
+def formulas(
+    context: typer.Context, name: Annotated[str | None, typer.Argument(help="One of the library.")] = None
+) -> None:
+    """List the library of formulas, or tell about one."""
+    from clfractal.commands.formulas import list_formulas, tell_formula
+
+    shell = _shell(context)
+    shell.print(list_formulas() if name is None else tell_formula(name))
+
+
+@app.command()
+def schema(context: typer.Context) -> None:
+    """Print the JSON Schema of scene files, for editors."""
+    import json
+
+    from clfractal.scene import load
+
+    _shell(context).print(json.dumps(load.schema(), indent=2))
+
+
+@app.command()
+def bench(
+    context: typer.Context,
+    device: DeviceOption = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE.json", help="Write the table as JSON, too.")
+    ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Measure this machine's speed and print a table."""
+    from importlib import import_module
+
+    shell = _shell(context, quiet=quiet, verbose=verbose)
+    shell.mute_drivers()
+    run: Any = import_module("clfractal.bench").run
+    run(device=device, json_file=json_file, shell=shell)

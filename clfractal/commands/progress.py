@@ -1,0 +1,99 @@
+"""How far a render is, on standard error: a bar on a terminal, plain lines now and then elsewhere."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from clfractal.commands.shell import Shell
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+
+    from clfractal.render.engine import Progress
+
+BAR_AFTER_SECONDS = 0.5
+"""Quick renders show no bar: the library that draws it takes longer to load than they take."""
+BAR_EVERY_SECONDS = 0.1
+LINE_EVERY_SECONDS = 2.0
+
+
+class Reporter:
+    """Called with the state after each batch of tiles."""
+
+    def __init__(self, shell: Shell, tiles: int) -> None:
+        self._shell = shell
+        self._tiles = tiles
+        self._bar: Bar | None = None
+        self._terminal = shell.terminal and not shell.quiet
+        self._every = BAR_EVERY_SECONDS if self._terminal else LINE_EVERY_SECONDS
+        self._next = time.monotonic() + (BAR_AFTER_SECONDS if self._terminal else LINE_EVERY_SECONDS)
+
+    def __call__(self, state: Progress) -> None:
+        now = time.monotonic()
+        if self._shell.quiet or now < self._next:
+            return
+        self._next = now + self._every
+        if self._terminal:
+            self._draw(state)
+        else:
+            share = state.tiles_done / max(state.tiles, 1)
+            self._shell.say(f"rendering: {share:4.0%}, {rate(state)}, {_left(state)}")
+
+    def close(self) -> None:
+        """Takes the bar away."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    def summary(self, state: Progress, seconds: float) -> str:
+        """What was done, for the last line."""
+        return (
+            f"{seconds:.2f} s, {rate(state)}"
+            if state.rays
+            else f"{seconds:.2f} s, nothing was left to render"
+        )
+
+    def _draw(self, state: Progress) -> None:
+        if self._bar is None:
+            self._bar = _new_bar(self._shell, self._tiles)
+        task = self._bar.task_ids[0]
+        self._bar.update(task, completed=state.tiles_done, rate=rate(state), left=_left(state))
+        self._bar.refresh()
+
+
+def rate(state: Progress) -> str:
+    """Camera rays per second in words."""
+    return f"{state.rays_per_second / 1e6:.2f} Mrays/s"
+
+
+def _left(state: Progress) -> str:
+    remaining = state.remaining
+    if remaining is None:
+        return "time left unknown"
+    minutes, seconds = divmod(round(remaining), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours:d}:{minutes:02d}:{seconds:02d} left" if hours else f"{minutes:d}:{seconds:02d} left"
+
+
+def _new_bar(shell: Shell, tiles: int) -> Bar:
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn
+    from rich.progress import Progress as Bar
+
+    # Refreshed by hand: a thread that draws while Ctrl-C is being answered would spoil the line.
+    bar = Bar(
+        TextColumn("rendering"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.fields[left]}"),
+        console=Console(file=shell.errors),
+        auto_refresh=False,
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    bar.add_task("rendering", total=tiles, rate="", left="")
+    bar.start()
+    return bar

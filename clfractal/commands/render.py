@@ -1,0 +1,151 @@
+"""`clfractal render`: from a scene file to finished pictures, resumable after any kind of end."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clfractal.commands.progress import Reporter
+from clfractal.commands.shell import Shell
+from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.files.atomic import check_output
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+
+if TYPE_CHECKING:
+    from clfractal.render.store import JournalFilm
+
+PARTIAL = ".partial"
+"""What is added to the first output's name for the file that keeps unfinished work."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """The options of `clfractal render`, as they were given."""
+
+    scene: str
+    outputs: tuple[Path, ...] = ()
+    device: str | None = None
+    precision: str | None = None
+    size: str | None = None
+    overrides: tuple[str, ...] = ()
+    region: str | None = None
+    samples: int | None = None
+    resume: bool = False
+    stats: Path | None = None
+
+
+def render_scene(order: Order, shell: Shell) -> None:
+    """Renders a scene to all outputs of an order.
+
+    Raises:
+        ClfractalError: anything wrong with the input, the files or the device. Work that was done stays in
+            the first output's `.partial` file.
+    """
+    start = time.perf_counter()
+    region = _region(order.region)
+    scene = _scene(order)
+    outputs = _outputs(order, scene)
+    shell.mute_drivers()
+    # Imported only now: a mistake in the input is told without waiting for OpenCL.
+    from clfractal import job as jobs
+    from clfractal.commands import stats
+    from clfractal.device.select import choose
+    from clfractal.render import engine
+    from clfractal.render.store import JournalFilm
+
+    job = jobs.prepare(scene, choose(order.device), region=region, on_start=shell.say)
+    if job.remark:
+        shell.say(f"{order.scene}: {job.remark}")
+    partial = outputs[0].with_name(outputs[0].name + PARTIAL)
+    if partial.exists() and not order.resume:
+        shell.say(f"{partial}: earlier work is dropped; --resume would continue it")
+    size = (scene.image.width, scene.image.height)
+    film = JournalFilm(
+        partial, job.identity(), job.plan.channels, size, job.plan.region, job.header(), resume=order.resume
+    )
+    reporter = Reporter(shell, film.grid.count)
+    shell.state = lambda: _interrupted(partial, film)
+    try:
+        state = engine.render(scene, job.plan, job.device, film, reporter)
+        reporter.close()
+        rendered = time.perf_counter()
+        film.header["seconds"] = rendered - state.started
+        job.save(film, outputs)
+    except BaseException:
+        reporter.close()
+        if not film.done.any():
+            film.discard()
+        raise
+    film.discard()
+    written = time.perf_counter()
+    shell.state = lambda: "clfractal: interrupted"
+    values = stats.statistics(
+        job, state, wall_ms=1e3 * (written - start), write_ms=1e3 * (written - rendered)
+    )
+    if order.stats is not None:
+        stats.write_statistics(order.stats, values)
+    shell.say(f"{', '.join(map(str, outputs))}: {reporter.summary(state, written - start)}")
+    if shell.verbose:
+        shell.say(stats.sentence(values))
+
+
+def _scene(order: Order) -> Scene:
+    """The scene with the options folded in; errors name the option that was given."""
+    given: dict[str, tuple[str, str]] = {}  # key -> option, value
+    if order.size is not None:
+        width, height = _numbers("--size", order.size, "x", 2, "WIDTHxHEIGHT, such as 1920x1080")
+        given |= {"image.width": ("--size", str(width)), "image.height": ("--size", str(height))}
+    if order.samples is not None:
+        given["renderer.samples"] = ("--samples", str(order.samples))
+    if order.precision is not None:
+        given["renderer.precision"] = ("--precision", json.dumps(order.precision))
+    overrides = [*order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
+    try:
+        return load_scene(Path(order.scene), overrides=overrides)
+    except ClfractalError as error:
+        key = (error.where.file or "").removeprefix("--set ")
+        if error.where.file is None or key == error.where.file or key not in given:
+            raise
+        raise type(error)(error.message, replace(error.where, file=given[key][0])) from error
+
+
+def _region(text: str | None) -> tuple[int, int, int, int] | None:
+    if text is None:
+        return None
+    x, y, width, height = _numbers("--region", text, ",", 4, "X,Y,WIDTH,HEIGHT, such as 0,0,640,480")
+    return x, y, width, height
+
+
+def _numbers(option: str, text: str, separator: str, count: int, form: str) -> list[int]:
+    parts = text.lower().split(separator)
+    try:
+        if len(parts) == count and len(text) <= 100:
+            return [int(part) for part in parts]
+    except ValueError:
+        pass
+    raise SceneError(f"must be {form}; got {text[:60]!r}", Where(option))
+
+
+def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
+    """The files to write, all of them checked before anything is rendered."""
+    source = Path(order.scene)
+    outputs = order.outputs or (Path(source.with_suffix(".png").name),)
+    if not order.outputs and os.path.realpath(outputs[0]) == os.path.realpath(source):
+        raise FileError("would be replaced by its own picture; name an output with -o", Where(order.scene))
+    from clfractal.render.store import check_output as check_picture
+
+    for path in outputs:
+        check_picture(path, scene.output.channels)
+    if order.stats is not None:
+        check_output(order.stats, (order.stats.suffix.lower(),))
+    return outputs
+
+
+def _interrupted(partial: Path, film: JournalFilm) -> str:
+    done = int(film.done.sum())
+    return f"{partial}: interrupted with {done} of {film.grid.count} tiles done; --resume continues"

@@ -1,0 +1,131 @@
+"""How commands speak: results on standard output, one line at a time on standard error, and no other word.
+
+Drivers write to standard error as they please. While a command runs, what they write goes into a file of its
+own, which `--verbose` shows when something failed.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TextIO
+
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, ClfractalError, FileError, Where
+
+_NOISE_SHOWN = 20_000  # bytes
+
+
+class Shell:
+    """Standard output and standard error of one run of the program.
+
+    `verbose` and `quiet` are set by a command from its options.
+    """
+
+    def __init__(self, *, owns_process: bool) -> None:
+        """`owns_process`: whether standard error may be taken away from drivers."""
+        self.verbose = False
+        self.quiet = False
+        self._owns_process = owns_process
+        self._errors: TextIO = sys.stderr
+        self._noise: int | None = None
+        self._interrupted = False
+        self.state: Callable[[], str] = lambda: "clfractal: interrupted"
+        """What to say of an interrupt."""
+
+    @property
+    def terminal(self) -> bool:
+        """Whether somebody watches standard error."""
+        return self._errors.isatty()
+
+    @property
+    def errors(self) -> TextIO:
+        """Standard error, for a progress bar."""
+        return self._errors
+
+    def mute_drivers(self) -> None:
+        """From now on only our lines reach standard error; not with `--verbose`."""
+        if not self._owns_process or self.verbose or self._noise is not None:
+            return
+        with suppress(OSError, ValueError):
+            own = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1)
+            self._noise = (
+                os.memfd_create("driver") if hasattr(os, "memfd_create") else os.open(os.devnull, os.O_RDWR)
+            )
+            os.dup2(self._noise, 2)
+            self._errors = own
+
+    def say(self, line: str) -> None:
+        """One line for the user, on standard error; nothing if it is closed, or with `--quiet`."""
+        if not self.quiet:
+            self._write(line)
+
+    def print(self, text: str) -> None:
+        """A command's result, on standard output.
+
+        Raises:
+            FileError: it cannot be written (a full disk).
+        """
+        try:
+            sys.stdout.write(text if text.endswith("\n") else text + "\n")
+            sys.stdout.flush()
+        except BrokenPipeError:
+            # The reader has seen enough, as `head` does; the rest is written to nobody.
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        except OSError as error:
+            with suppress(OSError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise FileError(f"cannot be written: {error.strerror}", Where("standard output")) from error
+
+    def refuse(self, line: str) -> None:
+        """One line about wrong input; `--quiet` does not silence it."""
+        self._write(" ".join(line.split()))
+
+    def fail(self, error: BaseException) -> int:
+        """Tells what went wrong in one line, with `--verbose` also how; gives the exit status."""
+        details = ""
+        if isinstance(error, ClfractalError):
+            line, status, details = str(error), int(error.status), error.details
+        elif isinstance(error, MemoryError):
+            line, status = "clfractal: out of memory", STATUS_BAD_INPUT
+        elif isinstance(error, OSError) and error.strerror:
+            line, status = _system_line(error), STATUS_BAD_INPUT
+        else:
+            summary = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+            line = f"clfractal: internal error, please report it: {summary}"
+            status = STATUS_DEVICE_FAILED
+        self.refuse(line)
+        if self.verbose:
+            import traceback
+
+            for text in (details, self.noise(), "".join(traceback.format_exception(error))):
+                if text.strip():
+                    self._write(text.rstrip())
+        return status
+
+    def interrupted(self) -> None:
+        """Tells of an interrupt, once."""
+        if not self._interrupted:
+            self._interrupted = True
+            self._write(self.state())
+
+    def noise(self) -> str:
+        """What drivers wrote to standard error since `mute_drivers`."""
+        if self._noise is None:
+            return ""
+        with suppress(OSError):
+            size = os.fstat(self._noise).st_size
+            return os.pread(self._noise, _NOISE_SHOWN, max(0, size - _NOISE_SHOWN)).decode("utf-8", "replace")
+        return ""
+
+    def _write(self, line: str) -> None:
+        with suppress(OSError, ValueError):  # closed by whoever started us
+            self._errors.write(line + "\n")
+            self._errors.flush()
+
+
+def _system_line(error: OSError) -> str:
+    where = f"{error.filename}: " if isinstance(error.filename, str) else "clfractal: "
+    return f"{where}{error.strerror}"

@@ -1,0 +1,73 @@
+"""What `--stats` and `--verbose` tell of a render."""
+
+from __future__ import annotations
+
+import json
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+import clfractal
+from clfractal.files.atomic import atomic_writer
+from clfractal.job import Job
+from clfractal.render.engine import Progress
+
+
+def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) -> dict[str, Any]:
+    """Times and counts as plain data.
+
+    `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the command's start to
+    its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray` counts
+    shadow rays' steps too.
+    """
+    info, plan = job.device.info, job.plan
+    return {
+        "device": info.name,
+        "platform": info.platform,
+        "driver": info.driver,
+        "version": clfractal.__version__,
+        "precision": plan.precision,
+        "lanes": plan.lanes,
+        "samples": plan.samples,
+        "width": plan.region.width,
+        "height": plan.region.height,
+        "tiles": state.tiles,
+        "tiles_resumed": state.tiles_before,
+        "build_ms": round(state.build_ms, 3),
+        "kernel_ms": round(state.kernel_ms, 3),
+        "write_ms": round(write_ms, 3),
+        "wall_ms": round(wall_ms, 3),
+        "rays": state.rays,
+        "rays_per_second": round(state.rays / max(1e-3 * state.kernel_ms, 1e-9), 1),
+        "iterations": state.iterations,
+        "steps": state.steps,
+        "steps_per_ray": round(state.steps_per_ray, 4),
+        "bad_distances": state.bad_distances,
+        "peak_memory_mb": round(peak_memory_mb(), 1),
+    }
+
+
+def write_statistics(path: Path, values: dict[str, Any]) -> None:
+    """Writes statistics as JSON; the file appears whole or not at all.
+
+    Raises:
+        FileError: it cannot be written.
+    """
+    with atomic_writer(path) as beside:
+        beside.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+
+
+def sentence(values: dict[str, Any]) -> str:
+    """The statistics as one line."""
+    return (
+        "{device}: {precision}, {lanes} lanes; build {build_ms:.0f} ms, kernels {kernel_ms:.0f} ms, files "
+        "{write_ms:.0f} ms; {steps_per_ray:.1f} steps per ray, {bad_distances} bad distances; peak memory "
+        "{peak_memory_mb:.0f} MB"
+    ).format(**values)
+
+
+def peak_memory_mb() -> float:
+    """The most memory that this process has held at a time, in MiB."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (2**20 if sys.platform == "darwin" else 2**10)
