@@ -67,3 +67,5 @@ INLINE scalar lanes_sum(real value) {
     for (int lane = 0; lane < LANES; ++lane) sum += each[lane];
     return sum;
 }
+
+#include "repairs.h"

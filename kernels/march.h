@@ -8,6 +8,15 @@ typedef struct {
     real bad;     // steps that the distance called safe and that ended inside
 } crossing;
 
+// A distance can be far too small where the map stretches space unevenly, and a cone that touches it is no proof of a
+// surface. With the gradient at hand a hit is proved: the touching point descends towards the solid, and counts if it
+// arrives within the pixel. Formulas with a scalar rule of their own are nearly conformal and need no proof.
+#define PROOF_STEPS 6
+#define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
+#define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there
+#define PROOF_REACH R(1.0)       // of the pixel's cone: how far from the ray the descent may lead
+#define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
+
 // Marches the active lanes. `refine` (the same for all lanes) narrows a step that ended inside down to the surface;
 // without it such a lane is simply a hit, which is all that a shadow needs.
 INLINE crossing march(ray r, mask active, int refine, __constant const struct March *settings,
@@ -17,38 +26,97 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
     real low = t;                            // the last point known to be outside
     real high = (real)(REAL_LARGEST);        // a point known to be inside
     real relaxation = (real)(settings->relaxation);
-    real radius_before = R(0.0), step_before = R(0.0);
+    real radius_before = (real)(REAL_LARGEST), step_before = R(0.0);
+#if !HAS_DERIVATIVE
+    mask proving = active & ~active;
+    vec probe = r.origin;
+    vec probe_downhill = r.direction;
+    real probe_radius = R(0.0);
+    real probes = R(0.0), factor = PROOF_FACTOR;
+#endif
     for (int i = 0; i < settings->max_steps; ++i) {
         if (!any_lane(active)) break;
-        const sphere here = orbit_distance(vec_along(r.origin, t, r.direction), active, orbit, k);
-        const real radius = here.step * (real)(settings->step_scale);
+        const vec on_ray = vec_along(r.origin, t, r.direction);
+#if HAS_DERIVATIVE
+        const sphere here = orbit_scalar_distance(on_ray, active, orbit, k);
+#else
+        surface_point surface;
+        const vec point = vec_pick(proving, probe, on_ray);
+        const sphere here = orbit_dual_distance(point, active, orbit, k, &surface);
+#endif
+        // A distance grows no faster than one moves: where the estimate says otherwise it has met a point at which the
+        // derivative vanishes, and means nothing.
+        real radius = here.step * (real)(settings->step_scale);
         const real cone = (real)(settings->detail) * (r.footprint + r.spread * t);
         found.steps += pick(active, R(1.0), R(0.0));
         found.count += pick(active, here.count, R(0.0));
 
+#if HAS_DERIVATIVE
+        radius = fmin(radius, radius_before + step_before);
+        const mask marching = active;
+#else
+        radius = pick(proving, radius, fmin(radius, radius_before + step_before));
+        // Lanes that prove a hit: arrived, given up, or one step further down.
+        const vec offset = vec_sub(point, on_ray);
+        const mask near = here.inside | less(radius, PROOF_ARRIVED * cone);
+        const real along = vec_dot(offset, r.direction);
+        const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
+        const mask arrived = proving & near & ~astray;
+        const mask failed = proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), probes));
+        found.hit |= arrived;
+        found.t = pick(arrived, t, found.t);
+        active &= ~arrived;
+        t = pick(failed, t + PROOF_ONWARD * cone, t);
+        proving &= ~(arrived | failed);
+        const mask marching = active & ~proving & ~failed;
+        const vec downhill = vec_scale(vec_normalize(surface.gradient), R(-1.0));
+        // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
+        const mask turned = less(vec_dot(downhill, probe_downhill), R(0.0));
+        const mask slow = less(R(0.5) * probe_radius, radius);
+        factor = pick(proving, factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
+#endif
+
         // Over-relaxation (Keinert et al. 2014, sec. 3.1): if this sphere does not touch the one before, something may lie
         // between them, so go back to the end of the one before.
-        const mask overshot = active & less(R(1.0), relaxation) & less(radius + radius_before, step_before);
-        const mask inside = active & ~overshot & here.inside;
-        const mask outside = active & ~overshot & ~here.inside;
+        const mask overshot = marching & less(R(1.0), relaxation) & less(radius + radius_before, step_before);
+        const mask inside = marching & ~overshot & here.inside;
+        const mask outside = marching & ~overshot & ~here.inside;
         if (i > 0) found.bad += pick(inside & ~less(high, (real)(REAL_LARGEST)), R(1.0), R(0.0));
         high = pick(inside, t, high);
         low = pick(outside, t, low);
 
         // The pixel's cone touches the solid, or the crossing is narrowed down.
-        const mask bracketed = active & less(high, (real)(REAL_LARGEST));
+        const mask bracketed = marching & less(high, (real)(REAL_LARGEST));
         const mask touched = outside & less(radius, cone);
         const mask narrow = refine ? bracketed & less(high - low, R(0.0625) * cone) : inside;
-        found.hit |= touched | narrow;
-        found.t = pick(touched | narrow, low, found.t);
-        active &= ~(touched | narrow);
+#if HAS_DERIVATIVE
+        const mask done = touched | narrow;
+#else
+        // A bracketed lane has seen the inside already.
+        const mask done = narrow | (touched & bracketed);
+        proving |= touched & ~done;
+        probe = vec_pick(proving, vec_along(point, factor * fmax(radius, PROOF_ARRIVED * cone), downhill), probe);
+        probe_downhill = downhill;
+        probe_radius = radius;
+        probes = pick(proving, pick(touched, R(0.0), probes + R(1.0)), probes);
+#endif
+        found.hit |= done;
+        found.t = pick(done, low, found.t);
+        active &= ~done;
 
         const real step = radius * relaxation;
         const real onward = pick(overshot, low + radius_before, t + step);
+#if !HAS_DERIVATIVE
+        relaxation = pick(failed, R(1.0), relaxation);
+        step_before = pick(failed, PROOF_ONWARD * cone, step_before);
+        const mask moving = marching & ~proving;
+#else
+        const mask moving = marching;
+#endif
         relaxation = pick(overshot, R(1.0), relaxation);
-        step_before = pick(overshot, radius_before, step);
-        radius_before = pick(overshot, radius_before, radius);
-        t = pick(bracketed, R(0.5) * (low + high), onward);
+        step_before = pick(overshot, radius_before, pick(moving, step, step_before));
+        radius_before = pick(marching & ~overshot, radius, radius_before);
+        t = pick(bracketed, R(0.5) * (low + high), pick(moving, onward, t));
         active &= less(t, r.far);
     }
     return found;

@@ -1,7 +1,8 @@
 // Asked of every driver before anything else runs on it: does it compile packets of LANES lanes, are the results right, and
 // how fast are loops whose lanes leave at different times? Each work-item takes LANES points of a plane through the
 // Mandelbulb of power 8 (White and Nylander's rule, polynomial form) and counts applications until it escapes; the second
-// kernel calls every built-in function that the number types use, because some drivers lack a few for wide vectors.
+// kernel calls every built-in function that the number types use, because some drivers lack a few for wide vectors; the
+// third those with several ways of evaluation, in packets whose lanes need different ones (see repairs.h).
 
 __kernel void escape_counts(__global scalar *counts, int width, int limit) {
     const int first = (int)get_global_id(0) * LANES;
@@ -50,4 +51,16 @@ __kernel void built_ins(__global scalar *sums, __global const scalar *arguments)
     sum += pick(less(t, R(0.5)), R(1.0), R(2.0)) + pick(equal(t, t) & ~is_nan(t), R(4.0), R(8.0));
     lanes_store(sum, each);
     for (int lane = 0; lane < LANES; ++lane) sums[first + lane] = each[lane];
+}
+
+__kernel void mixed_lanes(__global scalar *values, __global const scalar *arguments, int count) {
+    const int first = (int)get_global_id(0) * LANES;
+    scalar each[LANES];
+    for (int lane = 0; lane < LANES; ++lane) each[lane] = arguments[first + lane];
+    const real t = lanes_load(each);
+    const real results[4] = {sin(t), cos(t), pow(fabs(t), R(1.7)), log(fabs(t))};
+    for (int function = 0; function < 4; ++function) {
+        lanes_store(results[function], each);
+        for (int lane = 0; lane < LANES; ++lane) values[function * count + first + lane] = each[lane];
+    }
 }

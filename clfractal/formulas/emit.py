@@ -65,6 +65,8 @@ class Emitter:
         owner: distinguishes equal expressions with different parameter values (links of a chain).
         evaluate: the number of a node that is constant in the state.
         prefix: begins the names of this emitter's variables.
+        lines: the statements so far.
+        origins: of each variable over `real` the function and its operands (of `where` the mask's text first).
     """
 
     number_type: NumberType
@@ -74,6 +76,7 @@ class Emitter:
     evaluate: Callable[[Node], float]
     prefix: str = "t"
     lines: list[str] = field(default_factory=list)
+    origins: dict[str, tuple[str, tuple[Value, ...]]] = field(default_factory=dict)
     _known: dict[tuple[str, ...], Value] = field(default_factory=dict)
 
     def emit(self, node: Node) -> Value:
@@ -104,9 +107,9 @@ class Emitter:
             return head
         return self._operation(function, *operands)
 
-    def combine(self, function: str, a: Value, b: Value) -> Value:
+    def combine(self, function: str, *operands: Value) -> Value:
         """One more operation on values that are there already."""
-        return self._operation(function, a, b)
+        return self._operation(function, *operands)
 
     # --- operations ---
 
@@ -139,6 +142,8 @@ class Emitter:
         """One operation, in the cheapest form that its operands' kinds allow."""
         a = operands[0]
         b = operands[1] if len(operands) > 1 else None
+        if function == "neg" and a.number is not None:
+            return literal(-a.number)
         simple = self._simplify(function, a, b)
         if simple is not None:
             return simple
@@ -149,7 +154,9 @@ class Emitter:
         varying = any(operand.kind == "varying" for operand in operands)
         if self.number_type == "real" or not varying:
             kind: Literal["flat", "varying"] = "varying" if self.number_type == "real" and varying else "flat"
-            return self._statement("real", kind, f"real_{function}", *(o.text for o in operands))
+            result = self._statement("real", kind, f"real_{function}", *(o.text for o in operands))
+            self.origins.setdefault(result.text, (function, operands))
+            return result
         if function in ("sign", "floor"):
             return self._statement("real", "flat", f"real_{function}", self._plain(a))
         if b is None:
@@ -169,6 +176,8 @@ class Emitter:
         """Operations with 0 and 1 that need no code. x * 0 counts as 0 for infinite x too."""
         if b is None:
             return None
+        if function == "mul" and a.number is not None and b.number is not None:
+            return literal(a.number * b.number)
         if function == "add":
             return b if a.number == 0 else a if b.number == 0 else None
         if function == "sub":
@@ -260,8 +269,14 @@ class Emitter:
         a, b = self.emit(yes), self.emit(no)
         if self.number_type == "dual" and "varying" in (a.kind, b.kind):
             return self._statement("dual", "varying", "dual_where", chosen, self._lift(a), self._lift(b))
+        return self.choose(chosen, a, b)
+
+    def choose(self, chosen: str, a: Value, b: Value) -> Value:
+        """`a` in the lanes of the mask `chosen`, else `b`, both plain numbers."""
         kind: Literal["flat", "varying"] = "varying" if self.number_type == "real" else "flat"
-        return self._statement("real", kind, "real_where", chosen, a.text, b.text)
+        result = self._statement("real", kind, "real_where", chosen, a.text, b.text)
+        self.origins.setdefault(result.text, ("where", (Value(chosen, "flat"), a, b)))
+        return result
 
     def _condition(self, node: Node) -> str | bool:
         """A condition as the text of a mask, or its truth when it is known now."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
 from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Node, Number
+from clfractal.formulas.partials import Differentiator
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +126,10 @@ class _ChainWriter:
         state = "state" if number_type == "real" else "dual_state"
         emitter = self._emitter(index, number_type)
         mapped = self._map(emitter, bound)
+        if number_type == "dual" and not bound.formula.point_map:
+            local, rows = self._by_local_jacobian(index)
+            if _cost([*local.lines, *(f" = {row};" for row in rows)]) < _cost(emitter.lines):
+                emitter, mapped = local, [Value(row, "varying") for row in rows]
         head = (
             f"INLINE {state} {number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
         )
@@ -145,6 +150,27 @@ class _ChainWriter:
         texts = self._add_constant(index, number_type, adder, plain)
         lines = [*passes, *adder.lines]
         return _function(head, lines, f"const {state} sum = {{{', '.join(texts)}}};\n    return sum;")
+
+    def _by_local_jacobian(self, index: int) -> tuple[Emitter, list[str]]:
+        """The map over dual numbers by its own Jacobian: real statements, and a dual expression for each component."""
+        emitter = self._emitter(index, "real")
+        emitter.bindings = {
+            name: Value(f"{value.text}.v", value.kind) if value.text.startswith(("z.", "c.")) else value
+            for name, value in emitter.bindings.items()
+        }
+        mapped = self._map(emitter, self.links[index].bound)
+        differentiator = Differentiator(emitter)
+        rows = []
+        for value in mapped:
+            terms = []
+            for j in range(self.size):
+                partial = differentiator.partial(value, j)
+                if partial is not None:
+                    terms += [partial.text, f"z.s{j}"]
+            count = len(terms) // 2
+            chain = "dual_chain" if count == 1 else f"dual_chain{count}"
+            rows.append(f"{chain}({', '.join([value.text, *terms])})" if terms else f"dual_constant({value.text})")
+        return emitter, rows
 
     def _apply_derivative(self, index: int) -> str:
         """One application that carries the scalar derivative along, sharing what the two have in common."""
@@ -220,6 +246,24 @@ class _ChainWriter:
         name = "start" if number_type == "real" else "dual_start"
         head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
         return _function(head, lines, None)
+
+
+# What operations cost beside an addition, roughly, on the vector units of today's processors.
+_COSTS = {
+    "real_div": 8, "real_sqrt": 10, "real_exp": 25, "real_log": 25, "real_pow": 60, "real_sin": 30, "real_cos": 30,
+    "real_tan": 40, "real_asin": 30, "real_acos": 30, "real_atan": 30, "real_atan2": 45, "real_mod": 12,
+    "real_power_slope": 60, "real_power_log": 30, "real_arc_slope": 20,
+    "dual_add": 4, "dual_sub": 4, "dual_neg": 4, "dual_mul": 7, "dual_square": 5, "dual_mul_real": 4, "dual_where": 4,
+    "dual_chain": 3, "dual_chain2": 6, "dual_chain3": 9, "dual_chain4": 12, "dual_div": 23, "dual_div_real": 12,
+    "real_div_dual": 20, "real_sub_dual": 4, "dual_sqrt": 22, "dual_abs": 6, "dual_min": 5, "dual_max": 5,
+    "dual_clamp": 10, "dual_exp": 28, "dual_log": 37, "dual_sin": 63, "dual_cos": 63, "dual_tan": 45, "dual_asin": 53,
+    "dual_acos": 53, "dual_atan": 41, "dual_atan2": 62, "dual_mod": 18, "dual_pow": 150, "dual_pow_real": 123,
+}  # fmt: skip
+
+
+def _cost(lines: Sequence[str]) -> int:
+    """Cost of statements of the form `... = function(...);`."""
+    return sum(_COSTS.get(line.partition("= ")[2].partition("(")[0], 1) for line in lines)
 
 
 def _parameters(bound: BoundFormula) -> dict[str, Value]:

@@ -107,7 +107,7 @@ class SurfaceRenderer(Section):
     )
     max_steps: int = Field(1000, ge=1, le=100_000, description="most distance evaluations along a ray")
     over_relaxation: float = Field(
-        1.2, ge=1, lt=2, description="factor on steps, taken back where it is unsafe"
+        1.3, ge=1, lt=2, description="factor on steps, taken back where it is unsafe"
     )
     step_scale: Annotated[float, Field(strict=True, gt=0, le=2)] | None = Field(
         None, description="factor on distances; the formula's own if null"

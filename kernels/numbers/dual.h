@@ -18,6 +18,18 @@ INLINE dual dual_chain2(real v, real fa, dual a, real fb, dual b) {
     return r;
 }
 
+// The chain rule for functions of three and four numbers: a row of a map's Jacobian times the J carried along.
+INLINE dual dual_chain3(real v, real fa, dual a, real fb, dual b, real fc, dual c) {
+    const dual r = {v, fa * a.dx + fb * b.dx + fc * c.dx, fa * a.dy + fb * b.dy + fc * c.dy,
+                    fa * a.dz + fb * b.dz + fc * c.dz};
+    return r;
+}
+INLINE dual dual_chain4(real v, real fa, dual a, real fb, dual b, real fc, dual c, real fd, dual d) {
+    const dual r = {v, fa * a.dx + fb * b.dx + fc * c.dx + fd * d.dx, fa * a.dy + fb * b.dy + fc * c.dy + fd * d.dy,
+                    fa * a.dz + fb * b.dz + fc * c.dz + fd * d.dz};
+    return r;
+}
+
 INLINE dual dual_constant(real v) {
     const dual r = {v, R(0.0), R(0.0), R(0.0)};
     return r;
@@ -135,13 +147,8 @@ INLINE dual dual_tan(dual a) {
     return dual_chain(value, R(1.0) + value * value, a);
 }
 
-// Slope 0 at and beyond the ends of [-1, 1], where the true one is infinite or does not exist.
-INLINE real arc_slope(real a) {
-    const real square = (R(1.0) - a) * (R(1.0) + a);
-    return pick(less(R(0.0), square), R(1.0) / sqrt(square), R(0.0));
-}
-INLINE dual dual_asin(dual a) { return dual_chain(real_asin(a.v), arc_slope(a.v), a); }
-INLINE dual dual_acos(dual a) { return dual_chain(real_acos(a.v), -arc_slope(a.v), a); }
+INLINE dual dual_asin(dual a) { return dual_chain(real_asin(a.v), real_arc_slope(a.v), a); }
+INLINE dual dual_acos(dual a) { return dual_chain(real_acos(a.v), -real_arc_slope(a.v), a); }
 INLINE dual dual_atan(dual a) { return dual_chain(atan(a.v), R(1.0) / (R(1.0) + a.v * a.v), a); }
 
 // 0 with slope 0 at the origin.
@@ -151,13 +158,9 @@ INLINE dual dual_atan2(dual y, dual x) {
     return dual_chain2(real_atan2(y.v, x.v), x.v * inverse, y, -y.v * inverse, x);
 }
 
-// d(x^y) = y x^(y-1) dx + x^y log x dy; both slopes count as 0 where they are not finite.
-INLINE real finite_or_zero(real a) { return pick(less_equal(fabs(a), (real)(REAL_LARGEST)), a, R(0.0)); }
-INLINE dual dual_pow_real(dual x, real y) {
-    return dual_chain(real_pow(x.v, y), finite_or_zero(y * real_pow(x.v, y - R(1.0))), x);
-}
+// d(x^y) = y x^(y-1) dx + x^y log x dy.
+INLINE dual dual_pow_real(dual x, real y) { return dual_chain(real_pow(x.v, y), real_power_slope(x.v, y), x); }
 INLINE dual dual_pow(dual x, dual y) {
     const real value = real_pow(x.v, y.v);
-    const real by_base = finite_or_zero(y.v * real_pow(x.v, y.v - R(1.0)));
-    return dual_chain2(value, by_base, x, finite_or_zero(value * real_log(x.v)), y);
+    return dual_chain2(value, real_power_slope(x.v, y.v), x, real_power_log(value, x.v), y);
 }

@@ -43,3 +43,16 @@ INLINE real real_pow(real x, real y) {
     const real power = pow(x, y);
     return pick(is_nan(power), R(0.0), power);
 }
+
+// Slopes that a finite value stands for where the true one is infinite or does not exist.
+INLINE real real_finite_or_zero(real a) { return pick(less_equal(fabs(a), (real)(REAL_LARGEST)), a, R(0.0)); }
+
+// d asin(a)/da, 0 at and beyond the ends of [-1, 1].
+INLINE real real_arc_slope(real a) {
+    const real square = (R(1.0) - a) * (R(1.0) + a);
+    return pick(less(R(0.0), square), R(1.0) / sqrt(square), R(0.0));
+}
+
+// d(x^y)/dx = y x^(y-1), and d(x^y)/dy = x^y log x given x^y; 0 where they are not finite.
+INLINE real real_power_slope(real x, real y) { return real_finite_or_zero(y * real_pow(x, y - R(1.0))); }
+INLINE real real_power_log(real power, real x) { return real_finite_or_zero(power * real_log(x)); }

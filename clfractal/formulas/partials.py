@@ -1,0 +1,137 @@
+"""Differentiates what an `Emitter` wrote over `real`: the partials of an expression by the components of the state.
+
+A formula's map depends on each component in few places, so its own 3 x 3 (or 4 x 4) Jacobian is sparse and shares much with
+the map; multiplying it by the J carried along often costs less than carrying three partials through every operation.
+Forward rules as in Griewank & Walther, Evaluating Derivatives, 2nd ed. (SIAM 2008), ch. 3; conventions at kinks and poles
+as in `kernels/numbers/dual.h`.
+"""
+
+from __future__ import annotations
+
+from clfractal.formulas.emit import Emitter, Value, literal
+
+# A partial that is zero everywhere is None: it costs nothing.
+Partial = Value | None
+
+_ONE, _TWO, _HALF = literal(1.0), literal(2.0), literal(0.5)
+
+
+class Differentiator:
+    """Partials of values of one emitter by its state variables `z.s0.v`, `z.s1.v`, ..."""
+
+    def __init__(self, emitter: Emitter) -> None:
+        self.emitter = emitter
+        self._known: dict[tuple[str, int], Partial] = {}
+
+    def partial(self, value: Value, by: int) -> Partial:
+        """The partial of a value by component `by`; appends the statements that compute it."""
+        if value.kind != "varying":
+            return None
+        if value.text.startswith("z.s"):
+            return _ONE if value.text == f"z.s{by}.v" else None
+        key = (value.text, by)
+        if key not in self._known:
+            function, operands = self.emitter.origins[value.text]
+            self._known[key] = self._rule(function, operands, value, by)
+        return self._known[key]
+
+    def _rule(self, function: str, operands: tuple[Value, ...], value: Value, by: int) -> Partial:
+        if function == "where":
+            mask, yes, no = operands
+            return self._choose(mask.text, self.partial(yes, by), self.partial(no, by))
+        partials = [self.partial(operand, by) for operand in operands]
+        if all(partial is None for partial in partials):
+            return None
+        if len(operands) == 1:
+            return self._times(self._slope(function, operands[0], value), partials[0])
+        if function == "clamp":
+            return self._clamp(operands, partials)
+        return self._binary(function, operands[0], operands[1], partials[0], partials[1], value)
+
+    # --- functions of one number ---
+
+    def _slope(self, function: str, a: Value, value: Value) -> Value:
+        """The derivative of a function of one number at `a`, where its value is `value`."""
+        do = self.emitter.combine
+        if function == "neg":
+            return literal(-1.0)
+        if function == "abs":
+            return do("sign", a)
+        if function == "sqrt":
+            half = do("mul", do("div", _ONE, value), _HALF)
+            return self.emitter.choose(f"less(R(0.0), {value.text})", half, literal(0.0))
+        if function == "exp":
+            return value
+        if function == "log":
+            return self.emitter.choose(f"less((real)(REAL_SMALLEST), {a.text})", do("div", _ONE, a), literal(0.0))
+        if function == "sin":
+            return do("cos", a)
+        if function == "cos":
+            return do("neg", do("sin", a))
+        if function == "tan":
+            return do("add", do("mul", value, value), _ONE)
+        if function == "atan":
+            return do("div", _ONE, do("add", do("mul", a, a), _ONE))
+        if function in ("asin", "acos"):
+            slope = do("arc_slope", a)
+            return slope if function == "asin" else do("neg", slope)
+        assert function in ("sign", "floor"), function
+        return literal(0.0)
+
+    # --- functions of two ---
+
+    def _binary(self, function: str, a: Value, b: Value, da: Partial, db: Partial, value: Value) -> Partial:
+        do = self.emitter.combine
+        if function == "add":
+            return self._sum(da, db)
+        if function == "sub":
+            return self._sum(da, self._times(literal(-1.0), db))
+        if function == "mul":
+            if a.text == b.text:
+                return self._times(do("mul", a, _TWO), da)
+            return self._sum(self._times(b, da), self._times(a, db))
+        if function == "div":
+            inverse = do("div", _ONE, b)
+            by_b = self._times(do("neg", do("mul", value, inverse)), db) if db is not None else None
+            return self._sum(self._times(inverse, da), by_b)
+        if function in ("min", "max"):
+            first, second = (a, b) if function == "min" else (b, a)
+            return self._choose(f"less_equal({first.text}, {second.text})", da, db)
+        if function == "mod":
+            turns = do("floor", do("div", a, b))
+            return self._sum(da, self._times(do("neg", turns), db))
+        if function == "atan2":
+            square = do("add", do("mul", a, a), do("mul", b, b))
+            inverse = self.emitter.choose(f"less(R(0.0), {square.text})", do("div", _ONE, square), literal(0.0))
+            by_a = self._times(do("mul", b, inverse), da)
+            by_b = self._times(do("neg", do("mul", a, inverse)), db) if db is not None else None
+            return self._sum(by_a, by_b)
+        assert function == "pow", function
+        by_base = self._times(do("power_slope", a, b), da) if da is not None else None
+        by_exponent = self._times(do("power_log", value, a), db) if db is not None else None
+        return self._sum(by_base, by_exponent)
+
+    def _clamp(self, operands: tuple[Value, ...], partials: list[Partial]) -> Partial:
+        """clamp(x, low, high): the partial of whichever of the three it is."""
+        x, low, high = operands
+        below = self._choose(f"less_equal({low.text}, {x.text})", partials[0], partials[1])
+        return self._choose(f"less_equal({x.text}, {high.text})", below, partials[2])
+
+    # --- sparse arithmetic ---
+
+    def _times(self, factor: Value, partial: Partial) -> Partial:
+        if partial is None or factor.number == 0:
+            return None
+        if factor.number == -1:
+            return self.emitter.combine("neg", partial)
+        return self.emitter.combine("mul", factor, partial)
+
+    def _sum(self, a: Partial, b: Partial) -> Partial:
+        if a is None or b is None:
+            return a if b is None else b
+        return self.emitter.combine("add", a, b)
+
+    def _choose(self, mask: str, yes: Partial, no: Partial) -> Partial:
+        if yes is None and no is None:
+            return None
+        return self.emitter.choose(mask, yes or literal(0.0), no or literal(0.0))

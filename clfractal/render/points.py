@@ -1,0 +1,128 @@
+"""Formulas at lists of points, on a device: escape counts, distances and normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device import program
+from clfractal.device.select import Device
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+from clfractal.formulas.language import Chain
+from clfractal.formulas.opencl import write_formula
+from clfractal.render import layout
+
+Floats = npt.NDArray[np.float64]
+
+# Points of one launch: bounds the device memory, and how long a launch may run.
+LAUNCH_POINTS = 1 << 18
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Distances:
+    """What is known of points, arrays of shape (n,), normals of shape (n, 3).
+
+    Attributes:
+        step: the distance that rays march by, scene units; 0 inside.
+        full: the distance by the full Jacobian (the same for formulas without a scalar rule).
+        normal: unit gradient of the distance; zero where there is none.
+        smooth: smooth escape count.
+        inside: never escaped.
+    """
+
+    step: Floats
+    full: Floats
+    normal: Floats
+    smooth: Floats
+    inside: npt.NDArray[np.bool_]
+
+
+def escape(
+    chain: Chain,
+    points: npt.ArrayLike,
+    iterations: int,
+    *,
+    device: Device,
+    lanes: int,
+    precision: Precision = "float32",
+    bailout: float | None = None,
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+    """Escape counts of points, shape (n, 3) in scene units: (iterations, inside), both of shape (n,).
+
+    `iterations` counts applications until |z| exceeds the bailout; a point that never gets there has the limit and is
+    inside.
+
+    Raises:
+        ValueError: points of another shape, or not finite.
+        DeviceError, KernelBuildError: the device failed.
+    """
+    result = _run(chain, points, iterations, "escape_counts", 2, device, lanes, precision, bailout)
+    return result[0].astype(np.int64), result[1] > 0
+
+
+def distances(
+    chain: Chain,
+    points: npt.ArrayLike,
+    iterations: int,
+    *,
+    device: Device,
+    lanes: int,
+    precision: Precision = "float32",
+) -> Distances:
+    """Distances to the solid at points of shape (n, 3), with normals; see `escape` for the errors."""
+    result = _run(chain, points, iterations, "distances", 7, device, lanes, precision, None)
+    return Distances(result[0], result[1], result[2:5].T, result[5], result[6] > 0)
+
+
+def _run(
+    chain: Chain,
+    points: npt.ArrayLike,
+    iterations: int,
+    kernel_name: str,
+    planes: int,
+    device: Device,
+    lanes: int,
+    precision: Precision,
+    bailout: float | None,
+) -> Floats:
+    """Runs one of the kernels of `points.cl`; gives its planes, shape (planes, n)."""
+    array = np.asarray(points, np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"points must have shape (n, 3), got {array.shape}")
+    if not np.isfinite(array).all():
+        raise ValueError("points must be finite")
+    formula = write_formula(chain)
+    generated = {"formula.h": formula.text, "structs.h": layout.struct_text()}
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
+    text = flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
+    built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
+    kernel = built.kernel(kernel_name)
+    orbit = layout.orbit_record(chain, iterations, precision, bailout).reshape(1)
+    constants = np.array(formula.constants, precision)
+    result = np.empty((planes, len(array)))
+    with device.failures("evaluating points"):
+        fixed = [_upload(device, orbit), _upload(device, constants)]
+        for start in range(0, len(array), LAUNCH_POINTS):
+            part = array[start : start + LAUNCH_POINTS]
+            count = -(-len(part) // lanes) * lanes
+            padded = np.zeros((3, count), precision)
+            padded[:, : len(part)] = part.T
+            out = np.empty((planes, count), precision)
+            buffer = device.buffer(out.nbytes, "results")
+            # A kernel keeps no reference to its arguments: `arguments` must outlive the launch.
+            arguments = [_upload(device, padded), buffer, np.int32(count), *fixed]
+            kernel.set_args(*arguments)
+            cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), None)
+            cl.enqueue_copy(device.queue, out, buffer)
+            result[:, start : start + len(part)] = out[:, : len(part)]
+    return result
+
+
+def _upload(device: Device, array: npt.NDArray[np.generic]) -> cl.Buffer:
+    buffer = device.buffer(array.nbytes, "points", read_only=True)
+    cl.enqueue_copy(device.queue, buffer, np.ascontiguousarray(array).view(np.uint8).reshape(-1))
+    return buffer
