@@ -42,7 +42,7 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
         defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
     )
     program = build(device, flat.text, flags=math_flags(precision), sources=flat.sources, isolated=False)
-    fault = _built_ins_fault(program, precision, lanes)
+    fault = _built_ins_fault(program, precision, lanes) or _mixed_lanes_fault(program, precision, lanes)
     width, rows = (_WIDTH_SIMULATED, _ROWS_SIMULATED) if is_simulator(device.info) else (_WIDTH, _ROWS)
     counts, milliseconds = _escape_counts(program, precision, lanes, width, rows)
     differing = np.mean(counts[::_CHECKED, ::_CHECKED] != _expected_counts(width, rows))
@@ -67,6 +67,32 @@ def _built_ins_fault(program: Program, precision: Precision, lanes: int) -> str:
     expected = _expected_sums(t.astype(np.float64))
     error = float(np.max(np.abs(result - expected) / expected))
     return "" if error <= _TOLERANCE[precision] else f"built-in functions are wrong by {error:.1e}"
+
+
+def _mixed_lanes_fault(program: Program, precision: Precision, lanes: int) -> str:
+    """Arguments that are small, usual, huge, zero or infinite, in any neighbourhood."""
+    random = np.random.default_rng(1)
+    t = np.exp(random.normal(scale=4.0, size=1024)) * random.choice([-1.0, 1.0], 1024)
+    t[random.random(1024) < 0.2] *= 1e8
+    t[random.random(1024) < 0.1] = 0.0
+    t[random.random(1024) < 0.1] = np.inf
+    t = t.astype(precision)
+    values = np.empty((4, len(t)), precision)
+    arguments, results = _buffer(program.device, t), _buffer(program.device, values)
+    kernel = program.kernel("mixed_lanes")
+    kernel.set_args(results, arguments, np.int32(len(t)))
+    with program.device.failures("trying packets of mixed lanes"):
+        cl.enqueue_nd_range_kernel(program.device.queue, kernel, (len(t) // lanes,), (1,))
+        cl.enqueue_copy(program.device.queue, values, results)
+    with np.errstate(all="ignore"):
+        exact = t.astype(np.float64)
+        expected = np.stack([np.sin(exact), np.cos(exact), np.abs(exact) ** 1.7, np.log(np.abs(exact))])
+        error = np.abs(values - expected) / np.maximum(np.abs(expected), 1.0)
+    right = (values == expected) | (error <= 4 * _TOLERANCE[precision]) | np.isnan(expected)
+    if right.all():
+        return ""
+    function = ("sin", "cos", "pow", "log")[int(np.argmin(right.all(axis=1)))]
+    return f"{function} is wrong in packets of unlike lanes"
 
 
 def _escape_counts(

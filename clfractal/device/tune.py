@@ -21,7 +21,7 @@ LANE_COUNTS = (1, 4, 8, 16)
 DEFAULT_PROBE = "clfractal.device.probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
-_VERSION = 1  # of the probes: older measurements no longer count
+_VERSION = 2  # of the probes: older measurements no longer count
 _SECTION = "lanes"
 
 
