@@ -1,5 +1,7 @@
 // The number type `real`: a plain number per lane. Every operation is total: where mathematics has no value a finite one is
 // chosen (the choices are listed with each operation), so that a point never turns into NaN by itself.
+#include "repairs.h"
+
 INLINE real real_add(real a, real b) { return a + b; }
 INLINE real real_sub(real a, real b) { return a - b; }
 INLINE real real_mul(real a, real b) { return a * b; }
