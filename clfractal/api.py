@@ -67,8 +67,6 @@ def render(
     start = time.perf_counter()
     engine.render(loaded, job.plan, job.device, film, progress)
     film.header["seconds"] = time.perf_counter() - start
-    film.header["exposure"] = loaded.output.exposure
-    film.header["transparent"] = loaded.background == "transparent"
     return film
 
 

@@ -16,9 +16,9 @@ from clfractal.device import tune
 from clfractal.device.select import Device, has_float64
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.document import write_document
-from clfractal.render.film import TiledStore
+from clfractal.render.outputs import save_outputs
 from clfractal.render.plan import Plan, PrecisionChoice, choose_precision, make_plan
-from clfractal.render.store import save_outputs
+from clfractal.render.tiled import TiledStore
 from clfractal.render.view import camera_view
 from clfractal.scene.model import Scene
 
@@ -52,6 +52,8 @@ class Job:
             "device": self.device.info.name,
             "platform": f"{self.device.info.platform}, {self.device.info.version}",
             "precision": self.plan.precision,
+            "exposure": scene.output.exposure,
+            "transparent": scene.background == "transparent",
             "worldToCamera": view.world_to_camera(),
             "worldToNDC": view.world_to_ndc(),
         }
@@ -81,8 +83,6 @@ class Job:
             paths,
             half=output.half_channels,
             bits=output.png_bits,
-            transparent=self.scene.background == "transparent",
-            exposure=output.exposure,
         )
 
 

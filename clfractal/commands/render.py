@@ -137,7 +137,7 @@ def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
     outputs = order.outputs or (Path(source.with_suffix(".png").name),)
     if not order.outputs and os.path.realpath(outputs[0]) == os.path.realpath(source):
         raise FileError("would be replaced by its own picture; name an output with -o", Where(order.scene))
-    from clfractal.render.store import check_output as check_picture
+    from clfractal.render.outputs import check_output as check_picture
 
     for path in outputs:
         check_picture(path, scene.output.channels)

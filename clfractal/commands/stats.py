@@ -17,9 +17,9 @@ from clfractal.render.engine import Progress
 def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) -> dict[str, Any]:
     """Times and counts as plain data.
 
-    `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the command's start to
-    its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray` counts
-    shadow rays' steps too.
+    `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the command's start
+    to its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray`
+    counts shadow rays' steps too.
     """
     info, plan = job.device.info, job.plan
     return {

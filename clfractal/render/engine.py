@@ -12,9 +12,9 @@ import pyopencl as cl
 
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError
-from clfractal.render.film import TiledStore
 from clfractal.render.plan import Plan
 from clfractal.render.surface import Batch, SurfaceWorker
+from clfractal.render.tiled import TiledStore
 from clfractal.render.tiles import TILE, Tile
 from clfractal.scene.model import Scene
 

@@ -4,69 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
-from clfractal.render.tiles import TILE, Region, Tile, TileGrid
-
-Floats = npt.NDArray[np.float32]
-Bands = Iterator[tuple[int, dict[str, Floats]]]
-
-
-class TiledStore(Protocol):
-    """Where the engine puts finished tiles and from where files are written."""
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the channels, in the order of a tile's first axis."""
-
-    @property
-    def display(self) -> tuple[int, int]:
-        """Width and height of the whole picture, in pixels."""
-
-    @property
-    def region(self) -> Region:
-        """The part of the picture that the store holds."""
-
-    @property
-    def grid(self) -> TileGrid:
-        """The tiles of the region."""
-
-    @property
-    def header(self) -> dict[str, Any]:
-        """What files tell about the picture; see `Film`."""
-
-    @property
-    def done(self) -> npt.NDArray[np.bool_]:
-        """For each tile whether it is there; not to be written to."""
-
-    def put(self, tile_index: int, array: Floats) -> None:
-        """Stores a tile: float32 of shape (channels, rows, columns), cut to the region as `grid.tile` is."""
-
-    def bands(self) -> Bands:
-        """The picture from top to bottom, one row of tiles at a time.
-
-        Gives (first_row, channel name -> float32 of shape (rows, region width)); first_row in picture
-        coordinates. Pixels of missing tiles have the channel's fill value.
-        """
-
-
-def check_tile(array: Floats, tile: Tile, channels: Sequence[str]) -> None:
-    """Raises ValueError if an array does not fit its tile: a mistake of the program, not of the user."""
-    expected = (len(channels), tile.height, tile.width)
-    if array.shape != expected:
-        raise ValueError(f"tile {tile.index} needs shape {expected}, got {array.shape}")
+from clfractal.render.tiled import Bands, Floats, check_tile
+from clfractal.render.tiles import TILE, Region, TileGrid
 
 
 class Film:
     """A picture in memory: `film["R"]` is a float32 array of shape (height, width) of the region.
 
     R, G, B are linear Rec. 709; if the background is transparent they are premultiplied by A.
-    `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, and `worldToCamera` and
+    `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, `exposure` (stops) and
+    `transparent` (what PNG files and notebooks show), and `worldToCamera` and
     `worldToNDC`, 4 x 4 matrices for row vectors (point_camera = [x, y, z, 1] @ matrix: the translation is the
     last row), as OpenEXR's standard attributes want them.
 
@@ -149,12 +103,12 @@ class Film:
             row = end
 
     def save(self, path: str | Path, **settings: Any) -> None:
-        """Writes an `.exr` or `.png` file; settings as in `store.save_outputs`.
+        """Writes an `.exr` or `.png` file; settings as in `outputs.save_outputs`.
 
         Raises:
             FileError: it cannot be written.
         """
-        from clfractal.render.store import save_outputs
+        from clfractal.render.outputs import save_outputs
 
         save_outputs(self, [path], **settings)
 
@@ -175,6 +129,6 @@ class Film:
         """What a notebook shows; None (the text form instead) if there are no colours."""
         if not {"R", "G", "B"} <= set(self.channels):
             return None
-        from clfractal.render.store import png_bytes
+        from clfractal.render.outputs import png_bytes
 
         return png_bytes(self)

@@ -1,25 +1,19 @@
-"""Films that lie on disk while they are rendered, and the files that any film is written to."""
+"""Films that lie on disk while they are rendered."""
 
 from __future__ import annotations
 
-import io
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FileError, Where
-from clfractal.files import atomic
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
-from clfractal.files.png import Bits, stream_png, write_png
-from clfractal.render.film import Bands, Film, Floats, TiledStore, check_tile
+from clfractal.render.film import Film
+from clfractal.render.tiled import Bands, Floats, check_tile
 from clfractal.render.tiles import Region, TileGrid
-
-# Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
-_FILE_KEYS = {"scene": "clfractal", "worldToCamera": "worldToCamera", "worldToNDC": "worldToNDC"}
 
 
 class JournalFilm:
@@ -114,134 +108,3 @@ class JournalFilm:
     def __repr__(self) -> str:
         size = f"{self.display[0]}x{self.display[1]}"
         return f"<JournalFilm {self.journal.path} {size}, {self.done.mean():.0%} done>"
-
-
-def check_output(path: str | Path, channels: Collection[str] | None = None) -> None:
-    """Makes sure, before anything is rendered, that a picture can be written to `path`.
-
-    Raises:
-        FileError: unknown extension, no such folder, not writable, a folder or device; or a PNG without
-            the colour channels that it needs.
-    """
-    atomic.check_output(path)
-    if channels is not None and Path(path).suffix.lower() == ".png":
-        missing = [name for name in "RGB" if name not in channels]
-        if missing:
-            listed = ", ".join(missing)
-            raise FileError(
-                f"a PNG needs the channels R, G, B; without {listed} write an EXR", Where(str(path))
-            )
-
-
-def save_outputs(
-    store: TiledStore,
-    paths: Iterable[str | Path],
-    *,
-    header: Mapping[str, Any] | None = None,
-    half: Collection[str] | None = None,
-    bits: Bits = 8,
-    transparent: bool = False,
-    exposure: float = 0.0,
-) -> None:
-    """Writes a film to files, the format of each told by its extension; each appears whole or not at all.
-
-    All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`.
-
-    Args:
-        header: added to `store.header`.
-        half: the channels that an EXR stores as half; by default as `CHANNELS` says.
-        bits: 8 or 16, of a PNG.
-        transparent: whether a PNG has an alpha channel (the film's colours are premultiplied); needs A.
-        exposure: stops (powers of two) by which a PNG is lighter than the film; an EXR keeps scene values.
-
-    Raises:
-        FileError: a file cannot be written; earlier ones of `paths` may be there by then.
-    """
-    chosen = [Path(path) for path in paths]
-    for path in chosen:
-        check_output(path, store.channels)
-    whole = {**store.header, **(header or {})}
-    region = store.region
-    for path in chosen:
-        if path.suffix.lower() == ".png":
-            alpha = transparent and "A" in store.channels
-            write_png(
-                path,
-                _colors(store, alpha=alpha, exposure=exposure),
-                width=region.width,
-                height=region.height,
-                bits=bits,
-                alpha=alpha,
-                texts=_texts(whole),
-                origin=(region.x, region.y),
-            )
-        else:
-            # The library needs some 10 ms to load: only for those who write its files.
-            from clfractal.files.exr import write_exr
-
-            if half is None:
-                half = {name for name in store.channels if CHANNELS[name].precision == "half"}
-            write_exr(
-                path,
-                (band for _, band in store.bands()),
-                display=store.display,
-                region=(region.x, region.y, region.width, region.height),
-                channels=store.channels,
-                half=half,
-                header=_attributes(whole),
-            )
-
-
-def png_bytes(film: Film) -> bytes:
-    """An 8-bit PNG of a film in memory, for notebooks; transparent where the film is."""
-    stream = io.BytesIO()
-    region = film.region
-    alpha = "A" in film.channels and bool(film.header.get("transparent", False))
-    stream_png(
-        stream,
-        _colors(film, alpha=alpha, exposure=float(film.header.get("exposure", 0.0))),
-        width=region.width,
-        height=region.height,
-        alpha=alpha,
-        texts=_texts(film.header),
-        origin=(region.x, region.y),
-    )
-    return stream.getvalue()
-
-
-def _colors(store: TiledStore, *, alpha: bool, exposure: float) -> Iterator[Floats]:
-    """The bands as arrays (rows, width, 3 or 4), colours made lighter by `exposure` stops."""
-    gain = np.float32(2.0**exposure)
-    for _, band in store.bands():
-        rows, width = band["R"].shape
-        pixels = np.empty((rows, width, 4 if alpha else 3), dtype=np.float32)
-        for component, name in enumerate("RGB"):
-            with np.errstate(over="ignore"):  # infinitely light is limited to 1 later
-                np.multiply(band[name], gain, out=pixels[..., component])
-        if alpha:
-            pixels[..., 3] = band["A"]
-        yield pixels
-
-
-def _file_key(key: str) -> str:
-    return _FILE_KEYS.get(key) or f"clfractal{key[:1].upper()}{key[1:]}"
-
-
-def _software(header: Mapping[str, Any]) -> str:
-    return f"clfractal {header['version']}" if "version" in header else "clfractal"
-
-
-def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
-    """The film's header as attributes of an EXR file."""
-    return {"software": _software(header)} | {
-        _file_key(key): value for key, value in header.items() if value is not None
-    }
-
-
-def _texts(header: Mapping[str, Any]) -> dict[str, str]:
-    """The film's header as text chunks of a PNG file; it has no place for matrices."""
-    return {"Software": _software(header)} | {
-        _file_key(key): str(value)
-        for key, value in header.items()
-        if isinstance(value, str | bool | int | float | np.number)
-    }

@@ -17,8 +17,10 @@ from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
 from clfractal.files.png import read_texts
 from clfractal.files.srgb import encode8
-from clfractal.render.film import Film, TiledStore
-from clfractal.render.store import JournalFilm, check_output, save_outputs
+from clfractal.render.film import Film
+from clfractal.render.outputs import check_output, save_outputs
+from clfractal.render.store import JournalFilm
+from clfractal.render.tiled import TiledStore
 from clfractal.render.tiles import Region
 from tests.files.limits import file_size_limit
 
@@ -191,7 +193,8 @@ MEMORY = """
 import resource, sys
 import numpy as np
 from clfractal.render.film import Film
-from clfractal.render.store import JournalFilm, save_outputs
+from clfractal.render.outputs import save_outputs
+from clfractal.render.store import JournalFilm
 
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

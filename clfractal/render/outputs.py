@@ -1,0 +1,160 @@
+"""The files that a film is written to, whatever kind of film it is."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clfractal.errors import FileError, Where
+from clfractal.files import atomic
+from clfractal.files.channels import CHANNELS
+from clfractal.files.png import Bits, stream_png, write_png
+from clfractal.render.tiled import Floats, TiledStore
+
+# Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
+_FILE_KEYS = {"scene": "clfractal", "worldToCamera": "worldToCamera", "worldToNDC": "worldToNDC"}
+
+
+def check_output(path: str | Path, channels: Collection[str] | None = None) -> None:
+    """Makes sure, before anything is rendered, that a picture can be written to `path`.
+
+    Raises:
+        FileError: unknown extension, no such folder, not writable, a folder or device; or a PNG without
+            the colour channels that it needs.
+    """
+    atomic.check_output(path)
+    if channels is not None and Path(path).suffix.lower() == ".png":
+        missing = [name for name in "RGB" if name not in channels]
+        if missing:
+            listed = ", ".join(missing)
+            raise FileError(
+                f"a PNG needs the channels R, G, B; without {listed} write an EXR", Where(str(path))
+            )
+
+
+def save_outputs(
+    store: TiledStore,
+    paths: Iterable[str | Path],
+    *,
+    header: Mapping[str, Any] | None = None,
+    half: Collection[str] | None = None,
+    bits: Bits = 8,
+    transparent: bool | None = None,
+    exposure: float | None = None,
+) -> None:
+    """Writes a film to files, the format of each told by its extension; each appears whole or not at all.
+
+    All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`.
+
+    Args:
+        header: added to `store.header`.
+        half: the channels that an EXR stores as half; by default as `CHANNELS` says.
+        bits: 8 or 16, of a PNG.
+        transparent: whether a PNG has an alpha channel (the film's colours are premultiplied); needs A.
+        exposure: stops (powers of two) by which a PNG is lighter than the film; an EXR keeps scene values.
+            Both are what the header says if they are None.
+
+    Raises:
+        FileError: a file cannot be written; earlier ones of `paths` may be there by then.
+    """
+    chosen = [Path(path) for path in paths]
+    for path in chosen:
+        check_output(path, store.channels)
+    whole = {**store.header, **(header or {})}
+    region = store.region
+    for path in chosen:
+        if path.suffix.lower() == ".png":
+            alpha = _transparent(store, transparent)
+            write_png(
+                path,
+                _colors(store, alpha=alpha, exposure=_exposure(store, exposure)),
+                width=region.width,
+                height=region.height,
+                bits=bits,
+                alpha=alpha,
+                texts=_texts(whole),
+                origin=(region.x, region.y),
+            )
+        else:
+            # The library needs some 10 ms to load: only for those who write its files.
+            from clfractal.files.exr import write_exr
+
+            if half is None:
+                half = {name for name in store.channels if CHANNELS[name].precision == "half"}
+            write_exr(
+                path,
+                (band for _, band in store.bands()),
+                display=store.display,
+                region=(region.x, region.y, region.width, region.height),
+                channels=store.channels,
+                half=half,
+                header=_attributes(whole),
+            )
+
+
+def png_bytes(store: TiledStore) -> bytes:
+    """An 8-bit PNG of a film, for notebooks; transparent where the film is."""
+    stream = io.BytesIO()
+    region = store.region
+    alpha = _transparent(store, None)
+    stream_png(
+        stream,
+        _colors(store, alpha=alpha, exposure=_exposure(store, None)),
+        width=region.width,
+        height=region.height,
+        alpha=alpha,
+        texts=_texts(store.header),
+        origin=(region.x, region.y),
+    )
+    return stream.getvalue()
+
+
+def _transparent(store: TiledStore, wanted: bool | None) -> bool:
+    chosen = bool(store.header.get("transparent", False)) if wanted is None else wanted
+    return chosen and "A" in store.channels
+
+
+def _exposure(store: TiledStore, wanted: float | None) -> float:
+    return float(store.header.get("exposure", 0.0)) if wanted is None else wanted
+
+
+def _colors(store: TiledStore, *, alpha: bool, exposure: float) -> Iterator[Floats]:
+    """The bands as arrays (rows, width, 3 or 4), colours made lighter by `exposure` stops."""
+    gain = np.float32(2.0**exposure)
+    for _, band in store.bands():
+        rows, width = band["R"].shape
+        pixels = np.empty((rows, width, 4 if alpha else 3), dtype=np.float32)
+        for component, name in enumerate("RGB"):
+            with np.errstate(over="ignore"):  # infinitely light is limited to 1 later
+                np.multiply(band[name], gain, out=pixels[..., component])
+        if alpha:
+            pixels[..., 3] = band["A"]
+        yield pixels
+
+
+def _file_key(key: str) -> str:
+    return _FILE_KEYS.get(key) or f"clfractal{key[:1].upper()}{key[1:]}"
+
+
+def _software(header: Mapping[str, Any]) -> str:
+    return f"clfractal {header['version']}" if "version" in header else "clfractal"
+
+
+def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
+    """The film's header as attributes of an EXR file."""
+    return {"software": _software(header)} | {
+        _file_key(key): value for key, value in header.items() if value is not None
+    }
+
+
+def _texts(header: Mapping[str, Any]) -> dict[str, str]:
+    """The film's header as text chunks of a PNG file; it has no place for matrices."""
+    return {"Software": _software(header)} | {
+        _file_key(key): str(value)
+        for key, value in header.items()
+        if isinstance(value, str | bool | int | float | np.number)
+    }

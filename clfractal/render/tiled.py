@@ -1,0 +1,59 @@
+"""What holds the tiles of a picture: the engine writes to one, files are made from one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.render.tiles import Region, Tile, TileGrid
+
+Floats = npt.NDArray[np.float32]
+Bands = Iterator[tuple[int, dict[str, Floats]]]
+
+
+class TiledStore(Protocol):
+    """Where the engine puts finished tiles and from where files are written."""
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels, in the order of a tile's first axis."""
+
+    @property
+    def display(self) -> tuple[int, int]:
+        """Width and height of the whole picture, in pixels."""
+
+    @property
+    def region(self) -> Region:
+        """The part of the picture that the store holds."""
+
+    @property
+    def grid(self) -> TileGrid:
+        """The tiles of the region."""
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What files tell about the picture; see `Film`."""
+
+    @property
+    def done(self) -> npt.NDArray[np.bool_]:
+        """For each tile whether it is there; not to be written to."""
+
+    def put(self, tile_index: int, array: Floats) -> None:
+        """Stores a tile: float32 of shape (channels, rows, columns), cut to the region as `grid.tile` is."""
+
+    def bands(self) -> Bands:
+        """The picture from top to bottom, one row of tiles at a time.
+
+        Gives (first_row, channel name -> float32 of shape (rows, region width)); first_row in picture
+        coordinates. Pixels of missing tiles have the channel's fill value.
+        """
+
+
+def check_tile(array: Floats, tile: Tile, channels: Sequence[str]) -> None:
+    """Raises ValueError if an array does not fit its tile: a mistake of the program, not of the user."""
+    expected = (len(channels), tile.height, tile.width)
+    if array.shape != expected:
+        raise ValueError(f"tile {tile.index} needs shape {expected}, got {array.shape}")
