@@ -16,6 +16,8 @@ from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.errors import DeviceError, KernelBuildError
 
+pytestmark = pytest.mark.conformance
+
 _TRIPLE = "__kernel void triple(__global float *a, float by) { a[get_global_id(0)] *= by; }\n"
 _FLAGS = math_flags("float32")
 _WARM = Warm("triple", (8,), (1,), (Argument("buffer", 32), Argument("scalar", dtype="float32", value=2.0)))

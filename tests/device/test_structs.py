@@ -16,6 +16,8 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.errors import DeviceError
 
+pytestmark = pytest.mark.conformance
+
 _MIXED = Struct(
     "Mixed",
     [

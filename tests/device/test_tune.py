@@ -13,6 +13,8 @@ from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, has_float64
 from clfractal.errors import DeviceError
 
+pytestmark = pytest.mark.conformance
+
 _HERE = "tests.device.test_tune"
 
 

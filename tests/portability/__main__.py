@@ -1,0 +1,155 @@
+"""`python -m tests.portability [NAME ...]`: the same tests and pictures on every OpenCL implementation.
+
+Each implementation runs alone, in processes of its own: first the tests marked `conformance`, then the
+pictures of `pictures.py`; Oclgrind renders tiny ones and checks every access to memory. All pictures are then
+compared with those of the first implementation. Pictures that differ are left in `build/portability`.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from tests.portability.compare import difference
+from tests.portability.implementations import IMPLEMENTATIONS, WORKPLACE, Implementation, MissingError
+
+_TIMEOUT_S = 1800
+
+
+def main() -> int:
+    """The exit status: 0 if every implementation is there and passes."""
+    wanted = sys.argv[1:]
+    unknown = set(wanted) - {each.name for each in IMPLEMENTATIONS}
+    if unknown:
+        known = ", ".join(each.name for each in IMPLEMENTATIONS)
+        print(f"unknown implementation {', '.join(sorted(unknown))}; known: {known}", file=sys.stderr)
+        return 2
+    chosen = [each for each in IMPLEMENTATIONS if not wanted or each.name in wanted]
+    WORKPLACE.mkdir(parents=True, exist_ok=True)
+    faults: dict[str, list[str]] = {}
+    for implementation in chosen:
+        start = time.monotonic()
+        faults[implementation.name] = list(_examine(implementation))
+        print(f"{implementation.name}: {time.monotonic() - start:.0f} s", flush=True)
+    for name, fault in _compare(chosen):
+        faults[name].append(fault)
+    print("\nimplementation  result")
+    for name, found in faults.items():
+        print(f"{name:15} {'passed' if not found else '; '.join(found)}")
+    return 1 if any(faults.values()) else 0
+
+
+def _examine(implementation: Implementation) -> list[str]:
+    """What is wrong with one implementation by itself."""
+    print(f"\n=== {implementation.name}", flush=True)
+    try:
+        environment = implementation.environment(os.environ)
+    except MissingError as error:
+        print(error)
+        return ["not there and not to be installed"]
+    environment.update(_oclgrind_checks(implementation))
+    found = []
+    if not _run(["pytest", "-q", "-m", "conformance", *_tests(implementation)], environment):
+        found.append("conformance tests fail")
+    for kind in ("tiny",) if implementation.simulator else ("full", "tiny"):
+        pictures = _pictures(implementation, kind)
+        pictures.unlink(missing_ok=True)
+        if not _run(["tests.portability.pictures", str(pictures), kind], environment):
+            found.append(f"the {kind} pictures fail")
+    if implementation.simulator:
+        found += _memory_faults(environment)
+    return found
+
+
+def _tests(implementation: Implementation) -> list[str]:
+    # Interpreting costs some 10,000 times the time: the simulator is for memory, on tiny pictures.
+    return ["tests/device"] if implementation.simulator else ["tests"]
+
+
+def _pictures(implementation: Implementation, kind: str) -> Path:
+    return WORKPLACE / f"{implementation.name}-{kind}.npz"
+
+
+def _oclgrind_checks(implementation: Implementation) -> dict[str, str]:
+    if not implementation.simulator:
+        return {}
+    log = WORKPLACE / "oclgrind.log"
+    return {"OCLGRIND_LOG": str(log), "OCLGRIND_UNINITIALIZED": "1", "OCLGRIND_DATA_RACES": "1"}
+
+
+def _memory_faults(environment: Mapping[str, str]) -> list[str]:
+    """Oclgrind's findings on the tiny pictures; and on a kernel with a fault, to know that it looks."""
+    log = Path(environment["OCLGRIND_LOG"])
+    found = []
+    text = log.read_text() if log.exists() else ""
+    if text.strip():
+        print(text[:4000])
+        found.append("invalid use of memory")
+    _run(["tests.portability.canary"], environment)
+    if "Invalid write" not in (log.read_text() if log.exists() else ""):
+        found.append("the memory checker finds nothing where something is")
+    return found
+
+
+def _run(module_and_arguments: list[str], environment: Mapping[str, str]) -> bool:
+    command = [sys.executable, "-m", *module_and_arguments]
+    try:
+        return subprocess.run(command, env=environment, timeout=_TIMEOUT_S, check=False).returncode == 0
+    except subprocess.TimeoutExpired:
+        print(f"{' '.join(module_and_arguments)}: more than {_TIMEOUT_S} s")
+        return False
+
+
+def _compare(chosen: list[Implementation]) -> list[tuple[str, str]]:
+    """Faults of the pictures, by implementation; those of the first that has them are the measure."""
+    faults = []
+    for kind in ("full", "tiny"):
+        reference: dict[str, np.typing.NDArray[np.float32]] = {}
+        for implementation in chosen:
+            path = _pictures(implementation, kind)
+            if not path.exists():
+                continue
+            with np.load(path) as archive:
+                pictures = {name: archive[name] for name in archive.files}
+            if not reference:
+                reference = pictures
+            for name, picture in pictures.items():
+                # The measure is compared with itself too: that finds colours that are no numbers.
+                found = difference(reference[name], picture, name.split()[-1])
+                print(f"{implementation.name:12} {kind} {name:24} {found.share:.3%} {found.fault or 'same'}")
+                if found.fault:
+                    faults.append((implementation.name, f"{kind} {name}: {found.fault}"))
+                    _leave(implementation.name, f"{kind} {name}", reference[name], picture, found.pixels)
+    return faults
+
+
+def _leave(
+    implementation: str,
+    name: str,
+    expected: np.typing.NDArray[np.float32],
+    picture: np.typing.NDArray[np.float32],
+    pixels: np.typing.NDArray[np.bool_],
+) -> None:
+    """Expected, found and difference side by side, enlarged, as a PNG for a person to look at."""
+    from PIL import Image
+
+    def bytes_of(rgb: np.typing.NDArray[np.float32]) -> np.typing.NDArray[np.uint8]:
+        finite = np.nan_to_num(rgb, nan=1, posinf=1, neginf=0).clip(0, 1)
+        return (255 * np.moveaxis(finite, 0, -1) ** (1 / 2.2)).astype(np.uint8)
+
+    marks = np.repeat(pixels[None].astype(np.float32), 3, axis=0)
+    panels = [bytes_of(expected[:3]), bytes_of(picture[:3]), bytes_of(marks)]
+    image = Image.fromarray(np.concatenate(panels, axis=1))
+    path = WORKPLACE / f"{implementation} {name}.png".replace(" ", "-")
+    image.resize((image.width * 4, image.height * 4), Image.Resampling.NEAREST).save(path)
+    print(f"left {path}: expected, found, difference")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""Small pictures that every implementation renders: `python -m tests.portability.pictures OUT.npz [tiny]`.
+
+They reach what a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of
+four numbers, the scalar derivative and the full Jacobian, shadows of both kinds of light, several samples.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device import tune
+from clfractal.device.select import Device, choose
+from clfractal.device.structs import Precision
+from clfractal.render import engine
+from clfractal.render.film import Film
+from clfractal.render.plan import make_plan
+from clfractal.scene.load import load_scene
+
+CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
+
+_LIGHTS = """
+lights:
+  - {type: directional, direction: [-1, 1, -1]}
+  - {type: point, position: [2, -2, 1], color: [0.3, 0.4, 0.6], intensity: 2, falloff: inverse_square}
+"""
+
+_SCENES: dict[str, str] = {
+    "mandelbulb": "{name: mandelbulb, iterations: 10}",
+    "trigonometric": "{name: mandelbulb, iterations: 8, parameters: {power: 2.5, theta_phase: 0.3}}",
+    "hast": "{name: hast, iterations: 20}",
+    "mandelbox": "{name: mandelbox, iterations: 10}",
+    "quaternion": "{name: quaternion_julia, iterations: 12}",
+    "kaleidoscope": "{name: kaleidoscopic_ifs, iterations: 10}",
+}
+# Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
+_DOUBLE = ("mandelbulb", "mandelbox")
+_TINY = ("mandelbulb", "hast", "mandelbox")
+
+SIZE, TINY_SIZE = (96, 72), (12, 8)
+
+
+def cases(tiny: bool) -> Iterator[tuple[str, Precision]]:
+    """Names and number types of the pictures."""
+    for name in _TINY if tiny else _SCENES:
+        yield name, "float32"
+    for name in () if tiny else _DOUBLE:
+        yield name, "float64"
+
+
+def picture(
+    device: Device, name: str, precision: Precision, size: tuple[int, int]
+) -> npt.NDArray[np.float32]:
+    """All channels of a picture, shape (channels, height, width)."""
+    # The formula's bounds say where the camera has to be for the picture to be filled.
+    bounds = load_scene(_scene_text(name, (0.0, -9.0, 0.0), (0.0, 0.0, 0.0), size)).chain
+    x, y, z = (float(value) for value in bounds.center)
+    radius = float(bounds.radius)
+    position = (x + 0.7 * radius, y - 2.1 * radius, z + 0.7 * radius)
+    scene = load_scene(_scene_text(name, position, (x, y, z), size))
+    plan = make_plan(scene, precision=precision, lanes=tune.best_lanes(device, precision), channels=CHANNELS)
+    film = Film(plan.channels, size, plan.region)
+    engine.render(scene, plan, device, film)
+    return np.stack([film[channel] for channel in CHANNELS])
+
+
+def _scene_text(name: str, position: Sequence[float], target: Sequence[float], size: tuple[int, int]) -> str:
+    width, height = size
+    return (
+        f"version: 1\nformula: {_SCENES[name]}\nimage: {{width: {width}, height: {height}}}\n"
+        f"camera: {{position: {list(position)}, target: {list(target)}, fov: 45}}\n"
+        "renderer: {type: surface, samples: 2}\n" + _LIGHTS
+    )
+
+
+def main() -> None:
+    """Render all pictures on the device that the environment names."""
+    tiny = sys.argv[2:] == ["tiny"]
+    device = choose()
+    print(device.info.name, "|", device.info.version, flush=True)
+    rendered = {}
+    for name, precision in cases(tiny):
+        rendered[f"{name} {precision}"] = picture(device, name, precision, TINY_SIZE if tiny else SIZE)
+        print("rendered", name, precision, flush=True)
+    save: Any = np.savez  # its stubs know no arrays by name beside options
+    save(Path(sys.argv[1]), **rendered)
+
+
+if __name__ == "__main__":
+    main()
