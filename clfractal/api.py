@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from clfractal.scene.load import load_scene as load_scene
 from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
+    from clfractal.device.structs import Precision
     from clfractal.render.engine import ProgressCallback
     from clfractal.render.film import Film
 
@@ -79,7 +80,7 @@ def escape(
     parameters: Mapping[str, float] | None = None,
     precision: str = "float32",
     device: str | None = None,
-) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.bool_]]:
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
     """How many applications of a formula it takes for points to escape.
 
     Args:
@@ -102,8 +103,9 @@ def escape(
         DeviceError, KernelBuildError: as for `render`.
     """
     from clfractal.device.select import choose
+    from clfractal.device.tune import best_lanes
     from clfractal.formulas.catalog import load_chain
-    from clfractal.render import escape as escapes
+    from clfractal.render import points as launch
 
     chain = load_chain(formula, parameters)
     if precision not in ("float32", "float64"):
@@ -113,4 +115,8 @@ def escape(
     places = np.asarray(points, np.float64)
     if places.ndim != 2 or places.shape[1] != 3:
         raise FormulaError(f"points must have shape (n, 3), got {places.shape}")
-    return escapes.escape(chain, places, int(iterations), bailout, precision, choose(device))
+    number, chosen = cast("Precision", precision), choose(device)
+    lanes = best_lanes(chosen, number)
+    return launch.escape(
+        chain, places, int(iterations), device=chosen, lanes=lanes, precision=number, bailout=bailout
+    )

@@ -108,10 +108,13 @@ def _scene(order: Order) -> Scene:
     try:
         return load_scene(Path(order.scene), overrides=overrides)
     except ClfractalError as error:
-        key = (error.where.file or "").removeprefix("--set ")
-        if error.where.file is None or key == error.where.file or key not in given:
+        where = error.where
+        key = (where.file or "").removeprefix("--set ")
+        if order.size is not None and where.path == "image":  # its pixels are too many together
+            raise SceneError(error.message, Where("--size")) from error
+        if key == where.file or key not in given:
             raise
-        raise type(error)(error.message, replace(error.where, file=given[key][0])) from error
+        raise type(error)(error.message, replace(where, file=given[key][0])) from error
 
 
 def _region(text: str | None) -> tuple[int, int, int, int] | None:

@@ -1,0 +1,301 @@
+"""Whatever is wrong: one line, its exit status, and everything that was there before is untouched."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from clfractal.device import select
+from clfractal.device.source import FlatText
+from clfractal.render import surface
+from tests.files.limits import file_size_limit
+from tests.shell import SCENE, InProcess, command, environment
+
+INLINE = """version: 1
+camera: {{position: [0, -3, 0]}}
+image: {{width: 32, height: 32}}
+formula:
+  inline:
+    title: test
+    reference: test
+    variables: [x, y, z]
+    map: {map}
+    degree: 2
+    bounds: {{center: [0, 0, 0], radius: 2}}
+    bailout: 4
+"""
+NESTED = "(" * 10_000 + "x" + ")" * 10_000
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder: a good scene and the outputs of an earlier run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    (tmp_path / "old.png").write_bytes(b"an earlier picture")
+    (tmp_path / "old.exr").write_bytes(b"an earlier picture")
+    return tmp_path
+
+
+@pytest.fixture
+def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
+    return InProcess(capsys)
+
+
+def untouched(here: Path) -> bool:
+    """No new file, and the old ones are as they were."""
+    pictures = {name: (here / name).read_bytes() for name in ("old.png", "old.exr")}
+    assert set(pictures.values()) == {b"an earlier picture"}
+    others = [path.name for path in here.iterdir() if path.suffix != ".yaml" and path.name not in pictures]
+    assert not others, others
+    return True
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        (["--set", "formula.name=mandelbul"], ["unknown formula 'mandelbul'; did you mean 'mandelbulb'?"]),
+        (["--set", "camra.fov=3"], ["unknown key 'camra'; did you mean 'camera'?"]),
+        (["--set", "camera.fow=3"], ["--set camera.fow: ", "unknown key 'fow'; did you mean 'fov'?"]),
+        (["--set", "output.channels=[R, Q]"], ["unknown channel 'Q'", "iterations"]),
+        (["--set", "output.channels=[R, itertions]"], ["did you mean 'iterations'?"]),
+        (["--set", "renderer.type=volumetric"], ["volumetric", "surface"]),
+        (["--set", "formula.parameters.power=1e9"], ["--set formula.parameters.power: ", "at most"]),
+        (["--set", "formula.parameters.pwer=2"], ["did you mean 'power'?"]),
+        (["--set", "camera.target=[0, -3, 0]"], ["camera", "must differ"]),
+        (["--set", "camera.up=[0, 2, 0]"], ["camera", "parallel to the view"]),
+        (["--set", "camera.fov=.nan"], ["camera.fov", "finite"]),
+        (["--set", "camera.fov=.inf"], ["camera.fov", "finite"]),
+        (["--set", "camera.fov=400"], ["camera.fov", "must be below 180, got 400"]),
+        (["--set", "nothing"], ["must be KEY=VALUE"]),
+        (["--size", "0x10"], ["--size: must be at least 1, got 0"]),
+        (["--size", "1000000x10"], ["--size: must be at most"]),
+        (["--size", "60000x60000"], ["--size: must be at most", "pixels"]),
+        (["--size", "big"], ["--size: must be WIDTHxHEIGHT", "'big'"]),
+        (["--region", "0,0,41,1"], ["--region: must lie inside the picture of 40 x 36 pixels"]),
+        (["--region", "0,0,0,1"], ["--region: must lie inside"]),
+        (["--region", "1,2,3"], ["--region: must be X,Y,WIDTH,HEIGHT"]),
+        (["--samples", "0"], ["--samples: must be at least 1, got 0"]),
+        (["--samples", "many"], ["clfractal render: ", "--samples", "integer"]),
+        (["--precision", "float16"], ["--precision: must be", "float64"]),
+        (["--device", "nosuch"], ["unknown device 'nosuch'", "0:0"]),
+        (["--device", "17:0"], ["no device '17:0'", "0:0"]),
+        (["--sampels", "3"], ["clfractal render: ", "--sampels"]),
+        (["--stats", "nowhere/s.json"], ["nowhere/s.json: cannot be written: there is no folder"]),
+    ],
+)
+def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts: list[str]) -> None:
+    ended = shell("render", "scene.yaml", "-o", "old.png", "-o", "old.exr", *options)
+    assert ended.is_one_line(2, *parts)
+    assert untouched(here)
+
+
+@pytest.mark.parametrize(
+    ("output", "message"),
+    [
+        ("x.jpg", "x.jpg: unknown extension '.jpg'; known: .exr, .png"),
+        ("x", "x: needs an extension"),
+        ("no/x.png", "no/x.png: cannot be written: there is no folder 'no'"),
+        ("scene.yaml/x.png", "scene.yaml/x.png: cannot be written: 'scene.yaml' is not a folder"),
+        ("/dev/full", "/dev/full: needs an extension"),
+        ("folder.png", "folder.png: cannot be written: it is a folder"),
+    ],
+)
+def test_an_output_that_cannot_be_written(here: Path, shell: InProcess, output: str, message: str) -> None:
+    (here / "folder.png").mkdir()
+    assert shell("render", "scene.yaml", "-o", "old.exr", "-o", output).is_one_line(2, message)
+    (here / "folder.png").rmdir()
+    assert untouched(here)
+
+
+def test_a_file_system_that_takes_no_files(here: Path, shell: InProcess) -> None:
+    assert shell("render", "scene.yaml", "-o", "/proc/x.png").is_one_line(2, "/proc/x.png: cannot be written")
+    assert untouched(here)
+
+
+@pytest.mark.parametrize(
+    ("expressions", "parts"),
+    [
+        ('["x*qq", "y", "z"]', ["9:14: formula.inline.map.0: unknown name 'qq'", "column 3"]),
+        ('["x", "y"]', ["9:10: formula.inline.map: must have 3 expressions"]),
+        ('["x/0", "y", "z"]', ["9:14: formula.inline.map.0: division by zero"]),
+        ('["x/(2 - 2)", "y", "z"]', ["division by zero"]),
+        (f'["{NESTED}", "y", "z"]', ["formula.inline.map.0: is too long"]),
+        ('["' + "(" * 400 + "x" + ")" * 400 + '", "y", "z"]', ["formula.inline.map.0: "]),
+        ('["x +", "y", "z"]', ["formula.inline.map.0: "]),
+        ('[\'__import__("os").system("true")\', "y", "z"]', ["formula.inline.map.0: "]),
+        (
+            '["a", "y", "z"]\n    let: {a: "b", b: "a"}',
+            ["formula.inline.let.a: 'a' uses 'b', which is defined after"],
+        ),
+        ('["a", "y", "z"]\n    let: {a: "a + x"}', ["formula.inline.let.a: "]),
+    ],
+)
+def test_a_wrong_formula(here: Path, shell: InProcess, expressions: str, parts: list[str]) -> None:
+    (here / "wrong.yaml").write_text(INLINE.format(map=expressions))
+    assert shell("render", "wrong.yaml", "-o", "old.png").is_one_line(2, "wrong.yaml:", *parts)
+    assert untouched(here)
+
+
+def test_the_formulas_above_fail_for_what_they_say(here: Path, shell: InProcess) -> None:
+    (here / "right.yaml").write_text(INLINE.format(map='["x*x - y*y - z*z", "2*x*y", "2*x*z"]'))
+    assert shell("check", "right.yaml").status == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("nothing.yaml", "nothing.yaml: cannot be read: No such file or directory"),
+        ("/dev/zero", "/dev/zero: is not a regular file"),
+        (".", ".: is a folder, not a file"),
+        ("old.png", "old.png:"),
+        ("picture", "picture:"),
+    ],
+)
+def test_a_scene_that_cannot_be_read(here: Path, shell: InProcess, name: str, message: str) -> None:
+    (here / "picture").write_bytes(b"\x89PNG\r\n\x1a\n")
+    ended = shell("render", name, "-o", "old.exr")
+    (here / "picture").unlink()
+    assert ended.is_one_line(2, message)
+    assert untouched(here)
+
+
+def test_a_pipe_as_a_scene_is_not_waited_for(here: Path, shell: InProcess) -> None:
+    os.mkfifo(here / "pipe.yaml")
+    assert shell("check", "pipe.yaml").is_one_line(2, "pipe.yaml: is not a regular file")
+
+
+@pytest.mark.parametrize("name", ["whole.exr", "whole.png"])
+def test_a_picture_cut_short_as_a_scene(here: Path, shell: InProcess, name: str) -> None:
+    assert shell("render", "scene.yaml", "-o", name, "--quiet").status == 0
+    whole = (here / name).read_bytes()
+    (here / name).unlink()
+    for length in (6, 100, 700, len(whole) // 2, len(whole) - 1):
+        cut = here / f"cut{Path(name).suffix}"
+        cut.write_bytes(whole[:length])
+        ended = shell("render", cut.name, "-o", "old.exr")
+        cut.unlink()
+        assert ended.is_one_line(2, f"{cut.name}:")
+    assert untouched(here)
+
+
+def test_a_picture_is_not_replaced_by_its_own(here: Path, shell: InProcess) -> None:
+    assert shell("render", "scene.yaml", "-o", "mine.png", "--quiet").status == 0
+    assert shell("render", "mine.png").is_one_line(2, "mine.png: would be replaced", "-o")
+
+
+def test_a_full_disk(here: Path, shell: InProcess) -> None:
+    for output in ("old.png", "old.exr"):
+        with file_size_limit(4096):
+            ended = shell("render", "scene.yaml", "-o", output, "--quiet")
+        assert ended.is_one_line(2, f"{output}.partial: cannot be written: ")
+        assert untouched(here)
+
+
+def test_a_disk_that_is_full_when_the_picture_is_written(
+    here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The work is kept: with space again, --resume only has to write the files."""
+
+    def full(descriptor: int) -> None:
+        if os.pread(descriptor, 8, 0) != b"CLFJRNL1":  # there was space for the work, not for the picture
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)  # where a file system tells that a delayed write found no room
+        for output in ("old.png", "old.exr"):
+            ended = shell("render", "scene.yaml", "-o", output, "--quiet")
+            assert ended.is_one_line(2, f"{output}: cannot be written: No space left on device")
+            assert (here / output).read_bytes() == b"an earlier picture"
+    ended = shell("render", "scene.yaml", "-o", "old.png", "--resume")
+    assert ended.status == 0
+    assert "nothing was left to render" in ended.err
+    (here / "old.exr.partial").unlink()
+    assert {path.name for path in here.iterdir()} == {"scene.yaml", "old.png", "old.exr"}
+
+
+def test_standard_output_that_is_full(here: Path) -> None:
+    with open("/dev/full", "wb") as full:
+        ended = subprocess.run(
+            command("check", "scene.yaml"), cwd=here, env=environment(), stdout=full, stderr=subprocess.PIPE
+        )
+    assert ended.returncode == 2
+    assert ended.stderr == b"standard output: cannot be written: No space left on device\n"
+
+
+def test_no_device_at_all(here: Path) -> None:
+    """pyopencl's wheel looks for drivers in PYOPENCL_HOME too, and sets that when it is imported."""
+    code = (
+        "import os, sys, pyopencl; os.environ['PYOPENCL_HOME'] = os.environ['OCL_ICD_VENDORS']\n"
+        "from clfractal.cli import main\n"
+        "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'old.png']; main()"
+    )
+    nowhere = {"OCL_ICD_VENDORS": str(here), "CLFRACTAL_DEVICE": ""}
+    ended = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=here, env=environment(nowhere), capture_output=True, text=True
+    )
+    assert ended.returncode == 3
+    assert ended.stderr.count("\n") == 1
+    assert ended.stderr.startswith("no OpenCL device; install one")
+    assert untouched(here)
+
+
+def test_a_device_with_too_little_memory(
+    here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    describe = select._describe
+
+    def tiny(index: str, platform: object, device: object) -> select.DeviceInfo:
+        return replace(describe(index, platform, device), memory=10_000, max_alloc=5_000)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(select, "_describe", tiny)
+    ended = shell("render", "scene.yaml", "-o", "old.png")
+    assert ended.is_one_line(2, "rendering needs ", " MiB of device memory, ", "has 0.0 MiB")
+    assert untouched(here)
+
+
+def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = surface.program_text
+
+    def broken(*arguments: object) -> FlatText:
+        flat = text(*arguments)  # type: ignore[arg-type]
+        return replace(flat, text=flat.text.replace("kernel void surface", "kernel vod surface"))
+
+    monkeypatch.setattr(surface, "program_text", broken)
+    ended = shell("render", "scene.yaml", "-o", "old.png")
+    assert ended.is_one_line(3, "surface.cl:", "vod")
+    told = shell("render", "scene.yaml", "-o", "old.png", "--verbose")
+    assert told.status == 3
+    assert " | __kernel" in told.err.split("\n", 1)[1]
+    assert untouched(here)
+
+
+def test_a_driver_that_aborts(here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The child process that compiles plays a driver whose compiler calls abort()."""
+    shell("render", "scene.yaml", "-o", "warm.png", "--quiet")  # the lanes have been measured
+    (here / "warm.png").unlink()
+    monkeypatch.setenv("CLFRACTAL_TEST_ABORT", "surface")
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(here / "cache.yaml"))
+    monkeypatch.setenv("CLFRACTAL_LANES", "1")
+    ended = shell("render", "scene.yaml", "-o", "old.png")
+    assert ended.is_one_line(3, "the driver aborted (signal 6) while building")
+    assert untouched(here)
+
+
+def test_a_mistake_of_ours_is_one_line_too(
+    here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_arguments: object) -> None:
+        raise IndexError("of an array\nwith two lines")
+
+    monkeypatch.setattr(surface, "program_text", fails)
+    ended = shell("render", "scene.yaml", "-o", "old.png")
+    assert ended.is_one_line(3, "internal error", "IndexError: of an array with two lines")
+    assert "Traceback" in shell("render", "scene.yaml", "-o", "old.png", "--verbose").err
+    assert untouched(here)
