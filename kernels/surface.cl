@@ -67,7 +67,7 @@ __kernel void surface(__global float *film, __global uint *statistics, __global 
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     real coverage = R(0.0), bad = R(0.0), steps = R(0.0), count = R(0.0);
     real nearest_offset = (real)(REAL_LARGEST);
-    sample_result kept;
+    sample_result kept = {0};
     for (int sample = 0; sample < settings->samples; ++sample) {
         // The ray of each lane's sample.
         scalar x[LANES], y[LANES], offset[LANES];
