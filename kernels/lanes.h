@@ -28,6 +28,9 @@ typedef float scalar;
 typedef scalar real;
 typedef int mask;
 #define any_lane(m) ((m) != 0)
+#define as_mask(a) as_int(a)  // of float: the bits, as whole numbers
+#define as_real(a) as_float(a)
+#define real_of_mask(a) ((scalar)(a))
 #define less(a, b) (-((a) < (b)))
 #define less_equal(a, b) (-((a) <= (b)))
 #define equal(a, b) (-((a) == (b)))
@@ -44,6 +47,9 @@ typedef JOIN(float, LANES) real;
 typedef JOIN(int, LANES) mask;
 #endif
 #define any_lane(m) any(m)
+#define as_mask(a) JOIN(as_int, LANES)(a)
+#define as_real(a) JOIN(as_float, LANES)(a)
+#define real_of_mask(a) JOIN(convert_float, LANES)(a)
 #define less(a, b) ((real)(a) < (real)(b))
 #define less_equal(a, b) ((real)(a) <= (real)(b))
 #define equal(a, b) ((real)(a) == (real)(b))
