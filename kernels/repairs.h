@@ -29,6 +29,10 @@ INLINE real packet_tan(real a) {
     return pick(far, tan(pick(far, a, R(1e6))), near);
 }
 
+// Some drivers' own built-ins are macros.
+#undef sin
+#undef cos
+#undef tan
 #define sin(a) packet_sin(a)
 #define cos(a) packet_cos(a)
 #define tan(a) packet_tan(a)
@@ -52,6 +56,7 @@ INLINE real packet_pow(real x, real y) {
     return lanes_load(each);
 }
 
+#undef pow
 #define pow(x, y) packet_pow(x, y)
 #endif
 

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
 from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Node, Number
 from clfractal.formulas.partials import Differentiator
+
+# How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
+DualMap = Literal["operations", "jacobian", "cheapest"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,17 +36,19 @@ class FormulaText:
     has_derivative: bool
 
 
-def write_formula(chain: Chain, *, scalar_rule: bool = True) -> FormulaText:
+def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap = "cheapest") -> FormulaText:
     """The chain's functions over `real` and `dual`.
 
     `scalar_rule=False` leaves out the formulas' own derivative, so that marching uses the Jacobian throughout.
+    A map that uses the point (`point_x`) is always written operation by operation.
     """
-    return _ChainWriter(chain, scalar_rule).write()
+    return _ChainWriter(chain, scalar_rule, dual_map).write()
 
 
 class _ChainWriter:
-    def __init__(self, chain: Chain, scalar_rule: bool) -> None:
+    def __init__(self, chain: Chain, scalar_rule: bool, dual_map: DualMap) -> None:
         self.chain = chain
+        self.dual_map = dual_map
         self.links: Sequence[Link] = chain.links
         self.size = chain.size
         self.constants = Constants()
@@ -126,9 +132,10 @@ class _ChainWriter:
         state = "state" if number_type == "real" else "dual_state"
         emitter = self._emitter(index, number_type)
         mapped = self._map(emitter, bound)
-        if number_type == "dual" and not bound.formula.point_map:
+        if number_type == "dual" and not bound.formula.point_map and self.dual_map != "operations":
             local, rows = self._by_local_jacobian(index)
-            if _cost([*local.lines, *(f" = {row};" for row in rows)]) < _cost(emitter.lines):
+            cost = _cost([*local.lines, *(f" = {row};" for row in rows)])
+            if self.dual_map == "jacobian" or cost < _cost(emitter.lines):
                 emitter, mapped = local, [Value(row, "varying") for row in rows]
         head = (
             f"INLINE {state} {number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
@@ -250,12 +257,12 @@ class _ChainWriter:
 
 # What operations cost beside an addition, roughly, on the vector units of today's processors.
 _COSTS = {
-    "real_div": 8, "real_sqrt": 10, "real_exp": 25, "real_log": 25, "real_pow": 60, "real_sin": 30, "real_cos": 30,
+    "real_div": 8, "real_sqrt": 10, "real_rsqrt": 8, "real_exp": 25, "real_log": 25, "real_pow": 60, "real_sin": 30, "real_cos": 30,
     "real_tan": 40, "real_asin": 30, "real_acos": 30, "real_atan": 30, "real_atan2": 45, "real_mod": 12,
     "real_power_slope": 60, "real_power_log": 30, "real_arc_slope": 20,
     "dual_add": 4, "dual_sub": 4, "dual_neg": 4, "dual_mul": 7, "dual_square": 5, "dual_mul_real": 4, "dual_where": 4,
     "dual_chain": 3, "dual_chain2": 6, "dual_chain3": 9, "dual_chain4": 12, "dual_div": 23, "dual_div_real": 12,
-    "real_div_dual": 20, "real_sub_dual": 4, "dual_sqrt": 22, "dual_abs": 6, "dual_min": 5, "dual_max": 5,
+    "real_div_dual": 20, "real_sub_dual": 4, "dual_sqrt": 22, "dual_rsqrt": 14, "dual_abs": 6, "dual_min": 5, "dual_max": 5,
     "dual_clamp": 10, "dual_exp": 28, "dual_log": 37, "dual_sin": 63, "dual_cos": 63, "dual_tan": 45, "dual_asin": 53,
     "dual_acos": 53, "dual_atan": 41, "dual_atan2": 62, "dual_mod": 18, "dual_pow": 150, "dual_pow_real": 123,
 }  # fmt: skip
