@@ -1,14 +1,20 @@
-"""The command `clfractal`: arguments in, an exit status out, one line for whatever goes wrong."""
+"""The command `clfractal`: arguments in, an exit status out, one line for whatever goes wrong.
+
+Imports next to nothing: Ctrl-C has to be answered from the first moment on, and what a command needs is its
+own affair.
+"""
 
 from __future__ import annotations
 
 import os
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from clfractal.commands import interrupt
-from clfractal.commands.shell import Shell
-from clfractal.errors import STATUS_INTERRUPTED
+if TYPE_CHECKING:
+    from clfractal.commands.shell import Shell
+
+INTERRUPTED = 130
 
 
 def main() -> None:
@@ -16,14 +22,26 @@ def main() -> None:
 
     The process is ended at once, without a driver's cleaning up, which may take long, hang or crash.
     """
-    shell = Shell(owns_process=True)
+    from clfractal.commands import interrupt
+
+    shell: Shell | None = None
+
+    def last_words() -> None:
+        if shell is not None:
+            shell.interrupted()
+        else:
+            os.write(2, b"clfractal: interrupted\n")
+
     try:
-        interrupt.watch(shell.interrupted, STATUS_INTERRUPTED)
+        interrupt.watch(last_words, INTERRUPTED)
+        from clfractal.commands.shell import Shell
+
+        shell = Shell(owns_process=True)
         status = run(sys.argv[1:], shell)
     except KeyboardInterrupt:
         # While this is handled the traceback keeps every object of the driver alive: none is waited for.
-        shell.interrupted()
-        os._exit(STATUS_INTERRUPTED)
+        last_words()
+        os._exit(INTERRUPTED)
     os._exit(status)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +10,9 @@ import typer
 
 import clfractal
 from clfractal.commands.shell import Shell
-from clfractal.errors import STATUS_BAD_INPUT
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_INTERRUPTED
+
+Work = Callable[[], None]
 
 app = typer.Typer(
     name="clfractal",
@@ -41,11 +43,13 @@ Verbose = Annotated[
 def call(arguments: Sequence[str], shell: Shell) -> int:
     """Runs the command that the arguments name; gives the exit status.
 
+    Typer only reads the arguments and gives the work to do: what happens in it is none of Typer's business.
+
     Raises:
         ClfractalError: and whatever else a command raises.
     """
     try:
-        status = app(list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False)
+        work = app(list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False)
     except Exception as error:
         # Typer's own errors: their classes move between its versions, this method of theirs stays.
         tell = getattr(error, "format_message", None)
@@ -55,7 +59,11 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
         text = " ".join(str(tell()).split()).rstrip(".")
         shell.refuse(f"{command}: {text}; see {command} --help")
         return STATUS_BAD_INPUT
-    return status if isinstance(status, int) else 0
+    if work == STATUS_INTERRUPTED:  # what Typer makes of Ctrl-C
+        raise KeyboardInterrupt
+    if callable(work):
+        work()
+    return 0
 
 
 def _shell(context: typer.Context, *, quiet: bool = False, verbose: bool = False) -> Shell:
@@ -112,7 +120,7 @@ def render(
     stats: Annotated[
         Path | None, typer.Option("--stats", metavar="FILE.json", help="Write times and counts as JSON.")
     ] = None,
-) -> None:
+) -> Work:
     """Render a scene to one or more picture files."""
     from clfractal.commands.render import Order, render_scene
 
@@ -128,47 +136,50 @@ def render(
         resume=resume,
         stats=stats,
     )
-    render_scene(order, _shell(context, quiet=quiet, verbose=verbose))
+    shell = _shell(context, quiet=quiet, verbose=verbose)
+    return lambda: render_scene(order, shell)
 
 
 @app.command()
 def check(
     context: typer.Context, scene: Scene, overrides: Overrides = None, verbose: Verbose = False
-) -> None:
+) -> Work:
     """Check a scene and print it with every default filled in."""
     from clfractal.scene.load import dump_scene, load_scene
 
     shell = _shell(context, verbose=verbose)
-    shell.print(dump_scene(load_scene(Path(scene), overrides=overrides or ())))
+    return lambda: shell.print(dump_scene(load_scene(Path(scene), overrides=overrides or ())))
 
 
 @app.command()
-def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = False) -> None:
+def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = False) -> Work:
     """List every OpenCL device and how fast it is; measured once, then remembered."""
     from clfractal.commands.devices import list_devices
 
-    list_devices(_shell(context, quiet=quiet, verbose=verbose))
+    shell = _shell(context, quiet=quiet, verbose=verbose)
+    return lambda: list_devices(shell)
 
 
 @app.command()
 def formulas(
     context: typer.Context, name: Annotated[str | None, typer.Argument(help="One of the library.")] = None
-) -> None:
+) -> Work:
     """List the library of formulas, or tell about one."""
     from clfractal.commands.formulas import list_formulas, tell_formula
 
     shell = _shell(context)
-    shell.print(list_formulas() if name is None else tell_formula(name))
+    return lambda: shell.print(list_formulas() if name is None else tell_formula(name))
 
 
 @app.command()
-def schema(context: typer.Context) -> None:
+def schema(context: typer.Context) -> Work:
     """Print the JSON Schema of scene files, for editors."""
     import json
 
     from clfractal.scene import load
 
-    _shell(context).print(json.dumps(load.schema(), indent=2))
+    shell = _shell(context)
+    return lambda: shell.print(json.dumps(load.schema(), indent=2))
 
 
 @app.command()
@@ -180,11 +191,11 @@ def bench(
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
-) -> None:
+) -> Work:
     """Measure this machine's speed and print a table."""
     from importlib import import_module
 
     shell = _shell(context, quiet=quiet, verbose=verbose)
     shell.mute_drivers()
     run: Any = import_module("clfractal.bench").run
-    run(device=device, json_file=json_file, shell=shell)
+    return lambda: run(device=device, json_file=json_file, shell=shell)

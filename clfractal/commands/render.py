@@ -78,7 +78,9 @@ def render_scene(order: Order, shell: Shell) -> None:
         job.save(film, outputs)
     except BaseException:
         reporter.close()
-        if not film.done.any():
+        if film.done.any():
+            film.close()
+        else:
             film.discard()
         raise
     film.discard()

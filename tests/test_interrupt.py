@@ -1,0 +1,130 @@
+"""Ctrl-C: status 130 and one line, at once, whatever the program is doing."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tests.shell import command, environment
+
+# One tile of this takes a CPU several seconds: its kernel cannot be stopped, only left.
+ENDLESS = """version: 1
+formula: {name: mandelbulb, iterations: 3000}
+image: {width: 256, height: 256}
+camera: {position: [0, -2.2, 0], fov: 40}
+renderer: {type: surface, samples: 65536, detail: 0.01, max_steps: 100000}
+"""
+# What one answer may take on a loaded machine; the promise, half a second, the fastest of three has to keep.
+LIMIT_SECONDS = 1.5
+PROMISE_SECONDS = 0.5
+
+
+@pytest.fixture(autouse=True)
+def _interrupts_are_not_ignored() -> Iterator[None]:
+    """A test run in the background ignores Ctrl-C, and so would the processes it starts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def interrupt(
+    folder: Path, ready: Callable[[], bool], extra: dict[str, str], *options: str
+) -> tuple[int, str, float]:
+    """Starts a render, waits until it is `ready`, sends SIGINT; gives status, standard error and seconds."""
+    running = subprocess.Popen(
+        command("render", "endless.yaml", "-o", "out.exr", *options),
+        cwd=folder,
+        env=environment(extra),
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        deadline = time.monotonic() + 120
+        while not ready():
+            assert running.poll() is None, running.communicate()[1]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        start = time.monotonic()
+        running.send_signal(signal.SIGINT)
+        _, told = running.communicate(timeout=60)
+        return running.returncode, told, time.monotonic() - start
+    finally:
+        if running.poll() is None:
+            os.killpg(running.pid, signal.SIGKILL)
+            running.wait()
+
+
+def _is_past(moment: float) -> bool:
+    return time.monotonic() > moment
+
+
+def test_in_the_middle_of_a_kernel(tmp_path: Path) -> None:
+    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    journal = tmp_path / "out.exr.partial"
+    seconds = []
+    for _ in range(3):
+
+        def rendering() -> bool:
+            if not journal.exists():
+                return False
+            time.sleep(1.0)  # the program is loaded and its kernel runs
+            return True
+
+        status, told, took = interrupt(tmp_path, rendering, {}, "--quiet")
+        assert status == 130
+        assert re.fullmatch(r"(clfractal|out\.exr\.partial): interrupted.*\n", told), told
+        assert not (tmp_path / "out.exr").exists()
+        assert took < LIMIT_SECONDS
+        seconds.append(took)
+    assert min(seconds) < PROMISE_SECONDS
+
+
+def test_in_the_middle_of_a_compilation(tmp_path: Path) -> None:
+    """With an empty cache a child process compiles the kernel first: it must not outlive its parent."""
+    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    cache = tmp_path / "cache"
+    children: list[int] = []
+
+    def compiling() -> bool:
+        found = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+        for process in found:
+            try:
+                words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
+                owner = Path(f"/proc/{process}/environ").read_bytes()
+            except OSError:
+                continue
+            if b"clfractal.device.child" in words and str(cache).encode() in owner:
+                children.append(process)
+        return bool(children)
+
+    extra = {"CLFRACTAL_CACHE": str(cache), "CLFRACTAL_LANES": "1", "POCL_CACHE_DIR": str(tmp_path / "pocl")}
+    status, told, took = interrupt(tmp_path, compiling, extra, "--quiet")
+    assert status == 130
+    assert told.count("\n") == 1
+    assert "interrupted" in told
+    assert took < LIMIT_SECONDS
+    deadline = time.monotonic() + 5
+    while any(Path(f"/proc/{child}").exists() for child in children):
+        assert time.monotonic() < deadline, "the compiling child lives on"
+        time.sleep(0.01)
+    assert {path.name for path in tmp_path.iterdir()} - {"cache", "pocl"} == {"endless.yaml"}
+
+
+def test_while_everything_is_still_loading(tmp_path: Path) -> None:
+    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    for delay in (0.15, 0.3, 0.45):
+        moment = time.monotonic() + delay
+        status, told, took = interrupt(tmp_path, partial(_is_past, moment), {}, "--quiet")
+        assert status == 130
+        assert told.count("\n") == 1
+        assert "Traceback" not in told
+        assert took < LIMIT_SECONDS

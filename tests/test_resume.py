@@ -1,0 +1,172 @@
+"""Killed at any moment, a render is resumed and ends with the bits of one that was never disturbed."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import subprocess
+import time
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.files.exr import read_exr
+from clfractal.files.journal import _HEAD, MAGIC
+from tests.shell import SCENE, Ended, command, environment, process
+
+# Heavy enough for several batches of tiles, each of a fraction of a second.
+HEAVY = """version: 1
+formula: {name: mandelbulb, iterations: 60}
+image: {width: 224, height: 160}
+camera: {position: [0, -2.2, 0.4], fov: 40}
+renderer: {type: surface, samples: 16, detail: 0.2}
+output:
+  channels: [R, G, B, A, Z, N.X, iterations, steps]
+  precision: {R: float, G: float, B: float, N.X: float}
+"""
+TILES = 7 * 5
+
+
+def planes(path: Path) -> dict[str, bytes]:
+    """The bytes of every channel."""
+    return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
+
+
+def render(folder: Path, *options: str) -> Ended:
+    return process(["render", "heavy.yaml", "-o", "out.exr", *options], folder)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
+    """A finished render, and the seconds that it took with everything compiled."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    (folder / "heavy.yaml").write_text(HEAVY)
+    assert render(folder, "--quiet").status == 0  # compiles
+    start = time.perf_counter()
+    ended = render(folder, "--quiet")
+    assert ended == Ended(0, "", "")
+    return folder / "out.exr", time.perf_counter() - start
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_killed_at_random_moments(seed: int, undisturbed: tuple[Path, float], tmp_path: Path) -> None:
+    whole, seconds = undisturbed
+    chance = random.Random(seed)
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    kills = 0
+    while kills < 4:
+        running = subprocess.Popen(
+            command("render", "heavy.yaml", "-o", "out.exr", "--quiet", "--resume"),
+            cwd=tmp_path,
+            env=environment(),
+        )
+        try:
+            running.wait(chance.uniform(0.2, 1.0) * seconds)
+            break  # it finished
+        except subprocess.TimeoutExpired:
+            running.send_signal(signal.SIGKILL)
+            running.wait()
+            kills += 1
+            assert not (tmp_path / "out.exr").exists()
+    assert render(tmp_path, "--resume", "--quiet") == Ended(0, "", "") or kills == 0
+    assert planes(tmp_path / "out.exr") == planes(whole)
+    assert not (tmp_path / "out.exr.partial").exists()
+
+
+def test_resuming_renders_only_what_is_missing(undisturbed: tuple[Path, float], tmp_path: Path) -> None:
+    """Killed as soon as there is a tile on the disk; the statistics tell what the second run did."""
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    running = subprocess.Popen(
+        command("render", "heavy.yaml", "-o", "out.exr", "--quiet"), cwd=tmp_path, env=environment()
+    )
+    partial = tmp_path / "out.exr.partial"
+    record = 8 + 8 * 32 * 32 * 4
+    while running.poll() is None and not (partial.exists() and partial.stat().st_size > 2 * record):
+        time.sleep(0.002)
+    running.send_signal(signal.SIGKILL)
+    assert running.wait() == -signal.SIGKILL
+    ended = render(tmp_path, "--resume", "--stats", "stats.json", "--quiet")
+    assert ended == Ended(0, "", "")
+    stats = json.loads((tmp_path / "stats.json").read_text())
+    assert stats["tiles"] == TILES
+    assert 1 <= stats["tiles_resumed"] < TILES
+    assert stats["rays"] < 224 * 160 * 16
+    assert planes(tmp_path / "out.exr") == planes(undisturbed[0])
+
+
+def interrupted(folder: Path) -> None:
+    """Leaves the work of the small scene behind: the disk was full when the picture was written."""
+    (folder / "scene.yaml").write_text(SCENE)
+    code = (
+        "import sys; from clfractal.cli import main; from clfractal import job\n"
+        "def full(*_): raise OSError(28, 'No space left on device')\n"
+        "job.save_outputs = lambda *a, **k: full()\n"
+        "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'a.png', '--quiet']; main()"
+    )
+    python = command()[0]
+    ended = subprocess.run([python, "-P", "-c", code], cwd=folder, env=environment(), check=False)
+    assert ended.returncode == 2
+    assert (folder / "a.png.partial").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        (["--set", "camera.fov=44"], ["the scene has changed"]),
+        (["--samples", "4"], ["the scene has changed"]),
+        (["--size", "64x36"], ["the size was [40, 36] and is [64, 36]"]),
+        (["--region", "0,0,8,8"], ["the region was [0, 0, 40, 36] and is [0, 0, 8, 8]"]),
+        (["--set", "output.channels=[R, G, B]"], ["the channels was"]),
+    ],
+)
+def test_other_work_is_not_resumed(tmp_path: Path, options: list[str], parts: list[str]) -> None:
+    interrupted(tmp_path)
+    before = (tmp_path / "a.png.partial").read_bytes()
+    ended = process(["render", "scene.yaml", "-o", "a.png", "--resume", *options], tmp_path)
+    assert ended.is_one_line(2, "a.png.partial: cannot be resumed: ", *parts)
+    assert (tmp_path / "a.png.partial").read_bytes() == before
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_another_version_or_device_is_not_resumed(tmp_path: Path) -> None:
+    interrupted(tmp_path)
+    whole = (tmp_path / "a.png.partial").read_bytes()
+    for old, new, said in (
+        (f'"version": "{clfractal.__version__}"', '"version": "0.0.0"', 'the version was "0.0.0"'),
+        ('"device": "', '"device": "Old ', "the device"),
+    ):
+        _, length, _ = _HEAD.unpack_from(whole)
+        text = whole[_HEAD.size : _HEAD.size + length].decode().replace(old, new).encode()
+        changed = _HEAD.pack(MAGIC, len(text), zlib.crc32(text)) + text + whole[_HEAD.size + length :]
+        (tmp_path / "a.png.partial").write_bytes(changed)
+        ended = process(["render", "scene.yaml", "-o", "a.png", "--resume"], tmp_path)
+        assert ended.is_one_line(2, "a.png.partial: cannot be resumed: ", said)
+
+
+def test_without_resume_it_starts_anew_and_says_so(tmp_path: Path) -> None:
+    interrupted(tmp_path)
+    ended = process(["render", "scene.yaml", "-o", "a.png"], tmp_path)
+    assert ended.status == 0
+    assert ended.err.splitlines()[0].startswith("a.png.partial: earlier work is dropped")
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "a.png"}
+
+
+def test_a_picture_that_is_being_rendered_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    running = subprocess.Popen(
+        command("render", "heavy.yaml", "-o", "out.exr", "--quiet"), cwd=tmp_path, env=environment()
+    )
+    try:
+        while not (tmp_path / "out.exr.partial").exists():
+            assert running.poll() is None
+            time.sleep(0.002)
+        running.send_signal(signal.SIGSTOP)
+        ended = process(["render", "heavy.yaml", "-o", "out.exr", "--quiet"], tmp_path)
+        assert ended.is_one_line(2, "out.exr.partial: is in use")
+    finally:
+        running.send_signal(signal.SIGCONT)
+        assert running.wait() == 0
