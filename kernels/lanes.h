@@ -46,7 +46,15 @@ typedef JOIN(long, LANES) mask;
 typedef JOIN(float, LANES) real;
 typedef JOIN(int, LANES) mask;
 #endif
+// PoCL's `any` tests lane after lane; a reduction becomes one or two instructions.
+#if defined(__has_builtin)
+#if __has_builtin(__builtin_reduce_or)
+#define any_lane(m) (__builtin_reduce_or(m) != 0)
+#endif
+#endif
+#ifndef any_lane
 #define any_lane(m) any(m)
+#endif
 #define as_mask(a) JOIN(as_int, LANES)(a)
 #define as_real(a) JOIN(as_float, LANES)(a)
 #define real_of_mask(a) JOIN(convert_float, LANES)(a)
@@ -57,6 +65,17 @@ typedef JOIN(int, LANES) mask;
 #define pick(m, yes, no) select((real)(no), (real)(yes), m)
 #define lanes_store(value, array) JOIN(vstore, LANES)(value, 0, array)
 #define lanes_load(array) JOIN(vload, LANES)(0, array)
+#endif
+
+// The processor's own estimate of 1/sqrt(a), where the compiler generates x86 code directly and names the instruction.
+#if !REAL_IS_DOUBLE && defined(__has_builtin)
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rsqrt14ps512_mask)
+#define estimate_rsqrt(a) __builtin_ia32_rsqrt14ps512_mask(a, R(0.0), (ushort)(0xffff))
+#elif LANES == 8 && defined(__AVX__) && __has_builtin(__builtin_ia32_rsqrtps256)
+#define estimate_rsqrt(a) __builtin_ia32_rsqrtps256(a)
+#elif LANES == 4 && defined(__SSE__) && __has_builtin(__builtin_ia32_rsqrtps)
+#define estimate_rsqrt(a) __builtin_ia32_rsqrtps(a)
+#endif
 #endif
 
 // Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.

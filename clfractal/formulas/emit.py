@@ -65,6 +65,7 @@ class Emitter:
         owner: distinguishes equal expressions with different parameter values (links of a chain).
         evaluate: the number of a node that is constant in the state.
         prefix: begins the names of this emitter's variables.
+        lets: further names and their expressions, written where they are first used.
         lines: the statements so far.
         origins: of each variable over `real` the function and its operands (of `where` the mask's text first).
     """
@@ -75,6 +76,7 @@ class Emitter:
     owner: object
     evaluate: Callable[[Node], float]
     prefix: str = "t"
+    lets: dict[str, Node] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     origins: dict[str, tuple[str, tuple[Value, ...]]] = field(default_factory=dict)
     _known: dict[tuple[str, ...], Value] = field(default_factory=dict)
@@ -84,9 +86,13 @@ class Emitter:
         if isinstance(node, Number):
             return literal(node.value)
         if isinstance(node, Name):
-            value = self.bindings[node.name]
+            value = self._binding(node.name)
             return value if value.text else self._constant(node, [value])
-        names = {name: self.bindings[name] for name in names_in(node)}
+        if node.function == "where":
+            chosen = self._decided(node.arguments[0])
+            if chosen is not None:
+                return self.emit(node.arguments[1 if chosen else 2])
+        names = {name: self._binding(name) for name in names_in(node)}
         if all(value.kind == "constant" for value in names.values()):
             return self._constant(
                 substitute(node, {n: v.node for n, v in names.items() if v.node}), names.values()
@@ -107,9 +113,19 @@ class Emitter:
             return head
         return self._operation(function, *operands)
 
+    def _binding(self, name: str) -> Value:
+        if name not in self.bindings and name in self.lets:
+            self.bindings[name] = self.emit(self.lets[name])
+        return self.bindings[name]
+
     def combine(self, function: str, *operands: Value) -> Value:
         """One more operation on values that are there already."""
         return self._operation(function, *operands)
+
+    def radicand(self, value: Value) -> Value | None:
+        """x for a value that was computed as sqrt(x), else None."""
+        function, operands = self.origins.get(value.text, ("", ()))
+        return operands[0] if function == "sqrt" else None
 
     # --- operations ---
 
@@ -147,6 +163,11 @@ class Emitter:
         simple = self._simplify(function, a, b)
         if simple is not None:
             return simple
+        if function == "div" and a.number == 1 and b is not None:
+            square = self.radicand(b)
+            if square is not None:
+                # One operation for 1/sqrt(x): shorter to wait for than a root and a division in turn.
+                return self._operation("rsqrt", square)
         if function == "div" and b is not None and b.kind == "constant" and b.number != 0:
             # The host divides once; the kernel multiplies.
             inverse = self._constant(Call("div", (Number(1.0), b.node or Number(1.0))), [literal(1.0), b])
@@ -160,7 +181,9 @@ class Emitter:
         if function in ("sign", "floor"):
             return self._statement("real", "flat", f"real_{function}", self._plain(a))
         if b is None:
-            return self._statement("dual", "varying", f"dual_{function}", a.text)
+            result = self._statement("dual", "varying", f"dual_{function}", a.text)
+            self.origins.setdefault(result.text, (function, operands))
+            return result
         if function == "mul" and a.text == b.text:
             return self._statement("dual", "varying", "dual_square", a.text)
         if function in _LIFTED or len(operands) > 2:
@@ -216,7 +239,12 @@ class Emitter:
         """(x + iy)^n: whole n by complex multiplications, otherwise by modulus and angle."""
         n = exponent.number
         if n is not None and n == math.floor(n) and 0 < abs(n) <= 1024:
-            re, im = self._whole_complex_power(x, y, int(abs(n)))
+            square = self.radicand(y)
+            if square is None:
+                re, im = self._whole_complex_power(x, y, int(abs(n)))
+            else:
+                re, share = self._power_over_root(x, square, int(abs(n)))
+                im = self._operation("mul", share, y)
             if n > 0:
                 return re, im
             two = literal(2.0)
@@ -258,6 +286,22 @@ class Emitter:
             ),
         )
 
+    def _power_over_root(self, x: Value, square: Value, n: int) -> tuple[Value, Value]:
+        """(x + i sqrt(square))^n as (re, s) with imaginary part s * sqrt(square), so that nothing waits for the root."""
+        if n == 1:
+            return x, literal(1.0)
+        do = self._operation
+        re, s = self._power_over_root(x, square, n // 2)
+        squared = do("sub", do("mul", re, re), do("mul", square, do("mul", s, s)))
+        product = do("mul", re, s)
+        doubled = do("add", product, product)
+        if n % 2 == 0:
+            return squared, doubled
+        return (
+            do("sub", do("mul", squared, x), do("mul", square, doubled)),
+            do("add", do("mul", doubled, x), squared),
+        )
+
     # --- conditions ---
 
     def _where(self, node: Call) -> Value:
@@ -277,6 +321,13 @@ class Emitter:
         result = self._statement("real", kind, "real_where", chosen, a.text, b.text)
         self.origins.setdefault(result.text, ("where", (Value(chosen, "flat"), a, b)))
         return result
+
+    def _decided(self, condition: Node) -> bool | None:
+        """The truth of a condition that depends on parameters alone: only the branch taken is written."""
+        names = {name: self._binding(name) for name in names_in(condition)}
+        if any(value.kind != "constant" for value in names.values()):
+            return None
+        return bool(self.evaluate(substitute(condition, {n: v.node for n, v in names.items() if v.node})))
 
     def _condition(self, node: Node) -> str | bool:
         """A condition as the text of a mask, or its truth when it is known now."""
@@ -298,6 +349,9 @@ class Emitter:
             p, q = a.number, b.number
             truths = {"lt": p < q, "le": p <= q, "gt": p > q, "ge": p >= q, "eq": p == q, "ne": p != q}
             return truths[node.function]
+        if b.number == 0 and node.function in ("gt", "eq", "ne"):
+            # sqrt(x) > 0 where x > 0: the root need not be waited for.
+            a = self.radicand(a) or a
         left, right = self._plain(a), self._plain(b)
         if node.function in ("gt", "ge"):
             left, right = right, left

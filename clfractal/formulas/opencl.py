@@ -94,8 +94,7 @@ class _ChainWriter:
         )
 
     def _map(self, emitter: Emitter, bound: BoundFormula) -> list[Value]:
-        for name, node in bound.formula.let:
-            emitter.bindings[name] = emitter.emit(node)
+        emitter.lets = dict(bound.formula.let)
         return [emitter.emit(node) for node in bound.formula.map]
 
     def _full(self, number_type: NumberType, value: Value) -> str:
@@ -198,8 +197,7 @@ class _ChainWriter:
         bound = self.shape_link.bound
         assert bound.formula.shape is not None
         emitter = self._emitter(index, number_type)
-        for name, node in bound.formula.let:
-            emitter.bindings[name] = emitter.emit(node)
+        emitter.lets = dict(bound.formula.let)
         value = self._full(number_type, emitter.emit(bound.formula.shape))
         prefix, state = ("", "state") if number_type == "real" else ("dual_", "dual_state")
         head = f"INLINE {number_type} {prefix}solid_distance({state} z, __constant const scalar *k) {{"

@@ -58,8 +58,10 @@ class Differentiator:
         if function == "abs":
             return do("sign", a)
         if function == "sqrt":
-            half = do("mul", do("div", _ONE, value), _HALF)
-            return self.emitter.choose(f"less(R(0.0), {value.text})", half, literal(0.0))
+            half = do("mul", do("rsqrt", a), _HALF)
+            return self.emitter.choose(f"less(R(0.0), {a.text})", half, literal(0.0))
+        if function == "rsqrt":
+            return do("mul", do("mul", value, literal(-0.5)), do("mul", value, value))
         if function == "exp":
             return value
         if function == "log":

@@ -131,6 +131,11 @@ INLINE dual dual_sqrt(dual a) {
     return dual_chain(root, pick(less(R(0.0), root), R(0.5) / root, R(0.0)), a);
 }
 
+INLINE dual dual_rsqrt(dual a) {
+    const real root = real_rsqrt(a.v);
+    return dual_chain(root, R(-0.5) * root * (root * root), a);
+}
+
 INLINE dual dual_exp(dual a) {
     const real value = exp(a.v);
     return dual_chain(value, value, a);
