@@ -1,0 +1,172 @@
+"""The program as a library."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.files.exr import read_exr
+from clfractal.render.engine import Progress
+from tests.shell import SCENE
+
+
+def test_everything_public_is_there() -> None:
+    for name in dir(clfractal):
+        assert getattr(clfractal, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'rendre'"):
+        clfractal.rendre  # noqa: B018
+
+
+def test_render_is_a_function_and_a_package() -> None:
+    from clfractal.render import film
+
+    assert film.Film is clfractal.Film
+    assert callable(clfractal.render)
+    import clfractal.render.engine as engine
+
+    assert callable(engine.render)
+
+
+def test_a_film_of_arrays() -> None:
+    film = clfractal.render(clfractal.load_scene(SCENE))
+    assert film["R"].shape == film["Z"].shape == (36, 40)
+    assert film["R"].dtype == np.float32
+    covered = film["A"] > 0
+    assert 0.1 < covered.mean() < 0.9
+    # The camera is 3 away from the origin, the set within 1.3 of it; what is missed is infinitely far.
+    assert ((film["Z"] > 1.5) & (film["Z"] < 4.5))[covered].all()
+    assert np.isinf(film["Z"][~covered]).all()
+    assert (film._repr_png_() or b"")[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.parametrize("name", ["a.exr", "a.png"])
+def test_a_picture_renders_itself_again(tmp_path: Path, name: str) -> None:
+    """Samples and number type of the render are in the header, not those of the scene it came from."""
+    first = clfractal.render(SCENE, samples=3, precision="float64", channels=["R", "G", "B", "A", "N.X"])
+    first.save(tmp_path / name)
+    scene = clfractal.load_scene(tmp_path / name)
+    assert scene.renderer.samples == 3
+    assert scene.renderer.precision == "float64"
+    again = clfractal.render(scene)
+    assert again.channels == first.channels
+    for channel in first:
+        np.testing.assert_array_equal(again[channel], first[channel])
+
+
+def test_a_region_is_a_part_of_the_whole(tmp_path: Path) -> None:
+    whole = clfractal.render(SCENE)
+    part = clfractal.render(SCENE, region=(7, 5, 20, 30))
+    assert part["R"].shape == (30, 20)
+    for channel in whole:
+        np.testing.assert_array_equal(part[channel], whole[channel][5:35, 7:27])
+    part.save(tmp_path / "part.exr")
+    header = read_exr(tmp_path / "part.exr")[1]
+    assert header["dataWindow"] == (7, 5, 26, 34)
+    assert header["displayWindow"] == (0, 0, 39, 35)
+
+
+def test_progress_can_end_a_render() -> None:
+    seen: list[int] = []
+
+    def stop(state: Progress) -> None:
+        seen.append(state.tiles_done)
+        raise TimeoutError
+
+    with pytest.raises(TimeoutError):
+        clfractal.render(SCENE, progress=stop)
+    assert len(seen) == 1
+
+
+def test_exposure_and_transparency_reach_the_picture(tmp_path: Path) -> None:
+    dark = clfractal.render(SCENE + "output: {exposure: -2}\nbackground: transparent\n")
+    assert dark.header["exposure"] == -2
+    assert dark.header["transparent"] is True
+    dark.save(tmp_path / "a.png")
+    color_type = (tmp_path / "a.png").read_bytes()[25]
+    assert color_type == 6  # colours and alpha
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"samples": 0}, "--samples: must be from 1"),
+        ({"precision": "float128"}, "unknown precision 'float128'"),
+        ({"channels": ["R", "Q"]}, "unknown channel 'Q'"),
+        ({"region": (0, 0, 41, 1)}, "must lie inside the picture"),
+        ({"device": "nosuch"}, "unknown device 'nosuch'"),
+    ],
+)
+def test_wrong_settings(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(clfractal.ClfractalError, match=message):
+        clfractal.render(SCENE, **settings)  # type: ignore[arg-type]
+
+
+def test_escape_of_points_known_by_hand() -> None:
+    """Power 2 on the z axis is the real quadratic map z -> z^2 + c: -1 and 0.25 stay, 0.5 and 3 leave."""
+    points = np.array([[0, 0, -1.0], [0, 0, 0.25], [0, 0, 0.5], [0, 0, 3.0], [0, 0, 0]])
+    counts, inside = clfractal.escape("mandelbulb", points, iterations=40, parameters={"power": 2}, bailout=2)
+    assert counts.shape == inside.shape == (5,)
+    assert np.issubdtype(counts.dtype, np.integer)
+    assert inside.dtype == np.bool_
+    assert inside.tolist() == [True, True, False, False, True]
+    # 0.5 -> 0.75 -> 1.0625 -> 1.6289 -> 3.1533: the fifth is beyond 2; 3 is at once.
+    assert counts.tolist() == [40, 40, 5, 1, 40]
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_escape_of_a_formula_of_ones_own(tmp_path: Path, precision: str) -> None:
+    formula = {
+        "title": "a cube that grows",
+        "reference": "test",
+        "variables": ["x", "y", "z"],
+        "parameters": {"factor": {"type": "real", "default": 2.0}},
+        "map": ["factor*x", "factor*y", "factor*z"],
+        "add": "none",
+        "degree": 1,
+        "bounds": {"center": [0, 0, 0], "radius": 2},
+        "bailout": 10,
+    }
+    points = np.array([[1.0, 0, 0], [0, 6, 0], [0, 0, 11]])
+    # 1 needs four doublings to exceed 10 (16), 6 one, 11 none.
+    counts, inside = clfractal.escape(formula, points, iterations=20, precision=precision)
+    assert counts.tolist() == [4, 1, 0]
+    assert not inside.any()
+    counts, _ = clfractal.escape(
+        formula, points, iterations=20, precision=precision, parameters={"factor": 4}
+    )
+    assert counts.tolist() == [2, 1, 0]
+    (tmp_path / "cube.yaml").write_text(
+        "title: t\nreference: r\nvariables: [x, y, z]\nmap: [2*x, 2*y, 2*z]\nadd: none\ndegree: 1\n"
+        "bounds: {center: [0, 0, 0], radius: 2}\nbailout: 10\n"
+    )
+    counts, _ = clfractal.escape(tmp_path / "cube.yaml", points, iterations=20, precision=precision)
+    assert counts.tolist() == [4, 1, 0]
+
+
+@pytest.mark.parametrize(
+    ("formula", "settings", "message"),
+    [
+        ("mandelbul", {}, "did you mean 'mandelbulb'"),
+        ("mandelbulb", {"parameters": {"powr": 3}}, "did you mean 'power'"),
+        ("mandelbulb", {"precision": "half"}, "precision must be"),
+        ("mandelbulb", {"iterations": -1}, "iterations must be"),
+        ("mandelbulb", {"iterations": 1.5}, "iterations must be"),
+    ],
+)
+def test_wrong_questions_to_escape(formula: str, settings: dict[str, object], message: str) -> None:
+    with pytest.raises(clfractal.FormulaError, match=message):
+        clfractal.escape(formula, [[0, 0, 0]], **{"iterations": 5, **settings})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("points", [[0, 0, 0], [[0, 0]], np.zeros((2, 3, 1))])
+def test_points_of_a_wrong_shape(points: object) -> None:
+    with pytest.raises(clfractal.FormulaError, match="points must have shape"):
+        clfractal.escape("hast", points, iterations=5)  # type: ignore[arg-type]
+
+
+def test_no_points_are_no_mistake() -> None:
+    counts, inside = clfractal.escape("hast", np.zeros((0, 3)), iterations=5)
+    assert counts.shape == inside.shape == (0,)
