@@ -31,7 +31,7 @@ class Reporter:
 
     def __call__(self, state: Progress) -> None:
         now = time.monotonic()
-        if self._shell.quiet or now < self._next:
+        if self._shell.quiet or now < self._next or state.tiles_done >= state.tiles:
             return
         self._next = now + self._every
         if self._terminal:

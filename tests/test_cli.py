@@ -1,0 +1,237 @@
+"""The commands as users type them: what they write, where, and with which exit status."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.commands.progress import Reporter
+from clfractal.commands.shell import Shell
+from clfractal.files.exr import read_exr
+from clfractal.files.png import read_texts
+from clfractal.formulas import catalog
+from clfractal.render.engine import Progress
+from tests.shell import SCENE, InProcess, command, environment, process
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a scene."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path
+
+
+@pytest.fixture
+def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
+    return InProcess(capsys)
+
+
+def names(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_the_default_output_is_the_scenes_name(here: Path, shell: InProcess) -> None:
+    (here / "deep").mkdir()
+    (here / "deep" / "my.scene.yaml").write_text(SCENE)
+    ended = shell("render", "deep/my.scene.yaml")
+    assert (ended.status, ended.out) == (0, "")
+    assert ended.err.startswith("my.scene.png: ")
+    assert names(here) == {"scene.yaml", "deep", "my.scene.png"}
+
+
+def test_several_outputs_of_one_render(here: Path, shell: InProcess) -> None:
+    ended = shell("render", "scene.yaml", "-o", "a.exr", "-o", "a.png", "--output", "b.EXR", "--quiet")
+    assert (ended.status, ended.out, ended.err) == (0, "", "")
+    assert names(here) == {"scene.yaml", "a.exr", "a.png", "b.EXR"}
+    first, second = (read_exr(here / name)[0] for name in ("a.exr", "b.EXR"))
+    assert all(np.array_equal(first[name], second[name]) for name in first)
+
+
+def test_what_a_picture_tells_of_itself(here: Path, shell: InProcess) -> None:
+    shell("render", "scene.yaml", "-o", "a.exr", "-o", "a.png", "--samples", "2", "--precision", "float64")
+    header = read_exr(here / "a.exr")[1]
+    assert header["clfractalVersion"] == clfractal.__version__
+    assert header["clfractalPrecision"] == "float64"
+    assert header["clfractalDevice"]
+    assert header["clfractalSeconds"] > 0
+    scene = clfractal.load_scene(header["clfractal"])
+    assert (scene.renderer.samples, scene.renderer.precision) == (2, "float64")
+    assert scene == clfractal.load_scene(read_texts(here / "a.png")["clfractal"])
+    # The camera at (0, -3, 0) looks along +y, which is -z of camera space, and the target is in the middle.
+    to_camera, to_ndc = header["worldToCamera"], header["worldToNDC"]
+    np.testing.assert_allclose(np.array([0, 0, 0, 1]) @ to_camera, [0, 0, -3, 1], atol=1e-6)
+    np.testing.assert_allclose(np.array([0, 0, 1, 1]) @ to_camera, [0, 1, -3, 1], atol=1e-6)
+    projected = np.array([0, 0, 0, 1]) @ to_ndc
+    np.testing.assert_allclose(projected[:2] / projected[3], [0.5, 0.5], atol=1e-6)
+
+
+def test_a_picture_is_a_scene(here: Path, shell: InProcess) -> None:
+    shell("render", "scene.yaml", "-o", "a.exr", "--samples", "2", "--size", "30x20")
+    assert shell("render", "a.exr", "-o", "b.exr").status == 0
+    first, second = (read_exr(here / name)[0] for name in ("a.exr", "b.exr"))
+    assert first["R"].shape == (20, 30)
+    assert all(np.array_equal(first[name], second[name]) for name in first)
+
+
+def test_size_keeps_the_camera(here: Path, shell: InProcess) -> None:
+    """Twice the pixels: every second one of the larger picture lies beside one of the smaller."""
+    shell("render", "scene.yaml", "-o", "small.exr", "--size", "40x40")
+    shell("render", "scene.yaml", "-o", "large.exr", "--size", "80x80")
+    small, large = (read_exr(here / name)[0]["A"] for name in ("small.exr", "large.exr"))
+    blocks = large.astype(float).reshape(40, 2, 40, 2).mean(axis=(1, 3))
+    assert np.abs(blocks - small).mean() < 0.05
+
+
+def test_a_region_from_the_shell(here: Path, shell: InProcess) -> None:
+    shell("render", "scene.yaml", "-o", "whole.exr")
+    shell("render", "scene.yaml", "-o", "part.exr", "--region", "3,4,20,10")
+    whole, part = (read_exr(here / name)[0] for name in ("whole.exr", "part.exr"))
+    for name in whole:
+        np.testing.assert_array_equal(part[name], whole[name][4:14, 3:23])
+
+
+def test_statistics(here: Path, shell: InProcess) -> None:
+    assert shell("render", "scene.yaml", "-o", "a.png", "--samples", "3", "--stats", "s.json").status == 0
+    stats = json.loads((here / "s.json").read_text())
+    promised = {"device", "platform", "precision", "lanes", "build_ms", "kernel_ms", "wall_ms", "rays"}
+    promised |= {"iterations", "steps_per_ray", "bad_distances", "peak_memory_mb"}
+    assert promised <= set(stats)
+    assert stats["rays"] == 40 * 36 * 3
+    assert stats["precision"] == "float32"
+    assert stats["kernel_ms"] > 0
+    assert stats["wall_ms"] > 0
+    assert 1 < stats["steps_per_ray"] < 1000
+    assert 10 < stats["peak_memory_mb"] < 10_000
+
+
+def test_check_prints_a_scene_that_loads_again(here: Path, shell: InProcess) -> None:
+    ended = shell("check", "scene.yaml", "--set", "camera.fov=30")
+    assert (ended.status, ended.err) == (0, "")
+    assert clfractal.load_scene(ended.out) == clfractal.load_scene(SCENE.replace("-3, 0]", "-3, 0], fov: 30"))
+
+
+def test_schema_is_json(shell: InProcess) -> None:
+    ended = shell("schema")
+    assert ended.status == 0
+    schema = json.loads(ended.out)
+    assert set(schema["required"]) == {"version", "formula", "camera"}
+
+
+def test_formulas_lists_the_library(shell: InProcess) -> None:
+    listed = [line.split()[0] for line in shell("formulas").out.splitlines()]
+    assert listed == list(catalog.names())
+
+
+@pytest.mark.parametrize("name", catalog.names())
+def test_each_formula_tells_about_itself(shell: InProcess, name: str) -> None:
+    ended = shell("formulas", name)
+    assert ended.status == 0
+    assert ended.out.startswith(f"{name}: ")
+    for parameter in [] if catalog.is_chain(name) else catalog.load(name).parameters:
+        assert f"  {parameter.name}: " in ended.out
+
+
+def test_an_unknown_formula(shell: InProcess) -> None:
+    assert shell("formulas", "mandelbx").is_one_line(2, "did you mean 'mandelbox'?")
+
+
+def test_devices(shell: InProcess) -> None:
+    ended = shell("devices")
+    assert ended.status == 0
+    head, *rows = ended.out.splitlines()
+    assert head.split() == ["index", "name", "platform", "memory", "float64", "GL", "lanes", "speed"]
+    assert len(rows) == len(clfractal.devices())
+    assert sum(row.startswith("*") for row in rows) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        ([], "Missing command"),
+        (["rendr"], "rendr"),
+        (["render"], "SCENE"),
+        (["render", "a.yaml", "b.yaml"], "b.yaml"),
+        (["formulas", "hast", "tetrabrot"], "tetrabrot"),
+        (["--nonsense"], "--nonsense"),
+    ],
+)
+def test_usage_errors_are_one_line(shell: InProcess, arguments: list[str], part: str) -> None:
+    assert shell(*arguments).is_one_line(2, "clfractal", part, "--help")
+
+
+def test_help_and_version(shell: InProcess) -> None:
+    assert shell("--version").out == f"clfractal {clfractal.__version__}\n"
+    whole = shell("--help")
+    for name in ("render", "check", "devices", "formulas", "schema", "bench"):
+        assert f"  {name} " in whole.out
+    told = shell("render", "--help").out
+    options = ["-o", "--device", "--precision", "--size", "--set", "--region", "--samples", "--resume"]
+    for option in [*options, "--quiet", "--verbose", "--stats"]:
+        assert option in told
+
+
+def test_a_reader_that_has_seen_enough(here: Path) -> None:
+    """As in `clfractal schema | head -1`: no message, no traceback."""
+    running = subprocess.Popen(
+        command("schema"), cwd=here, env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert running.stdout is not None
+    running.stdout.close()
+    assert running.stderr is not None
+    assert running.stderr.read() == b""
+    assert running.wait() == 0
+
+
+def test_plain_lines_come_at_most_every_two_seconds(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    reporter = Reporter(Shell(owns_process=False), 1000)
+    state = Progress(1000)
+    for tick in range(1000):
+        now[0] += 0.01  # ten seconds in all
+        state.tiles_done, state.rays = tick, 1000 * tick
+        reporter(state)
+    lines = capsys.readouterr().err.splitlines()
+    assert 4 <= len(lines) <= 5
+    assert all("Mrays/s" in line and "left" in line for line in lines)
+
+
+def test_a_bar_on_a_terminal(here: Path) -> None:
+    """A long render on a terminal shows rays per second and the time left, and leaves one last line."""
+    ours, theirs = pty.openpty()
+    options = ["--samples", "400", "--size", "128x128", "--set", "formula.iterations=50"]
+    running = subprocess.Popen(
+        command("render", "scene.yaml", "-o", "a.png", *options),
+        cwd=here,
+        env=environment({"TERM": "xterm", "COLUMNS": "120"}),
+        stderr=theirs,
+    )
+    os.close(theirs)
+    told = b""
+    try:
+        while chunk := os.read(ours, 4096):
+            told += chunk
+    except OSError:  # the other end is closed
+        pass
+    os.close(ours)
+    assert running.wait() == 0
+    assert b"Mrays/s" in told
+    assert b" left" in told
+    assert b"a.png: " in told.splitlines()[-1]
+
+
+def test_python_dash_m(here: Path) -> None:
+    ended = process(["render", "scene.yaml", "--quiet"], here)
+    assert (ended.status, ended.out, ended.err) == (0, "", "")
+    assert names(here) == {"scene.yaml", "scene.png"}
