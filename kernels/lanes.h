@@ -47,7 +47,7 @@ typedef JOIN(float, LANES) real;
 typedef JOIN(int, LANES) mask;
 #endif
 // PoCL's `any` tests lane after lane; a reduction becomes one or two instructions.
-#if defined(__has_builtin)
+#if defined(__has_builtin) && !defined(INTERPRETED)
 #if __has_builtin(__builtin_reduce_or)
 #define any_lane(m) (__builtin_reduce_or(m) != 0)
 #endif
@@ -68,7 +68,7 @@ typedef JOIN(int, LANES) mask;
 #endif
 
 // The processor's own estimate of 1/sqrt(a), where the compiler generates x86 code directly and names the instruction.
-#if !REAL_IS_DOUBLE && defined(__has_builtin)
+#if !REAL_IS_DOUBLE && defined(__has_builtin) && !defined(INTERPRETED)
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rsqrt14ps512_mask)
 #define estimate_rsqrt(a) __builtin_ia32_rsqrt14ps512_mask(a, R(0.0), (ushort)(0xffff))
 #elif LANES == 8 && defined(__AVX__) && __has_builtin(__builtin_ia32_rsqrtps256)
@@ -79,8 +79,10 @@ typedef JOIN(int, LANES) mask;
 #endif
 
 // Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.
-// (Where the driver cannot, it is defined before: see `cannot_run_optimised_code` in clfractal/device/select.py.)
-#ifndef INLINE
+// (INTERPRETED is defined for a driver that cannot: see `cannot_run_optimised_code` in clfractal/device/select.py.)
+#ifdef INTERPRETED
+#define INLINE static inline
+#else
 #define INLINE static inline __attribute__((always_inline))
 #endif
 

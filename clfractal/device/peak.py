@@ -6,13 +6,13 @@ import numpy as np
 import pyopencl as cl
 
 from clfractal.device.program import Program, build, math_flags
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device, has_float64, is_simulator
 from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 
 _CHAINS = (4, 8, 12)  # enough independent ones hide the latency of an FMA (4 cycles, two units: 8)
 _WIDTHS = (1, 8, 16)
-_STEPS = 2000
+_STEPS, _STEPS_SIMULATED = 2000, 4
 _LAUNCHES = 4
 
 # The multiplier is below 1 and unknown to the compiler, so that no chain overflows, fades out or folds away.
@@ -41,16 +41,19 @@ def fma_peak(device: Device, precision: Precision) -> float:
     if precision == "float64" and not has_float64(device.info):
         raise DeviceError(f"{device.info.name} has no float64", status=STATUS_BAD_INPUT)
     names = {f"w{width}c{chains}": (width, chains) for width in _WIDTHS for chains in _CHAINS}
+    steps = _STEPS_SIMULATED if is_simulator(device.info) else _STEPS
     texts = [
-        _text(precision, width, chains).replace("void chains", f"void {name}")
+        _text(precision, width, chains, steps).replace("void chains", f"void {name}")
         for name, (width, chains) in names.items()
     ]
     enable = "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n" if precision == "float64" else ""
     program = build(device, enable + "\n".join(texts), flags=math_flags(precision))
-    return max(_rate(program, precision, name, *shape) for name, shape in names.items())
+    return max(
+        _rate(program, precision, name, width * chains * steps) for name, (width, chains) in names.items()
+    )
 
 
-def _text(precision: Precision, width: int, chains: int) -> str:
+def _text(precision: Precision, width: int, chains: int, steps: int) -> str:
     real = "double" if precision == "float64" else "float"
     vector = real if width == 1 else f"{real}{width}"
     names = [f"x{index}" for index in range(chains)]
@@ -58,7 +61,7 @@ def _text(precision: Precision, width: int, chains: int) -> str:
     return _KERNEL.format(
         real=real,
         vector=vector,
-        steps=_STEPS,
+        steps=steps,
         declarations=", ".join(
             f"{name} = a + ({real})({index} + get_global_id(0))" for index, name in enumerate(names)
         ),
@@ -68,11 +71,13 @@ def _text(precision: Precision, width: int, chains: int) -> str:
     )
 
 
-def _rate(program: Program, precision: Precision, name: str, width: int, chains: int) -> float:
+def _rate(program: Program, precision: Precision, name: str, fmas_per_item: int) -> float:
     device = program.device
     # Enough work-items to fill a GPU and to outlast the cost of a launch on a CPU.
     local = 64 if device.info.kind == "gpu" else 1
     items = device.info.compute_units * (2048 if device.info.kind == "gpu" else 64)
+    if is_simulator(device.info):
+        items = 1
     dtype = np.dtype(precision)
     out = device.buffer(items * dtype.itemsize, "the measurement of the peak")
     kernel = program.kernel(name)
@@ -83,4 +88,4 @@ def _rate(program: Program, precision: Precision, name: str, width: int, chains:
             event = cl.enqueue_nd_range_kernel(device.queue, kernel, (items,), (local,))
             event.wait()
             fastest = min(fastest, event.profile.end - event.profile.start)
-    return 2.0 * width * chains * _STEPS * items / max(fastest, 1.0)
+    return 2.0 * fmas_per_item * items / max(fastest, 1.0)

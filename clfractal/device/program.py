@@ -82,7 +82,7 @@ def build(
     """
     start = time.perf_counter()
     if cannot_run_optimised_code(device.info):
-        text, flags = "#define INLINE static inline\n" + text, [*flags, "-cl-opt-disable"]
+        text, flags = "#define INTERPRETED\n" + text, [*flags, "-cl-opt-disable"]
     key = _key(device, text, flags, warm)
     binary = cache.load_blob(key)
     if binary is not None:

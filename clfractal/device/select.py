@@ -179,10 +179,11 @@ def is_intel_cpu(info: DeviceInfo) -> bool:
 
 
 def cannot_run_optimised_code(info: DeviceInfo) -> bool:
-    """Oclgrind's interpreter lacks intrinsics that its own compiler's optimiser and forced inlining make.
+    """Oclgrind's interpreter lacks intrinsics that its own compiler makes; kernels are told by INTERPRETED.
 
-    Then a kernel cannot be created: "Undefined external function: llvm.bitreverse.i32" (for shuffled bits) or
-    "llvm.experimental.noalias.scope.decl" (for `always_inline` without optimisation), Oclgrind 21.10.
+    Then a kernel cannot be created (Oclgrind 21.10): "Undefined external function: llvm.bitreverse.i32" (the
+    optimiser, for shuffled bits), "llvm.experimental.noalias.scope.decl" (`always_inline` without
+    optimisation), "llvm.vector.reduce.or.v4i32" (a reduction).
     """
     return is_simulator(info)
 

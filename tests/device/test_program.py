@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from clfractal.device import compiler
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.program import Program, build, math_flags
-from clfractal.device.select import Device
+from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
 from clfractal.errors import DeviceError, KernelBuildError
 
@@ -46,6 +47,20 @@ def test_built_then_found(device: Device, empty_cache: Path, isolated: bool, war
     assert second.cached
     assert _triples(second)
     assert second.build_ms >= 0
+
+
+def test_a_first_launch_puts_machine_code_into_the_binary(device: Device, empty_cache: Path) -> None:
+    """PoCL generates it for a local size; other drivers have it from the start."""
+    text = f"__constant long unique = {time.time_ns()};\n" + _TRIPLE  # new to PoCL's own cache too
+    cold = compiler.binary_of(build(device, text, flags=_FLAGS, isolated=False).cl_program)
+    program = build(device, text, flags=_FLAGS, warm=_WARM)
+    warm = compiler.binary_of(program.cl_program)
+    if not is_pocl(device.info):
+        assert len(warm) >= len(cold) > 0
+        return
+    assert len(warm) > len(cold) > 0
+    assert _triples(program)
+    assert len(compiler.binary_of(program.cl_program)) == len(warm), "a launch like the first adds none"
 
 
 def test_text_flags_and_launch_are_the_key(device: Device, empty_cache: Path) -> None:

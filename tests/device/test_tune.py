@@ -135,6 +135,4 @@ def test_a_device_without_float64_says_so(
 
 def test_the_peak_is_a_rate(device: Device) -> None:
     """No timing is tested, only that the chains are not folded away: that would give millions of GFLOP/s."""
-    if select.is_simulator(device.info):
-        return
-    assert 0.1 < fma_peak(device, "float32") < 1e6
+    assert 1e-6 < fma_peak(device, "float32") < 1e6
