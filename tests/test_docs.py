@@ -1,0 +1,91 @@
+"""The code in README.md and docs/ is executed.
+
+By the word behind the fence: `sh` is run by a shell, with `clfractal` the program under test and `scenes/` in
+the current folder; `python` is run, the blocks of a page one after another; `yaml` with `version:` is loaded as a
+scene, with `map:` as a formula. What is not meant to be executed here (installing, measuring) is `console`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import clfractal
+from clfractal.formulas import catalog
+from clfractal.resources import folder
+from tests.shell import environment
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+KNOWN = {"sh", "python", "yaml", "console", "text", "json", "c", ""}
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """The page's blocks of code in a language."""
+    return [text for word, text in FENCE.findall(page.read_text(encoding="utf-8")) if word == language]
+
+
+def name(page: Path) -> str:
+    return page.name
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Path:
+    """A folder to work in: the scenes, and a `clfractal` on the path of `shell_environment`."""
+    (tmp_path / "scenes").symlink_to(folder("scenes"))
+    tool = tmp_path / "bin" / "clfractal"
+    tool.parent.mkdir()
+    tool.write_text(f'#!/bin/sh\nexec "{sys.executable}" -P -m clfractal "$@"\n')
+    tool.chmod(tool.stat().st_mode | stat.S_IXUSR)
+    return tmp_path
+
+
+def shell_environment(desk: Path) -> dict[str, str]:
+    return environment({"PATH": f"{desk / 'bin'}{os.pathsep}{os.environ['PATH']}"})
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_block_says_what_it_is(page: Path) -> None:
+    words = {word for word, _ in FENCE.findall(page.read_text(encoding="utf-8"))}
+    assert words <= KNOWN
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "sh")], ids=name)
+def test_shell_code(page: Path, desk: Path) -> None:
+    for text in blocks(page, "sh"):
+        ended = subprocess.run(
+            ["sh", "-eu", "-c", text], cwd=desk, env=shell_environment(desk), capture_output=True, text=True
+        )
+        assert ended.returncode == 0, f"{text}\n{ended.stderr[-2000:]}"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
+def test_python_code(page: Path, desk: Path) -> None:
+    text = "\n".join(blocks(page, "python"))
+    ended = subprocess.run(
+        [sys.executable, "-P", "-c", text], cwd=desk, env=environment(), capture_output=True, text=True
+    )
+    assert ended.returncode == 0, f"{text}\n{ended.stderr[-2000:]}"
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "yaml")], ids=name)
+def test_scenes_and_formulas(page: Path, desk: Path) -> None:
+    for text in blocks(page, "yaml"):
+        if "version:" in text:
+            assert clfractal.load_scene(text + "\n").version == 1
+        else:
+            (desk / "formula.yaml").write_text(text)
+            assert catalog.load_file(desk / "formula.yaml").map
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#:]+?)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        assert (page.parent / target).exists(), target
