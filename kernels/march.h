@@ -15,7 +15,6 @@ typedef struct {
 #define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
 #define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there
 #define PROOF_REACH R(1.0)       // of the pixel's cone: how far from the ray the descent may lead
-#define PROOF_CREEP R(0.25)      // of the pixel's cone: the least step
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
 
 // Marches the active lanes. `refine` (the same for all lanes) narrows a step that ended inside down to the surface;
@@ -34,7 +33,6 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
     vec probe_downhill = r.direction;
     real probe_radius = R(0.0);
     real probes = R(0.0), factor = PROOF_FACTOR;
-    real threshold = (real)(REAL_LARGEST);   // after a failed proof another needs a distance half as large
 #endif
     for (int i = 0; i < settings->max_steps; ++i) {
         if (!any_lane(active)) break;
@@ -69,8 +67,6 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
         found.t = pick(arrived, t, found.t);
         active &= ~arrived;
         t = pick(failed, t + PROOF_ONWARD * cone, t);
-        threshold = pick(failed, fmax(R(0.5) * radius_before, PROOF_ARRIVED * cone),
-                         pick(less(cone, radius) & ~proving, (real)(REAL_LARGEST), threshold));
         proving &= ~(arrived | failed);
         const mask marching = active & ~proving & ~failed;
         const vec downhill = vec_scale(vec_normalize(surface.gradient), R(-1.0));
@@ -91,11 +87,7 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
 
         // The pixel's cone touches the solid, or the crossing is narrowed down.
         const mask bracketed = marching & less(high, (real)(REAL_LARGEST));
-#if HAS_DERIVATIVE
         const mask touched = outside & less(radius, cone);
-#else
-        const mask touched = outside & less(radius, fmin(cone, threshold));
-#endif
         const mask narrow = refine ? bracketed & less(high - low, R(0.0625) * cone) : inside;
 #if HAS_DERIVATIVE
         const mask done = touched | narrow;
@@ -112,11 +104,7 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
         found.t = pick(done, low, found.t);
         active &= ~done;
 
-#if HAS_DERIVATIVE
         const real step = radius * relaxation;
-#else
-        const real step = fmax(radius * relaxation, PROOF_CREEP * cone);
-#endif
         const real onward = pick(overshot, low + radius_before, t + step);
 #if !HAS_DERIVATIVE
         relaxation = pick(failed, R(1.0), relaxation);
