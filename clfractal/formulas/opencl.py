@@ -140,10 +140,11 @@ class _ChainWriter:
             f"INLINE {state} {number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
         )
         if bound.repeat == 1:
-            texts = self._add_constant(index, number_type, emitter, mapped)
-            return _function(
-                head, emitter.lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;"
-            )
+            # A map written by its Jacobian is made of real statements; what is added to it is not.
+            adder = self._adder(index, number_type) if emitter.number_type != number_type else emitter
+            texts = self._add_constant(index, number_type, adder, mapped)
+            lines = emitter.lines if adder is emitter else [*emitter.lines, *adder.lines]
+            return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
         # The map several times, then the constant: `next` names what one pass of the map gives.
         passes = [
             f"for (int pass = 0; pass < {bound.repeat}; ++pass) {{",
@@ -152,10 +153,16 @@ class _ChainWriter:
         inner = ", ".join(self._full(number_type, value) for value in mapped)
         passes += [f"    const {state} next = {{{inner}}};", "    z = next;", "}"]
         plain = [Value(f"z.s{i}", "varying") for i in range(self.size)]
-        adder = Emitter(number_type, {}, self.constants, index, _evaluator(bound), prefix="u")
+        adder = self._adder(index, number_type)
         texts = self._add_constant(index, number_type, adder, plain)
         lines = [*passes, *adder.lines]
         return _function(head, lines, f"const {state} sum = {{{', '.join(texts)}}};\n    return sum;")
+
+    def _adder(self, index: int, number_type: NumberType) -> Emitter:
+        """Writes statements after those of the map."""
+        return Emitter(
+            number_type, {}, self.constants, index, _evaluator(self.links[index].bound), prefix="u"
+        )
 
     def _by_local_jacobian(self, index: int) -> tuple[Emitter, list[str]]:
         """The map over dual numbers by its own Jacobian: real statements, and a dual expression for each component."""
@@ -175,7 +182,9 @@ class _ChainWriter:
                     terms += [partial.text, f"z.s{j}"]
             count = len(terms) // 2
             chain = "dual_chain" if count == 1 else f"dual_chain{count}"
-            rows.append(f"{chain}({', '.join([value.text, *terms])})" if terms else f"dual_constant({value.text})")
+            rows.append(
+                f"{chain}({', '.join([value.text, *terms])})" if terms else f"dual_constant({value.text})"
+            )
         return emitter, rows
 
     def _apply_derivative(self, index: int) -> str:
