@@ -1,8 +1,9 @@
 """The code in README.md and docs/ is executed.
 
-By the word behind the fence: `sh` is run by a shell, with `clfractal` the program under test and `scenes/` in
-the current folder; `python` is run, the blocks of a page one after another; `yaml` with `version:` is loaded as a
-scene, with `map:` as a formula. What is not meant to be executed here (installing, measuring) is `console`.
+By the word behind the fence: `sh` is run by a shell, with `clfractal` the program under test and `scenes/`
+in the current folder; `python` is run, the blocks of a page one after another; `yaml` with `version:` is
+loaded as a scene, with `map:` as a formula. What is not meant to be executed here (installing, measuring) is
+`console`.
 """
 
 from __future__ import annotations
