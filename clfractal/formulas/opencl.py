@@ -6,6 +6,7 @@ values of the kernel argument `k`, so that dragging a parameter recompiles nothi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -43,6 +44,21 @@ def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap =
     A map that uses the point (`point_x`) is always written operation by operation.
     """
     return _ChainWriter(chain, scalar_rule, dual_map).write()
+
+
+def operations_per_application(chain: Chain) -> float:
+    """Arithmetic operations of one application as rays march by it, averaged over the chain's cycle.
+
+    A fused multiply-add counts as two, a root or a division as one; comparisons and selections do not count.
+    """
+    formula = write_formula(chain)
+    prefix = "derivative_apply_" if formula.has_derivative else "dual_apply_"
+    total = 0.0
+    for index, link in enumerate(chain.links):
+        body = formula.text.partition(f"{prefix}{index}(")[2].partition("\n}")[0]
+        calls = re.findall(r"\b((?:real|dual)_\w+)\(", body)
+        total += link.count * link.bound.repeat * sum(_OPERATIONS.get(call, 1) for call in calls)
+    return total / chain.cycle_length
 
 
 class _ChainWriter:
@@ -272,6 +288,17 @@ _COSTS = {
     "real_div_dual": 20, "real_sub_dual": 4, "dual_sqrt": 22, "dual_rsqrt": 14, "dual_abs": 6, "dual_min": 5, "dual_max": 5,
     "dual_clamp": 10, "dual_exp": 28, "dual_log": 37, "dual_sin": 63, "dual_cos": 63, "dual_tan": 45, "dual_asin": 53,
     "dual_acos": 53, "dual_atan": 41, "dual_atan2": 62, "dual_mod": 18, "dual_pow": 150, "dual_pow_real": 123,
+}  # fmt: skip
+
+
+# Arithmetic of the dual operations that are more than one; what only selects is none.
+_OPERATIONS = {
+    "real_where": 0, "real_sign": 0, "real_abs": 0, "real_min": 0, "real_max": 0, "real_clamp": 0, "dual_where": 0,
+    "dual_constant": 0, "dual_min": 0, "dual_max": 0, "dual_clamp": 0, "dual_abs": 3,
+    "dual_add": 4, "dual_sub": 4, "dual_neg": 4, "dual_mul": 10, "dual_square": 5, "dual_mul_real": 4,
+    "dual_add_coordinate_x": 2, "dual_add_coordinate_y": 2, "dual_add_coordinate_z": 2,
+    "dual_chain": 3, "dual_chain2": 9, "dual_chain3": 15, "dual_chain4": 21, "dual_div": 12, "real_div_dual": 5,
+    "dual_sqrt": 5, "dual_rsqrt": 6,
 }  # fmt: skip
 
 

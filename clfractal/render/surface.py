@@ -93,6 +93,9 @@ class SurfaceWorker:
         self.corners = [device.buffer(capacity * 8, "tile corners", read_only=True) for _ in range(2)]
         self.constants = [self._upload(record) for record in records]
         self.kernels = [self._kernel(slot) for slot in range(2)]
+        # Transfers have a queue of their own: in the kernels' queue they would wait for the batch before or after.
+        with device.failures("opening a queue"):
+            self.transfers = cl.CommandQueue(device.context)
 
     def start(self, tiles: npt.NDArray[np.int32], packets: tuple[int, int] | None = None, *, slot: int = 0) -> Batch:
         """Enqueues tiles (indices in the plan's grid); `packets` (first, count) renders a part of each."""
@@ -102,7 +105,7 @@ class SurfaceWorker:
         corners = np.stack([grid.first_column + columns, grid.first_row + rows], axis=1).astype(np.int32) * TILE
         with self.device.failures("rendering"):
             queue = self.device.queue
-            cl.enqueue_copy(queue, self.corners[slot], np.ascontiguousarray(corners))
+            cl.enqueue_copy(self.transfers, self.corners[slot], np.ascontiguousarray(corners))
             self.kernels[slot].set_arg(len(self.constants) + 4, np.int32(first))
             event = cl.enqueue_nd_range_kernel(
                 queue, self.kernels[slot], (count, len(tiles)), (self.group, 1)
@@ -116,8 +119,8 @@ class SurfaceWorker:
         film = np.empty(shape, np.float32)
         statistics = np.empty((len(batch.tiles), self.packets, 4), np.uint32)
         with self.device.failures("reading the film"):
-            cl.enqueue_copy(self.device.queue, statistics, self.statistics[batch.slot])
-            cl.enqueue_copy(self.device.queue, film, self.films[batch.slot])
+            cl.enqueue_copy(self.transfers, statistics, self.statistics[batch.slot])
+            cl.enqueue_copy(self.transfers, film, self.films[batch.slot])
         first, count = batch.packets
         used = statistics[:, first : first + count].astype(np.uint64)
         return film, used.sum(axis=(0, 1), dtype=np.uint64)

@@ -1,0 +1,157 @@
+"""The speed table of a device: the rows of the project's promise, measured as medians in one session."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from clfractal.commands.shell import Shell
+from clfractal.device.peak import fma_peak
+from clfractal.device.select import Device, choose
+from clfractal.errors import DeviceError
+from clfractal.files.atomic import atomic_writer
+from clfractal.formulas.opencl import operations_per_application
+from clfractal.job import Job, prepare
+from clfractal.render import engine
+from clfractal.render.film import Film
+from clfractal.scene.load import load_scene
+
+REPETITIONS = 7
+SHELL_REPETITIONS = 5
+
+# Row 1: what fills most of a megapixel with the Mandelbulb, one directional light with a hard shadow.
+MANDELBULB = """\
+version: 1
+formula: {name: mandelbulb, parameters: {power: 8}, iterations: 250}
+image: {width: 1000, height: 1000}
+camera: {position: [0, -3, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 53.13}
+lights: [{direction: [0.5, 0.6, -0.62], shadow: true}]
+"""
+# Row 2: the thesis's own fractal by its Jacobian, with a hard shadow.
+HAST = """\
+version: 1
+formula: {name: hast, parameters: {power: 2}, iterations: 40}
+image: {width: 1000, height: 1000}
+camera: {position: [-0.8, 2.2, 3.0], target: [-0.5, 0, 0], up: [0, 1, 0], fov: 53.13}
+renderer: {bounds: {center: [-0.3, 0, 0], radius: 2}}
+lights: [{direction: [-0.4, -0.5, -0.77], shadow: true}]
+"""
+ROWS = {"mandelbulb8-shadow": MANDELBULB, "hast2-shadow": HAST}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table. Times in milliseconds, medians; `ms` is the device's own time where there is one."""
+
+    name: str
+    ms: float
+    wall_ms: float
+    rays_per_s: float | None = None
+    iterations_per_s: float | None = None
+    steps_per_ray: float | None = None
+    fma_share: float | None = None
+    lanes: int | None = None
+
+
+def run(*, device: str | None, json_file: Path | None, shell: Shell) -> None:
+    """Measures every row, prints the table, and writes JSON if a file is named.
+
+    Raises:
+        DeviceError: there is no device, or it failed.
+        FileError: the file cannot be written.
+    """
+    chosen = choose(device)
+    shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
+    peak = fma_peak(chosen, "float32")
+    rows = [_render_row(name, text, chosen, peak) for name, text in ROWS.items()]
+    rows.append(_shell_row(chosen))
+    report = {
+        "device": chosen.info.name,
+        "platform": f"{chosen.info.platform}, {chosen.info.version}",
+        "peak_gflops_float32": round(peak, 1),
+        "rows": [asdict(row) for row in rows],
+    }
+    for line in table(report):
+        shell.print(line)
+    if json_file is not None:
+        with atomic_writer(json_file) as beside:
+            beside.write_text(json.dumps(report, indent=1) + "\n")
+
+
+def table(report: Mapping[str, Any]) -> list[str]:
+    """The report as lines of text."""
+    lines = [
+        f"{report['device']}; {report['platform']}; FMA peak {report['peak_gflops_float32']:.0f} GFLOP/s",
+        f"{'row':20} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'of peak':>8} {'lanes':>5}",
+    ]
+    for row in report["rows"]:
+        cells = [
+            _cell(row["rays_per_s"], 8, 2, 1e-6),
+            _cell(row["iterations_per_s"], 8, 1, 1e-6),
+            _cell(row["steps_per_ray"], 9, 2),
+            _cell(row["fma_share"], 7, 1, 100.0, "%"),
+            _cell(row["lanes"], 5, 0),
+        ]
+        lines.append(f"{row['name']:20} {row['ms']:8.1f} {row['wall_ms']:8.1f} " + " ".join(cells))
+    return lines
+
+
+def _cell(value: float | None, width: int, digits: int, factor: float = 1.0, unit: str = "") -> str:
+    if value is None:
+        return "-".rjust(width + len(unit))
+    return f"{value * factor:{width}.{digits}f}{unit}"
+
+
+def _render_row(name: str, text: str, device: Device, peak: float) -> Row:
+    """One scene, rendered into memory again and again; the first time builds the program and does not count."""
+    job = prepare(load_scene(text), device, precision="float32")
+    _once(job)
+    results = [_once(job) for _ in range(REPETITIONS)]
+    state = results[0][1]
+    kernel_ms = statistics.median(state.kernel_ms for _, state in results)
+    operations = state.iterations * operations_per_application(job.scene.chain)
+    return Row(
+        name,
+        ms=kernel_ms,
+        wall_ms=1e3 * statistics.median(seconds for seconds, _ in results),
+        rays_per_s=1e3 * state.rays / kernel_ms,
+        iterations_per_s=1e3 * state.iterations / kernel_ms,
+        steps_per_ray=state.steps_per_ray,
+        fma_share=operations / (1e-3 * kernel_ms) / (1e9 * peak),
+        lanes=job.plan.lanes,
+    )
+
+
+def _once(job: Job) -> tuple[float, engine.Progress]:
+    size = (job.scene.image.width, job.scene.image.height)
+    film = Film(job.plan.channels, size, job.plan.region)
+    start = time.perf_counter()
+    state = engine.render(job.scene, job.plan, job.device, film)
+    return time.perf_counter() - start, state
+
+
+def _shell_row(device: Device) -> Row:
+    """From the shell's command to the finished PNG of row 1, caches warm: a new process each time."""
+    environment = {**os.environ, "CLFRACTAL_DEVICE": device.info.index}
+    with tempfile.TemporaryDirectory(prefix="clfractal-bench-") as folder:
+        scene, picture = Path(folder, "scene.yaml"), Path(folder, "picture.png")
+        scene.write_text(MANDELBULB)
+        command = [sys.executable, "-m", "clfractal", "render", str(scene), "-o", str(picture), "--quiet"]
+        times = []
+        for _ in range(SHELL_REPETITIONS + 1):
+            start = time.perf_counter()
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+            times.append(1e3 * (time.perf_counter() - start))
+            if done.returncode != 0:
+                raise DeviceError(f"the shell's row failed: {done.stderr.strip()}")
+    median = statistics.median(times[1:])
+    return Row("shell-to-png", ms=median, wall_ms=median)
