@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,9 @@ Floats = npt.NDArray[np.float64]
 
 # Points of one launch: bounds the device memory, and how long a launch may run.
 LAUNCH_POINTS = 1 << 18
+
+# Points of a work-group. Fixed, because PoCL compiles a kernel anew for every size of work-group.
+GROUP_POINTS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,15 +112,15 @@ def _run(
         fixed = [_upload(device, orbit), _upload(device, constants)]
         for start in range(0, len(array), LAUNCH_POINTS):
             part = array[start : start + LAUNCH_POINTS]
-            count = -(-len(part) // lanes) * lanes
+            count = -(-len(part) // GROUP_POINTS) * GROUP_POINTS
             padded = np.zeros((3, count), precision)
             padded[:, : len(part)] = part.T
             out = np.empty((planes, count), precision)
             buffer = device.buffer(out.nbytes, "results")
             # A kernel keeps no reference to its arguments: `arguments` must outlive the launch.
-            arguments = [_upload(device, padded), buffer, np.int32(count), *fixed]
+            arguments: list[Any] = [_upload(device, padded), buffer, np.int32(count), *fixed]
             kernel.set_args(*arguments)
-            cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), None)
+            cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (GROUP_POINTS // lanes,))
             cl.enqueue_copy(device.queue, out, buffer)
             result[:, start : start + len(part)] = out[:, : len(part)]
     return result
