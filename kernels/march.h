@@ -15,6 +15,9 @@ typedef struct {
 #define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
 #define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there
 #define PROOF_REACH R(1.0)       // of the pixel's cone: how far from the ray the descent may lead
+#define PROOF_CREEP R(0.25)      // of the pixel's cone: the least step
+#define PROOF_APART R(1.0)       // of the pixel's cone: how far apart two proofs are, unless ...
+#define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
 
 // Marches the active lanes. `refine` (the same for all lanes) narrows a step that ended inside down to the surface;
@@ -33,6 +36,7 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
     vec probe_downhill = r.direction;
     real probe_radius = R(0.0);
     real probes = R(0.0), factor = PROOF_FACTOR;
+    real retry_t = R(0.0), retry_radius = R(0.0);   // the next proof is due from this t on, or below this distance
 #endif
     for (int i = 0; i < settings->max_steps; ++i) {
         if (!any_lane(active)) break;
@@ -66,6 +70,8 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
         found.hit |= arrived;
         found.t = pick(arrived, t, found.t);
         active &= ~arrived;
+        retry_t = pick(failed, t + PROOF_APART * cone, retry_t);
+        retry_radius = pick(failed, PROOF_CLOSER * radius_before, retry_radius);
         t = pick(failed, t + PROOF_ONWARD * cone, t);
         proving &= ~(arrived | failed);
         const mask marching = active & ~proving & ~failed;
@@ -87,7 +93,11 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
 
         // The pixel's cone touches the solid, or the crossing is narrowed down.
         const mask bracketed = marching & less(high, (real)(REAL_LARGEST));
+#if HAS_DERIVATIVE
         const mask touched = outside & less(radius, cone);
+#else
+        const mask touched = outside & less(radius, cone) & (less_equal(retry_t, t) | less(radius, retry_radius));
+#endif
         const mask narrow = refine ? bracketed & less(high - low, R(0.0625) * cone) : inside;
 #if HAS_DERIVATIVE
         const mask done = touched | narrow;
@@ -104,7 +114,11 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
         found.t = pick(done, low, found.t);
         active &= ~done;
 
+#if HAS_DERIVATIVE
         const real step = radius * relaxation;
+#else
+        const real step = fmax(radius * relaxation, PROOF_CREEP * cone);
+#endif
         const real onward = pick(overshot, low + radius_before, t + step);
 #if !HAS_DERIVATIVE
         relaxation = pick(failed, R(1.0), relaxation);
