@@ -1,0 +1,91 @@
+"""Small pictures of the scenes, and the golden ones that tests compare them with.
+
+    python -m tests.pictures            writes tests/golden/*.png anew
+    python -m tests.pictures mandelbox  only this one
+
+Golden pictures belong to a checkout: run it there, look at what changed, commit.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from clfractal import resources
+from clfractal.api import load_scene, render
+from clfractal.render.film import Film
+from clfractal.scene.model import Scene
+
+WIDTH, HEIGHT = 96, 54
+GOLDEN = Path(__file__).parent / "golden"
+FAILURES = Path("test-failures")
+
+Picture = npt.NDArray[np.uint8]
+
+
+def scene_paths() -> list[Path]:
+    """Every scene that travels with the program, by name."""
+    return sorted(resources.folder("scenes").glob("*.yaml"))
+
+
+def small_scene(path: Path) -> Scene:
+    """The scene at the size of the golden pictures, with one sample per pixel."""
+    sizes = [f"image.width={WIDTH}", f"image.height={HEIGHT}", "renderer.samples=1"]
+    return load_scene(path, overrides=sizes)
+
+
+@cache
+def small_film(path: Path) -> Film:
+    """The scene rendered small; once for all tests, because building its program takes seconds."""
+    return render(small_scene(path), channels=["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "iterations"])
+
+
+def small_picture(path: Path) -> Picture:
+    """What a screen would show of `small_film`: sRGB, shape (HEIGHT, WIDTH, 3)."""
+    return small_film(path).to_rgb8(small_scene(path).output.exposure)
+
+
+def golden_path(path: Path) -> Path:
+    """Where the golden picture of a scene lies."""
+    return GOLDEN / f"{path.stem}.png"
+
+
+def read_picture(path: Path) -> Picture:
+    """An 8-bit picture of three channels."""
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+def keep_failure(name: str, picture: Picture, golden: Picture) -> Path:
+    """Saves a picture, the golden one and their difference side by side (four times as large) to look at.
+
+    The difference is grey where both agree.
+    """
+    FAILURES.mkdir(exist_ok=True)
+    difference = np.clip(128 + picture.astype(np.int16) - golden, 0, 255).astype(np.uint8)
+    for kind, pixels in (("picture", picture), ("golden", golden), ("difference", difference)):
+        Image.fromarray(pixels).save(FAILURES / f"{name}.{kind}.png")
+    side_by_side = np.concatenate([picture, golden, difference], axis=1)
+    target = FAILURES / f"{name}.png"
+    Image.fromarray(side_by_side.repeat(4, axis=0).repeat(4, axis=1)).save(target)
+    return target
+
+
+def main(names: Sequence[str]) -> None:
+    """Writes the golden pictures of the named scenes, or of all."""
+    GOLDEN.mkdir(exist_ok=True)
+    for path in scene_paths():
+        if names and path.stem not in names:
+            continue
+        Image.fromarray(small_picture(path)).save(golden_path(path), optimize=True)
+        print(golden_path(path))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

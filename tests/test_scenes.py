@@ -1,0 +1,143 @@
+"""The scenes that travel with the program: complete, well lit, and looking as they did.
+
+Golden pictures are 96 x 54 with one sample per pixel (see `tests.pictures`). Rounding differs between OpenCL
+implementations, and where a fractal's rim or a shadow falls between two pixels a whole pixel changes. So
+pictures are compared by a mean, which a few such pixels hardly move, and by means over blocks of 6 x 6 pixels,
+which find a missing part, another light or another colour that is small on the whole.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.api import load_scene
+from clfractal.formulas import catalog
+from tests.pictures import (
+    HEIGHT,
+    WIDTH,
+    Picture,
+    golden_path,
+    keep_failure,
+    read_picture,
+    scene_paths,
+    small_film,
+    small_picture,
+)
+
+# In levels of 8 bits. Between PoCL 3.1, the PoCL wheel and Intel's runtime the means are at most MEASURED_MEAN,
+# the blocks' at most MEASURED_BLOCK.
+MEAN_LIMIT = 1.5
+BLOCK_LIMIT = 14.0
+BLOCK = 6
+
+SCENES = scene_paths()
+THESIS_FIGURES = {
+    "mandelbulb": "figure 12",
+    "hast_rotated": "figure 14",
+    "hast_above": "figure 14",
+    "hast_normals": "figure 15",
+    "hast_power8": "figure 16",
+}
+
+each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+
+
+def mean_difference(picture: Picture, golden: Picture) -> float:
+    """The mean over pixels and channels of the absolute difference, in levels."""
+    return float(np.abs(picture.astype(np.float64) - golden).mean())
+
+
+def worst_block(picture: Picture, golden: Picture) -> float:
+    """The largest difference of the means of a block of BLOCK x BLOCK pixels, over channels, in levels."""
+    difference = picture.astype(np.float64) - golden
+    blocks: npt.NDArray[np.float64] = difference.reshape(HEIGHT // BLOCK, BLOCK, WIDTH // BLOCK, BLOCK, 3)
+    return float(np.abs(blocks.mean(axis=(1, 3))).max())
+
+
+def test_there_are_scenes_for_the_whole_library() -> None:
+    assert len(SCENES) >= 14
+    used = set()
+    for path in SCENES:
+        formula = load_scene(path).formula
+        used |= {formula.name} | {link.name for link in formula.chain or ()}
+    assert set(catalog.names()) - used == set()
+
+
+def test_the_figures_of_the_thesis_are_there() -> None:
+    texts = {path.stem: path.read_text("utf-8") for path in SCENES}
+    for name, figure in THESIS_FIGURES.items():
+        assert figure in texts[name]
+
+
+@each_scene
+def test_it_begins_with_what_it_shows(path: Path) -> None:
+    head = []
+    for line in path.read_text("utf-8").splitlines():
+        if not line.startswith("# "):
+            break
+        head.append(line[2:])
+    assert len(head) >= 3
+    assert head[-1].startswith("Takes about ")
+
+
+@each_scene
+def test_it_is_as_large_as_a_screen_and_smooth(path: Path) -> None:
+    scene = load_scene(path)
+    assert (scene.image.width, scene.image.height) == (1920, 1080)
+    assert 4 <= scene.renderer.samples <= 16
+
+
+@each_scene
+def test_it_shows_something_well_lit(path: Path) -> None:
+    film = small_film(path)
+    for channel in film.channels:
+        assert not np.isnan(film[channel]).any(), channel
+    for channel in "RGB":
+        assert np.isfinite(film[channel]).all()
+        assert film[channel].min() >= 0
+    hit = film["A"] > 0
+    assert 0.03 < hit.mean() < 0.97
+    picture = small_picture(path)
+    assert (picture == 255).all(axis=-1).mean() < 0.02
+    brightness = picture.max(axis=-1)[hit]
+    assert np.median(brightness) > 40
+    assert np.mean(brightness < 8) < 0.10
+    # Light and shade, not one flat tone.
+    assert brightness.std() > 12
+
+
+@each_scene
+def test_normals_have_length_one_and_face_the_eye(path: Path) -> None:
+    film = small_film(path)
+    hit = np.isfinite(film["Z"])
+    normals = np.stack([film["N.X"], film["N.Y"], film["N.Z"]], axis=-1)[hit]
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=2e-3)
+
+
+@each_scene
+def test_it_looks_as_it_did(path: Path) -> None:
+    picture, golden = small_picture(path), read_picture(golden_path(path))
+    mean, block = mean_difference(picture, golden), worst_block(picture, golden)
+    if mean > MEAN_LIMIT or block > BLOCK_LIMIT:
+        kept = keep_failure(path.stem, picture, golden)
+        pytest.fail(f"{path.stem}: mean difference {mean:.2f}, worst block {block:.1f} levels; see {kept}")
+
+
+def test_golden_pictures_have_scenes() -> None:
+    assert {path.name for path in golden_path(SCENES[0]).parent.glob("*.png")} == {
+        golden_path(path).name for path in SCENES
+    }
+
+
+def test_the_comparison_finds_what_matters() -> None:
+    golden = read_picture(golden_path(SCENES[0]))
+    assert mean_difference(golden, golden) == 0 == worst_block(golden, golden)
+    brighter = np.clip(golden * 1.07, 0, 255).astype(np.uint8)
+    assert mean_difference(brighter, golden) > MEAN_LIMIT
+    hole = golden.copy()
+    hole[24:30, 48:54] = 0
+    assert worst_block(hole, golden) > BLOCK_LIMIT
