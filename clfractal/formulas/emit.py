@@ -92,7 +92,7 @@ class Emitter:
             chosen = self._decided(node.arguments[0])
             if chosen is not None:
                 return self.emit(node.arguments[1 if chosen else 2])
-        names = {name: self._binding(name) for name in names_in(node)}
+        names = {name: self._binding(name) for name in sorted(names_in(node))}
         if all(value.kind == "constant" for value in names.values()):
             return self._constant(
                 substitute(node, {n: v.node for n, v in names.items() if v.node}), names.values()
@@ -324,7 +324,7 @@ class Emitter:
 
     def _decided(self, condition: Node) -> bool | None:
         """The truth of a condition that depends on parameters alone: only the branch taken is written."""
-        names = {name: self._binding(name) for name in names_in(condition)}
+        names = {name: self._binding(name) for name in sorted(names_in(condition))}
         if any(value.kind != "constant" for value in names.values()):
             return None
         return bool(self.evaluate(substitute(condition, {n: v.node for n, v in names.items() if v.node})))

@@ -1,0 +1,35 @@
+"""A scene's program is the same text in every process: its text is the key under which it is cached."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from tests.shell import environment
+
+CODE = """
+import hashlib
+from clfractal.formulas import catalog
+from clfractal.render.plan import make_plan
+from clfractal.render.surface import program_text
+from clfractal.scene.load import load_scene
+for name in catalog.names():
+    julia = {"julia": [0.1, 0.2, 0.3, 0.4]} if name == "quaternion_julia" else {}
+    scene = load_scene({"version": 1, "formula": {"name": name, **julia}, "camera": {}})
+    for precision in ("float32", "float64"):
+        text = program_text(scene, make_plan(scene, precision=precision, lanes=8)).text
+        print(name, precision, hashlib.sha256(text.encode()).hexdigest())
+"""
+
+
+def test_it_does_not_depend_on_the_order_of_sets() -> None:
+    """Python's hashes of texts, and with them the order of a set, differ from process to process."""
+    told = []
+    for seed in range(4):
+        settings = environment({"PYTHONHASHSEED": str(seed)})
+        ended = subprocess.run(
+            [sys.executable, "-P", "-c", CODE], env=settings, capture_output=True, text=True, check=True
+        )
+        told.append(ended.stdout)
+    assert len(told[0].splitlines()) >= 20
+    assert set(told) == {told[0]}
