@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from clfractal.commands.shell import Shell
 from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, choose
 from clfractal.errors import DeviceError
@@ -24,6 +23,7 @@ from clfractal.job import Job, prepare
 from clfractal.render import engine
 from clfractal.render.film import Film
 from clfractal.scene.load import load_scene
+from clfractal.shell import Shell
 
 REPETITIONS = 7
 SHELL_REPETITIONS = 5

@@ -18,6 +18,7 @@ from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.document import write_document
 from clfractal.render.outputs import save_outputs
 from clfractal.render.plan import Plan, PrecisionChoice, choose_precision, make_plan
+from clfractal.render.probe import probe_for
 from clfractal.render.tiled import TiledStore
 from clfractal.render.view import camera_view
 from clfractal.scene.model import Scene
@@ -117,7 +118,7 @@ def prepare(
     plan = make_plan(
         scene,
         precision=used,
-        lanes=tune.best_lanes(device, used, on_start=on_start),
+        lanes=tune.best_lanes(device, used, probe=probe_for(device.info), on_start=on_start),
         samples=samples,
         region=region,
         channels=tuple(channels) if channels is not None else None,

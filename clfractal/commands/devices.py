@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from clfractal.commands.shell import Shell
 from clfractal.device import select, tune
 from clfractal.device.select import Device, DeviceInfo
 from clfractal.errors import ClfractalError, DeviceError
+from clfractal.render.probe import probe_for
+from clfractal.shell import Shell
 
 _HEAD = ("", "index", "name", "platform", "memory", "float64", "GL", "lanes", "speed")
 
@@ -47,7 +48,7 @@ def _measured(device: Device, on_start: Callable[[str], None]) -> tuple[str, str
     if select.is_simulator(device.info):
         return "1", "a simulator"
     try:
-        lanes = tune.best_lanes(device, "float32", on_start=on_start)
+        lanes = tune.best_lanes(device, "float32", probe=probe_for(device.info), on_start=on_start)
         report = tune.lane_reports(device, "float32", (lanes,))[0]
     except ClfractalError as error:
         return "-", f"does not work: {error.message}" if isinstance(error, DeviceError) else error.message

@@ -65,7 +65,9 @@ class Differentiator:
         if function == "exp":
             return value
         if function == "log":
-            return self.emitter.choose(f"less((real)(REAL_SMALLEST), {a.text})", do("div", _ONE, a), literal(0.0))
+            return self.emitter.choose(
+                f"less((real)(REAL_SMALLEST), {a.text})", do("div", _ONE, a), literal(0.0)
+            )
         if function == "sin":
             return do("cos", a)
         if function == "cos":
@@ -104,7 +106,9 @@ class Differentiator:
             return self._sum(da, self._times(do("neg", turns), db))
         if function == "atan2":
             square = do("add", do("mul", a, a), do("mul", b, b))
-            inverse = self.emitter.choose(f"less(R(0.0), {square.text})", do("div", _ONE, square), literal(0.0))
+            inverse = self.emitter.choose(
+                f"less(R(0.0), {square.text})", do("div", _ONE, square), literal(0.0)
+            )
             by_a = self._times(do("mul", b, inverse), da)
             by_b = self._times(do("neg", do("mul", a, inverse)), db) if db is not None else None
             return self._sum(by_a, by_b)

@@ -69,7 +69,12 @@ MARCH = Struct(
 LIGHT = Struct(
     "Light",
     [
-        Field("vector", "real", 3, "directional: where the light travels to, length 1; point: its place, scene units"),
+        Field(
+            "vector",
+            "real",
+            3,
+            "directional: where the light travels to, length 1; point: its place, scene units",
+        ),
         Field("color", "real", 3, "linear Rec. 709"),
         Field("intensity", "real", 0, "factor on the colour"),
         Field("kind", "int", 0, "LIGHT_DIRECTIONAL or LIGHT_POINT"),

@@ -86,7 +86,9 @@ def make_region(scene: Scene, region: tuple[int, int, int, int] | None) -> Regio
     x, y, w, h = region
     if w < 1 or h < 1 or x < 0 or y < 0 or x + w > width or y + h > height:
         got = ",".join(str(value) for value in region)
-        raise SceneError(f"must lie inside the picture of {width} x {height} pixels, got {got}", Where("--region"))
+        raise SceneError(
+            f"must lie inside the picture of {width} x {height} pixels, got {got}", Where("--region")
+        )
     return Region(x, y, w, h)
 
 

@@ -97,12 +97,16 @@ class SurfaceWorker:
         with device.failures("opening a queue"):
             self.transfers = cl.CommandQueue(device.context)
 
-    def start(self, tiles: npt.NDArray[np.int32], packets: tuple[int, int] | None = None, *, slot: int = 0) -> Batch:
+    def start(
+        self, tiles: npt.NDArray[np.int32], packets: tuple[int, int] | None = None, *, slot: int = 0
+    ) -> Batch:
         """Enqueues tiles (indices in the plan's grid); `packets` (first, count) renders a part of each."""
         first, count = packets or (0, self.packets)
         grid = self._grid
         columns, rows = tiles % grid.columns, tiles // grid.columns
-        corners = np.stack([grid.first_column + columns, grid.first_row + rows], axis=1).astype(np.int32) * TILE
+        corners = (
+            np.stack([grid.first_column + columns, grid.first_row + rows], axis=1).astype(np.int32) * TILE
+        )
         with self.device.failures("rendering"):
             queue = self.device.queue
             cl.enqueue_copy(self.transfers, self.corners[slot], np.ascontiguousarray(corners))
