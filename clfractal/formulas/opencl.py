@@ -280,7 +280,8 @@ class _ChainWriter:
 
 # What operations cost beside an addition, roughly, on the vector units of today's processors.
 _COSTS = {
-    "real_div": 8, "real_sqrt": 10, "real_rsqrt": 8, "real_exp": 25, "real_log": 25, "real_pow": 60, "real_sin": 30, "real_cos": 30,
+    "real_div": 8, "real_sqrt": 10, "real_rsqrt": 8, "real_exp": 25, "real_log": 25, "real_pow": 60,
+    "real_sin": 30, "real_cos": 30,
     "real_tan": 40, "real_asin": 30, "real_acos": 30, "real_atan": 30, "real_atan2": 45, "real_mod": 12,
     "real_power_slope": 60, "real_power_log": 30, "real_arc_slope": 20,
     "dual_add": 4, "dual_sub": 4, "dual_neg": 4, "dual_mul": 7, "dual_square": 5, "dual_mul_real": 4, "dual_where": 4,
