@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 import clfractal
-from clfractal.commands.shell import Shell
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_INTERRUPTED
+from clfractal.shell import Shell
 
 Work = Callable[[], None]
 
@@ -193,9 +193,8 @@ def bench(
     verbose: Verbose = False,
 ) -> Work:
     """Measure this machine's speed and print a table."""
-    from importlib import import_module
+    from clfractal.bench import run
 
     shell = _shell(context, quiet=quiet, verbose=verbose)
     shell.mute_drivers()
-    run: Any = import_module("clfractal.bench").run
     return lambda: run(device=device, json_file=json_file, shell=shell)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from clfractal.commands.shell import Shell
+from clfractal.shell import Shell
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clfractal.commands.progress import Reporter
-from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.atomic import check_output
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.shell import Shell
 
 if TYPE_CHECKING:
     from clfractal.render.store import JournalFilm
