@@ -39,8 +39,10 @@ INLINE real distance_from_growth(real square, real relative, real count, __const
 #if LOGARITHMIC
     real height = R(0.34657359028) * quick_log2(square);  // half of log 2
     const real counts_left = (real)((scalar)orbit->iterations) - count;
-    if (any_lane(less(counts_left, R(12.0)))) {
-        height -= (real)(orbit->log_bailout) * exp2(-counts_left * (real)(orbit->log2_degree));
+    const mask late = less(counts_left, R(12.0));
+    if (any_lane(late)) {
+        // Lane by lane: a ray must not depend on its neighbours in the packet, or regions would differ from whole pictures.
+        height -= pick(late, (real)(orbit->log_bailout) * exp2(-counts_left * (real)(orbit->log2_degree)), R(0.0));
     }
     const real distance = R(0.5) * height * relative;
 #else
