@@ -54,16 +54,17 @@ def cases(tiny: bool) -> Iterator[tuple[str, Precision]]:
 
 
 def picture(
-    device: Device, name: str, precision: Precision, size: tuple[int, int]
+    device: Device, name: str, precision: Precision, size: tuple[int, int], lanes: int | None = None
 ) -> npt.NDArray[np.float32]:
-    """All channels of a picture, shape (channels, height, width)."""
+    """All channels of a picture, shape (channels, height, width); with the best lane count if none is given."""
+    lanes = lanes or tune.best_lanes(device, precision)
     # The formula's bounds say where the camera has to be for the picture to be filled.
     bounds = load_scene(_scene_text(name, (0.0, -9.0, 0.0), (0.0, 0.0, 0.0), size)).chain
     x, y, z = (float(value) for value in bounds.center)
     radius = float(bounds.radius)
     position = (x + 0.7 * radius, y - 2.1 * radius, z + 0.7 * radius)
     scene = load_scene(_scene_text(name, position, (x, y, z), size))
-    plan = make_plan(scene, precision=precision, lanes=tune.best_lanes(device, precision), channels=CHANNELS)
+    plan = make_plan(scene, precision=precision, lanes=lanes, channels=CHANNELS)
     film = Film(plan.channels, size, plan.region)
     engine.render(scene, plan, device, film)
     return np.stack([film[channel] for channel in CHANNELS])
