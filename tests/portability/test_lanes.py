@@ -15,6 +15,11 @@ from tests.portability.pictures import picture
 
 pytestmark = pytest.mark.conformance
 
+# Share of pixels with other bits: float64 has none with PoCL and Intel, but a library may round its vector functions
+# in another way than its scalar ones. Distances that depended on the neighbours changed 12 %. In float32 packets may
+# estimate reciprocal roots in another way.
+_OTHER_BITS = {"float32": 1.0, "float64": 0.01}
+
 
 def test_lane_counts_give_the_same_picture() -> None:
     """hast, whose needle shows the least difference of distances; float64, which leaves rounding no excuse."""
@@ -23,5 +28,7 @@ def test_lane_counts_give_the_same_picture() -> None:
     size = (12, 8) if is_simulator(device.info) else (64, 48)
     scalar = picture(device, "hast", precision, size, lanes=1)
     for lanes in {4, 16} & set(tune.accepted_lanes(device, precision)):
-        found = difference(scalar, picture(device, "hast", precision, size, lanes=lanes), precision)
-        assert not found.fault, f"{lanes} lanes: {found.fault}"
+        packet = picture(device, "hast", precision, size, lanes=lanes)
+        other_bits = float((scalar != packet).any(axis=0).mean())
+        assert other_bits <= _OTHER_BITS[precision], f"{lanes} lanes: {other_bits:.1%} of the pixels differ"
+        assert not difference(scalar, packet, precision).fault
