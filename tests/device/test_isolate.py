@@ -127,7 +127,10 @@ except KeyboardInterrupt:
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGKILL, signal.SIGTERM])
 def test_the_child_ends_with_its_parent(tmp_path: Path, end: signal.Signals) -> None:
     mark = tmp_path / "mark"
-    parent = subprocess.Popen([sys.executable, "-c", _PARENT, str(mark)], cwd=Path(__file__).parents[2])
+    # A killed process leaves its temporary folder behind: let that be in this test's own.
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-c", _PARENT, str(mark)]
+    parent = subprocess.Popen(command, cwd=Path(__file__).parents[2], env=environment)
     assert _wait(lambda: mark.exists() and mark.read_text())
     process = int(mark.read_text())
     assert _is_running(process)
