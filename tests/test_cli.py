@@ -44,7 +44,7 @@ def test_the_default_output_is_the_scenes_name(here: Path, shell: InProcess) -> 
     (here / "deep" / "my.scene.yaml").write_text(SCENE)
     ended = shell("render", "deep/my.scene.yaml")
     assert (ended.status, ended.out) == (0, "")
-    assert ended.err.startswith("my.scene.png: ")
+    assert ended.err.splitlines()[-1].startswith("my.scene.png: ")
     assert names(here) == {"scene.yaml", "deep", "my.scene.png"}
 
 

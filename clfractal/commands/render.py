@@ -71,7 +71,7 @@ def render_scene(order: Order, shell: Shell) -> None:
     reporter = Reporter(shell, film.grid.count)
     shell.state = lambda: _interrupted(partial, film)
     try:
-        state = engine.render(scene, job.plan, job.device, film, reporter)
+        state = engine.render(scene, job.plan, job.device, film, reporter, on_compile=shell.say)
         reporter.close()
         rendered = time.perf_counter()
         film.header["seconds"] = rendered - state.started

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,7 @@ def build(
     sources: SourceMap | None = None,
     warm: Warm | None = None,
     isolated: bool = True,
+    on_compile: Callable[[str], None] | None = None,
 ) -> Program:
     """The program of one flat text, from the cache or the driver's compiler.
 
@@ -73,8 +74,8 @@ def build(
         sources: the texts that the `#line` directives name, for messages.
         warm: a first launch to perform before the binary is kept, so that later runs start at once.
         isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
-            an
-            interrupt is answered at once.
+            an interrupt is answered at once.
+        on_compile: told a line if the cache has no binary, since compiling takes some seconds.
 
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
@@ -90,6 +91,8 @@ def build(
         if program is not None:
             return Program(device, program, _milliseconds(start), cached=True)
         cache.drop_blob(key)
+    if on_compile is not None:
+        on_compile(f"compiling for {device.info.name}, once")
     try:
         program, binary = _compile(device, text, flags, warm, isolated=isolated)
     except BuildFailureError as failure:

@@ -66,7 +66,7 @@ class Differentiator:
             return value
         if function == "log":
             return self.emitter.choose(
-                f"less((real)(REAL_SMALLEST), {a.text})", do("div", _ONE, a), literal(0.0)
+                f"less((real)(LOG_SMALLEST), {a.text})", do("div", _ONE, a), literal(0.0)
             )
         if function == "sin":
             return do("cos", a)

@@ -73,12 +73,18 @@ ProgressCallback = Callable[[Progress], None]
 
 
 def render(
-    scene: Scene, plan: Plan, device: Device, store: TiledStore, progress: ProgressCallback | None = None
+    scene: Scene,
+    plan: Plan,
+    device: Device,
+    store: TiledStore,
+    progress: ProgressCallback | None = None,
+    *,
+    on_compile: Callable[[str], None] | None = None,
 ) -> Progress:
     """Renders every tile that `store` lacks.
 
     `progress` is called after each batch. An exception in it, or a KeyboardInterrupt, ends the render between two
-    tiles; what is finished is in the store.
+    tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first.
 
     Raises:
         DeviceError, KernelBuildError: see `SurfaceWorker`.
@@ -89,7 +95,7 @@ def render(
     state.tiles_before = state.tiles_done
     if len(pending) == 0:
         return state
-    worker = SurfaceWorker(scene, plan, device, capacity=min(CAPACITY, len(pending)))
+    worker = SurfaceWorker(scene, plan, device, capacity=min(CAPACITY, len(pending)), on_compile=on_compile)
     state.build_ms = worker.program.build_ms
     state.started = time.perf_counter()
     _Loop(worker, store, state, progress).run(pending)

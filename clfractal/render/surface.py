@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,8 +66,16 @@ class Batch:
 class SurfaceWorker:
     """Renders tiles of one scene on one device. Two batches may be under way at a time."""
 
-    def __init__(self, scene: Scene, plan: Plan, device: Device, *, capacity: int) -> None:
-        """`capacity` is the most tiles of a batch.
+    def __init__(
+        self,
+        scene: Scene,
+        plan: Plan,
+        device: Device,
+        *,
+        capacity: int,
+        on_compile: Callable[[str], None] | None = None,
+    ) -> None:
+        """`capacity` is the most tiles of a batch; `on_compile` is told a line if the program is compiled first.
 
         Raises:
             DeviceError: too little memory (status 2), or the device failed.
@@ -87,6 +96,7 @@ class SurfaceWorker:
             flags=program.math_flags(plan.precision),
             sources=text.sources,
             warm=self._warm(records),
+            on_compile=on_compile,
         )
         self.films = [device.buffer(film_bytes, "the film") for _ in range(2)]
         self.statistics = [device.buffer(statistic_bytes, "statistics") for _ in range(2)]
