@@ -1,0 +1,340 @@
+"""What docs/ says is compared with the program: keys, defaults, ranges, options, channels, names, messages.
+
+A table of the documentation is found by its heading, and read as lists of cells. That the code in the pages
+runs is the matter of `test_docs.py`.
+"""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+import re
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+import clfractal
+from clfractal import api, errors
+from clfractal.commands.app import app
+from clfractal.device import cache, select, tune
+from clfractal.files import document, regular
+from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
+from clfractal.files.exr import read_exr
+from clfractal.files.png import read_texts
+from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser
+from clfractal.scene import load, parts
+from tests.shell import SCENE, InProcess
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+PACKAGE = Path(clfractal.__file__).resolve().parent
+
+
+def text(page: str) -> str:
+    return (DOCS / page).read_text(encoding="utf-8")
+
+
+def section(page: str, heading: str) -> str:
+    """What stands under a heading, up to the next one of any level."""
+    found = re.search(rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)", text(page), re.MULTILINE | re.DOTALL)
+    assert found, f"{page} has no heading {heading!r}"
+    return found[1]
+
+
+def table(page: str, heading: str) -> list[list[str]]:
+    """The rows of the first table under a heading, without its head; cells without their outer spaces."""
+    lines = section(page, heading).splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("|"))
+    rows = []
+    for line in lines[first:]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]])
+    return rows[2:]
+
+
+def code(cell: str) -> str:
+    """The first piece of code in a cell."""
+    found = re.search(r"`([^`]+)`", cell)
+    assert found, cell
+    return found[1]
+
+
+# --- scenes ---
+
+# Heading in scenes.md -> class of the schema.
+SECTIONS = {
+    "formula": "FormulaSpec",
+    "formula.chain": "ChainLink",
+    "image": "Image",
+    "camera, perspective": "PerspectiveCamera",
+    "camera, orthographic": "OrthographicCamera",
+    "renderer, surface": "SurfaceRenderer",
+    "renderer.bounds": "Ball",
+    "lights, directional": "DirectionalLight",
+    "lights, point": "PointLight",
+    "material": "Material",
+    "coloring": "Coloring",
+    "coloring.palette": "Stop",
+    "background": "Gradient",
+    "output": "Output",
+}
+
+
+def number(value: float) -> str:
+    """As the pages write numbers: whole ones in full, in groups of three digits."""
+    return f"{value:,.0f}" if value == int(value) else f"{value:g}"
+
+
+def allowed(entry: dict[str, Any]) -> str:
+    """The values that a schema allows, in the words of scenes.md."""
+    options = [option for option in entry.get("anyOf", entry.get("oneOf", ())) if option != {"type": "null"}]
+    if options:
+        return " or ".join(allowed(option) for option in options)
+    if "const" in entry:
+        return f"`{entry['const']}`"
+    if "enum" in entry:
+        return ", ".join(f"`{word}`" for word in entry["enum"])
+    if "$ref" in entry:
+        return "a mapping"
+    kind = entry.get("type")
+    if kind == "array":
+        if "prefixItems" in entry:
+            return f"{len(entry['prefixItems'])} numbers, {interval(entry['prefixItems'][0])}"
+        return f"a list of {entry['minItems']} to {entry['maxItems']}"
+    if kind in ("integer", "number"):
+        return ("whole, " if kind == "integer" else "") + interval(entry)
+    return {"boolean": "`true`, `false`", "string": "text", "object": "a mapping"}[str(kind)]
+
+
+def interval(entry: dict[str, Any]) -> str:
+    low, above = entry.get("minimum"), entry.get("exclusiveMinimum")
+    high, below = entry.get("maximum"), entry.get("exclusiveMaximum")
+    start = number(low) if low is not None else f"above {number(above or 0)}"
+    return f"{start} to {number(high)}" if high is not None else f"{start} to below {number(below or 0)}"
+
+
+def default(entry: dict[str, Any], name: str, required: list[str]) -> str:
+    if name in required:
+        return "required"
+    if "default" not in entry:
+        return "`{}`"  # made by a function: only `output.precision`
+    shown = json.dumps(plain(entry["default"])).replace('"', "")
+    return f"`{shown}`"
+
+
+def plain(value: Any) -> Any:
+    """Whole floats as int, as one writes them."""
+    if isinstance(value, list):
+        return [plain(each) for each in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def expected_rows(name: str) -> list[list[str]]:
+    """key, default, allowed of a class of the schema."""
+    found = load.schema()["$defs"][name]
+    required = found.get("required", [])
+    return [
+        [f"`{key}`", default(entry, key, required), allowed(entry)]
+        for key, entry in found["properties"].items()
+    ]
+
+
+def test_every_part_of_a_scene_is_described() -> None:
+    assert set(SECTIONS.values()) == set(load.schema()["$defs"])
+    keys = {code(row[0]) for row in table("scenes.md", "The top level")}
+    assert keys == set(load.schema()["properties"])
+    required = {code(row[0]) for row in table("scenes.md", "The top level") if row[1] == "required"}
+    assert required == set(load.schema()["required"])
+
+
+@pytest.mark.parametrize("heading", SECTIONS)
+def test_keys_defaults_and_ranges_of_a_scene(heading: str) -> None:
+    told = [row[:3] for row in table("scenes.md", heading)]
+    assert sorted(told) == sorted(expected_rows(SECTIONS[heading]))
+
+
+def test_limits_of_scene_files() -> None:
+    limits = {
+        "pixels": parts.MAX_PIXELS,
+        "lights": parts.MAX_LIGHTS,
+        "bytes of a text file": regular.MAX_BYTES,
+        "values in a file": document.MAX_NODES,
+        "levels of nesting": document.MAX_DEPTH,
+    }
+    assert {row[0]: int(row[1].replace(",", "")) for row in table("scenes.md", "Limits")} == limits
+
+
+# --- formulas ---
+
+
+def test_every_key_of_a_formula_is_described() -> None:
+    rows = table("formulas.md", "The keys")
+    assert {code(row[0]) for row in rows} == set(build._KEYS)
+    assert {code(row[0]) for row in rows if row[1] == "required"} == set(build._REQUIRED)
+    assert {code(row[0]) for row in table("formulas.md", "Parameters")} == set(build._PARAMETER_KEYS)
+    assert {code(row[0]) for row in table("formulas.md", "Chains")} == set(catalog._CHAIN_KEYS)
+
+
+def test_every_function_of_the_language_is_described() -> None:
+    told = [
+        call for row in table("formulas.md", "Functions") for call in re.findall(r"`(\w+\(.*?\))`", row[0])
+    ]
+    arguments = {call.partition("(")[0]: call.count(",") + 1 for call in told}
+    assert arguments == {**nodes.PARAMETER_FUNCTIONS, "min": 3, "max": 3}  # written with an ellipsis
+
+
+def test_reserved_names_are_told() -> None:
+    told = set(re.findall(r"`(\w+)`", section("formulas.md", "Names")))
+    assert build._RESERVED - set(nodes.FUNCTIONS) <= told
+
+
+def test_limits_of_formulas() -> None:
+    limits = {
+        "characters of an expression": parser.MAX_TEXT,
+        "numbers, names and operations of an expression": parser.MAX_NODES,
+        "levels of nesting": parser.MAX_DEPTH,
+        "constant exponents": evaluate.MAX_EXPONENT,
+        "parameters": build.MAX_PARAMETERS,
+        "names in `let`": build.MAX_LETS,
+        "`repeat`": model.MAX_REPEAT,
+        "formulas in a chain": chain.MAX_LINKS,
+        "`count` of a formula in a chain": chain.MAX_COUNT,
+        "`bounds.radius`": binding.MAX_RADIUS,
+        "`bailout`, `distance_bailout`": binding.MAX_BAILOUT,
+    }
+    assert {row[0]: float(row[1].replace(",", "")) for row in table("formulas.md", "Limits")} == limits
+
+
+def library_row(name: str) -> list[str]:
+    """Name, title and parameters of a formula of the library."""
+    title = str(catalog.description(name)["title"])
+    if catalog.is_chain(name):
+        links = (f"{link['name']} x {link['count']}" for link in catalog.description(name)["chain"])
+        return [f"`{name}`", title, "a chain: " + ", ".join(links)]
+    parameters = (f"`{each.name}` {each.default:.4g}" for each in catalog.load(name).parameters)
+    return [f"`{name}`", title, ", ".join(parameters) or "none"]
+
+
+def test_the_library_is_told_in_full() -> None:
+    assert table("formulas.md", "The library") == [library_row(name) for name in catalog.names()]
+
+
+# --- the command line ---
+
+
+def commands() -> dict[str, Any]:
+    return dict(vars(typer.main.get_command(app))["commands"])
+
+
+def test_every_command_and_option_is_described() -> None:
+    assert {code(row[0]).split()[1] for row in table("command-line.md", "Commands")} == set(commands())
+    for name, command in commands().items():
+        known = {option for each in command.params for option in each.opts if option.startswith("-")}
+        told = set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", section("command-line.md", f"clfractal {name}")))
+        assert told == known, name
+
+
+def test_exit_statuses() -> None:
+    told = {int(row[0]) for row in table("command-line.md", "Exit status")}
+    assert told == {0, errors.STATUS_BAD_INPUT, errors.STATUS_DEVICE_FAILED, errors.STATUS_INTERRUPTED}
+
+
+def test_environment_variables() -> None:
+    told = {code(row[0]) for row in table("command-line.md", "Environment variables")}
+    ours = {select.ENVIRONMENT_VARIABLE, tune.LANES_VARIABLE, cache.ENVIRONMENT_VARIABLE}
+    assert ours == {name for name in told if name.startswith("CLFRACTAL_")}
+    sources = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
+    assert set(re.findall(r'"(CLFRACTAL_\w+)"', sources)) == ours | {"CLFRACTAL_TEST_ABORT"}
+
+
+@pytest.mark.parametrize("row", table("command-line.md", "Messages"), ids=lambda row: str(row[0]))
+def test_messages(
+    row: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each mistake of the table, tried; the scene is in `scene.yaml`."""
+    (tmp_path / "scene.yaml").write_text(
+        section("command-line.md", "Messages").split("```")[1].split("\n", 1)[1]
+    )
+    monkeypatch.chdir(tmp_path)
+    ended = InProcess(capsys)(*shlex.split(code(row[0]))[1:])
+    assert ended.err == code(row[1]) + "\n"
+    assert ended.status == errors.STATUS_BAD_INPUT
+
+
+# --- a render, and what it leaves ---
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a.exr, a.png and stats.json."""
+    from clfractal.cli import run
+    from clfractal.shell import Shell
+
+    folder = tmp_path_factory.mktemp("rendered")
+    (folder / "scene.yaml").write_text(SCENE)
+    outputs = (
+        "-o",
+        str(folder / "a.exr"),
+        "-o",
+        str(folder / "a.png"),
+        "--stats",
+        str(folder / "stats.json"),
+    )
+    status = run(["render", str(folder / "scene.yaml"), "--quiet", *outputs], Shell(owns_process=False))
+    assert status == 0
+    return folder
+
+
+def test_keys_of_the_statistics(rendered: Path) -> None:
+    told = [code(row[0]) for row in table("command-line.md", "Statistics")]
+    assert told == list(json.loads((rendered / "stats.json").read_text()))
+
+
+def test_attributes_of_pictures(rendered: Path) -> None:
+    usual = section("pictures-and-channels.md", "Attributes of an EXR").partition("|")[0]
+    told = {code(row[0]) for row in table("pictures-and-channels.md", "Attributes of an EXR")}
+    _, header = read_exr(rendered / "a.exr")
+    assert told | set(re.findall(r"`(\w+)`", usual)) == set(header)
+    chunks = {code(row[0]) for row in table("pictures-and-channels.md", "Text chunks of a PNG")}
+    assert chunks == set(read_texts(rendered / "a.png"))
+
+
+def test_channels() -> None:
+    told = [row[:4] for row in table("pictures-and-channels.md", "Channels")]
+    by_default = {name: "yes" if name in DEFAULT_CHANNELS else "no" for name in CHANNELS}
+    assert told == [[f"`{c.name}`", by_default[c.name], c.precision, c.kind] for c in CHANNELS.values()]
+
+
+# --- Python ---
+
+
+def test_the_python_api_is_described() -> None:
+    page = text("python.md")
+    missing = [
+        name for name in dir(clfractal) if not name.startswith("__") and f"`clfractal.{name}" not in page
+    ]
+    assert missing == []
+    for function in (api.render, api.escape):
+        told = {code(row[0]) for row in table("python.md", f"clfractal.{function.__name__}")}
+        assert told == set(inspect.signature(function).parameters)
+
+
+# --- all pages ---
+
+
+@pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
+def test_files_that_a_page_names_exist(page: str) -> None:
+    """`clfractal/render/view.py`, `kernels/march.h`: an architecture page outlives its files only too easily."""
+    named = set(re.findall(r"`((?:clfractal|kernels|tests|benchmarks|scenes)/[\w./]+\.\w+)`", text(page)))
+    assert [name for name in sorted(named) if not os.path.exists(DOCS.parent / name)] == []
+
+
+def test_every_module_has_its_place_in_the_architecture() -> None:
+    page = text("architecture.md")
+    modules = [path for path in PACKAGE.rglob("*.py") if path.name not in ("__init__.py", "__main__.py")]
+    kernels = [path for path in (DOCS.parent / "kernels").rglob("*") if path.is_file()]
+    assert [path.name for path in modules + kernels if f"`{path.name}`" not in page] == []
