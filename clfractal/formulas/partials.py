@@ -118,10 +118,13 @@ class Differentiator:
         return self._sum(by_base, by_exponent)
 
     def _clamp(self, operands: tuple[Value, ...], partials: list[Partial]) -> Partial:
-        """clamp(x, low, high): the partial of whichever of the three it is."""
+        """clamp(x, low, high): the partial of whichever of the three it is; `high` wins where low > high."""
         x, low, high = operands
         below = self._choose(f"less_equal({low.text}, {x.text})", partials[0], partials[1])
-        return self._choose(f"less_equal({x.text}, {high.text})", below, partials[2])
+        within = f"less_equal({x.text}, {high.text})"
+        if low.number is None or high.number is None or not low.number <= high.number:
+            within = f"({within} & less_equal({low.text}, {high.text}))"
+        return self._choose(within, below, partials[2])
 
     # --- sparse arithmetic ---
 

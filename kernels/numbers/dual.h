@@ -142,7 +142,7 @@ INLINE dual dual_exp(dual a) {
 }
 
 INLINE dual dual_log(dual a) {
-    return dual_chain(real_log(a.v), pick(less((real)(REAL_SMALLEST), a.v), R(1.0) / a.v, R(0.0)), a);
+    return dual_chain(real_log(a.v), pick(less((real)(LOG_SMALLEST), a.v), R(1.0) / a.v, R(0.0)), a);
 }
 
 INLINE dual dual_sin(dual a) { return dual_chain(sin(a.v), cos(a.v), a); }

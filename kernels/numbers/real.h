@@ -43,8 +43,9 @@ INLINE real real_rsqrt(real a) {
 #endif
 }
 
-// The logarithm of the smallest normal number at and below 0.
-INLINE real real_log(real a) { return log(fmax(a, (real)(REAL_SMALLEST))); }
+// The logarithm of the smallest normal float at and below 0, in every precision, so that all agree.
+#define LOG_SMALLEST S(1.1754943508222875e-38)
+INLINE real real_log(real a) { return log(fmax(a, (real)(LOG_SMALLEST))); }
 
 // Arguments outside [-1, 1] count as the nearer end.
 INLINE real real_asin(real a) { return asin(real_clamp(a, R(-1.0), R(1.0))); }

@@ -111,7 +111,7 @@ def power(x: float, y: float) -> Exact:
 
 
 def log_smallest(smallest: float) -> Callable[[float], Exact]:
-    """log of at least the smallest normal number of a precision."""
+    """log of at least the smallest number that it takes."""
     return lambda a: INF if a == INF else mpmath.log(mpf(a) if a > smallest else mpf(smallest))
 
 

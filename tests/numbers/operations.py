@@ -82,11 +82,12 @@ def lifted(call: str) -> list[int]:
 
 
 def table(precision: str) -> list[Operation]:
-    """All operations; of `log` and the like the meaning depends on the precision's range."""
+    """All operations; what overflows depends on the precision."""
     single = precision == "float32"
     smallest = 2.0**-126 if single else 2.0**-1022
     largest = (2 - 2.0**-23) * 2.0**127 if single else (2 - 2.0**-52) * 2.0**1023
-    logarithm = log_smallest(smallest)
+    log_least = 2.0**-126
+    logarithm = log_smallest(log_least)
 
     def power_slope(x: float, y: float) -> Exact:
         # y - 1 is a number of the precision before it is an exponent
@@ -105,7 +106,7 @@ def table(precision: str) -> list[Operation]:
         return power_slope(x, y), by_y
 
     def log_slopes(a: float) -> Sequence[Exact]:
-        return (1 / mpf(a) if a > smallest else mpf(0),)
+        return (1 / mpf(a) if a > log_least else mpf(0),)
 
     def atan2_slopes(y: float, x: float) -> Sequence[Exact]:
         square = mpf(x) ** 2 + mpf(y) ** 2

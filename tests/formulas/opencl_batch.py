@@ -1,0 +1,90 @@
+"""Many formulas in one program, since every build costs seconds: each text's own names get a number."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device import compiler, program
+from clfractal.device.select import Device
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+from clfractal.formulas.opencl import FormulaText
+from clfractal.render import layout
+from clfractal.resources import folder
+
+Floats = npt.NDArray[np.floating[Any]]
+
+_DEFINED = re.compile(r"^(?:INLINE \w+|__kernel void|#define) (\w+)|^\} (\w+);", re.MULTILINE)
+_INCLUDES = re.compile(r'^#include "(?:lanes|vectors|structs|formula|orbit|numbers/\w+)\.h"\n', re.MULTILINE)
+
+HEAD = "".join(
+    f'#include "{name}"\n'
+    for name in ("lanes.h", "numbers/real.h", "numbers/dual.h", "vectors.h", "structs.h")
+)
+
+
+def kernel_file(name: str) -> str:
+    """A file of the kernels folder without the headers that every program here begins with."""
+    return _INCLUDES.sub("", (folder("kernels") / name).read_text(encoding="utf-8"))
+
+
+def numbered(text: str, number: int) -> str:
+    """The text with `_f<number>` after every name that it defines."""
+    names = {first or second for first, second in _DEFINED.findall(text)}
+    pattern = rf"\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
+    return re.sub(pattern, rf"\1_f{number}", text)
+
+
+def batch_text(formulas: Sequence[FormulaText], tail: str) -> str:
+    """All formulas, each followed by `tail`, which may use its functions; kernel k of formula 3 is `k_f3`."""
+    parts = [numbered(formula.text + tail, number) for number, formula in enumerate(formulas)]
+    return HEAD + "\n".join(parts)
+
+
+def compile_text(
+    device: Device, text: str, precision: Precision, lanes: int, flags: Sequence[str] = ()
+) -> Any:
+    """The driver's program of a generated text; BuildFailureError with the log if it does not compile."""
+    flat = flatten(
+        "batch.cl",
+        generated={"batch.cl": text, "structs.h": layout.struct_text()},
+        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
+    )
+    return compiler.compile_source(device, flat.text, [*program.math_flags(precision), *flags])
+
+
+def planes_of(points: Floats, precision: Precision, lanes: int) -> Floats:
+    """Points of shape (n, 3) as planes of shape (3, m), m a multiple of the lanes."""
+    padded = np.zeros((3, -(-len(points) // lanes) * lanes), precision)
+    padded[:, : len(points)] = points.T
+    return padded
+
+
+def launch(
+    device: Device,
+    built: Any,
+    kernel_name: str,
+    points: Floats,
+    planes: int,
+    precision: Precision,
+    lanes: int,
+    *constants: npt.NDArray[Any],
+) -> Floats:
+    """Runs a kernel (points, result, stride, constants...) and gives its planes, shape (planes, n)."""
+    padded = planes_of(points, precision, lanes)
+    result = np.full((planes, padded.shape[1]), np.nan, precision)
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    arrays = [padded, result, *constants]
+    buffers = [cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array)) for array in arrays]
+    kernel = cl.Kernel(built, kernel_name)
+    kernel.set_args(*buffers[:2], np.int32(padded.shape[1]), *buffers[2:])
+    # Work-groups of one: the cheapest to compile for.
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (padded.shape[1] // lanes,), (1,))
+    cl.enqueue_copy(device.queue, result, buffers[1])
+    return result[:, : len(points)]

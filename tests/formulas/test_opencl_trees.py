@@ -1,0 +1,128 @@
+"""Random expressions, written as OpenCL C, agree with NumPy: values and, both ways, partials."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+
+from clfractal.device.structs import Precision
+from clfractal.formulas import catalog
+from clfractal.formulas.backends import DualBackend, NumpyBackend, constant_dual, seeded
+from clfractal.formulas.chain import Chain, single
+from clfractal.formulas.evaluate import evaluate
+from clfractal.formulas.nodes import Call, Name, Node
+from clfractal.formulas.opencl import write_formula
+from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
+from tests.formulas.rounding import spread
+from tests.formulas.test_opencl import ORBITS, device, usable
+from tests.formulas.trees import VARIABLES, tame_tree
+
+# Three trees make a formula; a formula is applied once to points of space.
+FORMULAS = 16
+POINTS = 64
+PLANES = ("real", "dual", "d/dx", "d/dy", "d/dz")
+PRECISION: Precision = "float64"
+
+
+@lru_cache
+def random_trees() -> tuple[Node, ...]:
+    """The first trees that hypothesis thinks of (always the same): built together, since a build costs seconds."""
+    trees: list[Node] = []
+
+    @settings(max_examples=3 * FORMULAS, phases=[Phase.generate], database=None)
+    @given(tame_tree)
+    def collect(tree: Node) -> None:
+        trees.append(tree)
+
+    collect()
+    while len(trees) < 3 * FORMULAS:
+        trees.append(Name("x"))
+    return tuple(trees[: 3 * FORMULAS])
+
+
+def chain_of(number: int) -> Chain:
+    """A formula whose map are three trees; nothing is added, so that one application is the trees' values."""
+    plain = catalog.load_chain(
+        {
+            "inline": {
+                "title": "Random",
+                "reference": "none",
+                "variables": list(VARIABLES),
+                "map": list(VARIABLES),
+                "add": "none",
+                "degree": 1,
+                "bounds": {"center": [0, 0, 0], "radius": 3},
+                "bailout": 4,
+            }
+        }
+    ).first
+    trees = random_trees()[3 * number : 3 * number + 3]
+    return single(replace(plain, formula=replace(plain.formula, map=trees)))
+
+
+def points() -> Floats:
+    return np.random.default_rng(6).uniform(-3, 3, (POINTS, 3))
+
+
+@lru_cache
+def results(form: str) -> Floats:
+    """Values and partials of every tree after one application, shape (trees, 5, points): real, then dual."""
+    lanes = 1
+    formulas = [
+        write_formula(chain_of(n), dual_map="jacobian" if form == "jacobian" else "operations")
+        for n in range(FORMULAS)
+    ]
+    built = compile_text(device(), "#define STEPS 1\n" + batch_text(formulas, ORBITS), PRECISION, lanes)
+    found = []
+    for number, formula in enumerate(formulas):
+        constants = np.array(formula.constants, PRECISION)
+        out = launch(device(), built, f"orbits_f{number}", points(), 2 * 16, PRECISION, lanes, constants)
+        found.append(out.reshape(2, 16, POINTS)[1, :15].reshape(3, 5, POINTS))
+    return np.concatenate(found).astype(np.float64)
+
+
+def duals(tree: Node, base: Any) -> Floats:
+    """Value and partials, shape (4, points)."""
+    names = dict(zip(VARIABLES, seeded(list(points().T)), strict=True))
+    dual = constant_dual(evaluate(tree, names, DualBackend(base)), 3)
+    return np.array([np.broadcast_to(v, POINTS) for v in (dual.value, *dual.partials)], np.float64)
+
+
+def shown(node: Node) -> str:
+    """A tree as text."""
+    if isinstance(node, Call):
+        return f"{node.function}({', '.join(map(shown, node.arguments))})"
+    return node.name if isinstance(node, Name) else repr(node.value)
+
+
+@pytest.mark.parametrize("form", ["operations", "jacobian"])
+def test_random_expressions(form: str) -> None:
+    if not usable(PRECISION):
+        return
+    faults, compared = [], 0
+    unit = float(np.finfo(PRECISION).eps)
+    for tree, got in zip(random_trees(), results(form), strict=True):
+        with np.errstate(all="ignore"):
+            expected = duals(tree, NumpyBackend())
+        width = spread(lambda noisy, tree=tree: duals(tree, noisy), 4 * unit)  # type: ignore[misc]
+        # A point beside a jump of floor or of a condition has partials that differ, or values that do.
+        width = np.where(width.max(axis=0) > 1e-6 * (1 + np.abs(expected).max(axis=0)), np.inf, width)
+        allowed = 10 * width + 64 * unit * (np.abs(expected).max(axis=0) + 1e-3)
+        usual = np.isfinite(allowed) & (np.abs(expected) < 1e100)
+        compared += int(usual.sum())
+        # rows 0: over real; 1 to 4: over dual
+        for row, place in ((0, 0), (1, 0), (2, 1), (3, 2), (4, 3)):
+            wrong = usual[place] & ~(np.abs(got[row] - expected[place]) <= allowed[place])
+            if wrong.any():
+                at = int(np.flatnonzero(wrong)[0])
+                faults.append(
+                    f"{PLANES[row]} at {points()[at].tolist()}: {got[row, at]!r}, "
+                    f"NumPy {expected[place, at]!r}, allowed {allowed[place, at]:.2g}: {shown(tree)}"
+                )
+    assert compared > 0.5 * 4 * POINTS * len(random_trees())
+    assert not faults, "\n".join([f"{len(faults)} faults", *sorted(faults, key=len)[:8]])
