@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from clfractal.device.structs import Precision
 
 BUILD_TIMEOUT_S = 600.0
 
+_REMARK_SECONDS = 1.5  # longer than a refusal takes: an error stays alone on its line
 _FORMAT = 1  # of what is kept under a key
 
 
@@ -75,7 +77,7 @@ def build(
         warm: a first launch to perform before the binary is kept, so that later runs start at once.
         isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
             an interrupt is answered at once.
-        on_compile: told a line if the cache has no binary, since compiling takes some seconds.
+        on_compile: told a line, from another thread, if compiling takes more than a moment.
 
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
@@ -91,15 +93,23 @@ def build(
         if program is not None:
             return Program(device, program, _milliseconds(start), cached=True)
         cache.drop_blob(key)
-    if on_compile is not None:
-        on_compile(f"compiling for {device.info.name}, once")
+    remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"compiling for {device.info.name}, once"))
+    remark.daemon = True
+    remark.start()
     try:
         program, binary = _compile(device, text, flags, warm, isolated=isolated)
     except BuildFailureError as failure:
         raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
+    finally:
+        remark.cancel()
     if binary:
         cache.store_blob(key, binary)
     return Program(device, program, _milliseconds(start), cached=False)
+
+
+def _tell(listener: Callable[[str], None] | None, line: str) -> None:
+    if listener is not None:
+        listener(line)
 
 
 def _compile(
