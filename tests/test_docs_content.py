@@ -333,6 +333,18 @@ def test_files_that_a_page_names_exist(page: str) -> None:
     assert [name for name in sorted(named) if not os.path.exists(DOCS.parent / name)] == []
 
 
+def anchors(page: str) -> set[str]:
+    """The anchors of a page's headings, as the usual hosts make them."""
+    headings = re.findall(r"^#+ (.+)$", re.sub(r"^```.*?^```$", "", text(page), flags=re.M | re.S), re.M)
+    return {re.sub(r"[^\w -]", "", heading).strip().lower().replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
+def test_links_to_headings(page: str) -> None:
+    links = re.findall(r"\]\(([\w-]+\.md)?#([^)]+)\)", text(page))
+    assert [link for link in links if link[1] not in anchors(link[0] or page)] == []
+
+
 def test_every_module_has_its_place_in_the_architecture() -> None:
     page = text("architecture.md")
     modules = [path for path in PACKAGE.rglob("*.py") if path.name not in ("__init__.py", "__main__.py")]
