@@ -11,9 +11,15 @@ typedef struct {
 // A distance can be far too small where the map stretches space unevenly, and a cone that touches it is no proof of a
 // surface. With the gradient at hand a hit is proved: the touching point descends towards the solid, and counts if it
 // arrives within the pixel. Formulas with a scalar rule of their own are nearly conformal and need no proof.
-#define PROOF_STEPS 6
+//
+// How near counts as arrived depends on the potential G: a low one means that the solid can only be near, though it may be
+// as thin as a sheet that no descent finds; where it is high a small estimate is suspect (a valley of G whose steep sides
+// pretend to a solid at its bottom), and the descent has to get much nearer.
+#define PROOF_STEPS 12
 #define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
-#define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there
+#define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there ...
+#define PROOF_LANDED R(0.004)    // ... and this near where the potential is high
+#define PROOF_LOW R(0.1)         // a low potential: below this part of the cone over the set's radius
 #define PROOF_REACH R(1.0)       // of the pixel's cone: how far from the ray the descent may lead
 #define PROOF_CREEP R(0.25)      // of the pixel's cone: the least step
 #define PROOF_APART R(1.0)       // of the pixel's cone: how far apart two proofs are, unless ...
@@ -62,7 +68,13 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
         radius = pick(proving, radius, fmin(radius, radius_before + step_before));
         // Lanes that prove a hit: arrived, given up, or one step further down.
         const vec offset = vec_sub(point, on_ray);
+#if LOGARITHMIC
+        const real potential = (real)(orbit->log_distance_bailout) * exp2(-surface.smooth * (real)(orbit->log2_degree));
+        const mask low_potential = less(potential * (real)(settings->bounds_radius), PROOF_LOW * cone);
+        const mask near = here.inside | less(radius, pick(low_potential, PROOF_ARRIVED, PROOF_LANDED) * cone);
+#else
         const mask near = here.inside | less(radius, PROOF_ARRIVED * cone);
+#endif
         const real along = vec_dot(offset, r.direction);
         const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
         const mask arrived = proving & near & ~astray;
@@ -105,7 +117,7 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
         // A bracketed lane has seen the inside already.
         const mask done = narrow | (touched & bracketed);
         proving |= touched & ~done;
-        probe = vec_pick(proving, vec_along(point, factor * fmax(radius, PROOF_ARRIVED * cone), downhill), probe);
+        probe = vec_pick(proving, vec_along(point, factor * fmax(radius, PROOF_LANDED * cone), downhill), probe);
         probe_downhill = downhill;
         probe_radius = radius;
         probes = pick(proving, pick(touched, R(0.0), probes + R(1.0)), probes);
