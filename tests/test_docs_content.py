@@ -192,6 +192,18 @@ def test_reserved_names_are_told() -> None:
     assert build._RESERVED - set(nodes.FUNCTIONS) <= told
 
 
+def test_the_message_about_the_formula_of_the_tutorial(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = section("formulas.md", "A formula of one's own")
+    for name, content in re.findall(r"^cat > (\S+) <<'END'\n(.*?)^END$", page, re.M | re.S):
+        (tmp_path / name).write_text(content.replace("re*cos(turn) - im", "re*cos(trn) - im"))
+    monkeypatch.chdir(tmp_path)
+    told = re.search(r"`(tricorn\.yaml:.*)`\.", page)
+    assert told
+    assert InProcess(capsys)("check", "scene.yaml").err == told[1] + "\n"
+
+
 def test_limits_of_formulas() -> None:
     limits = {
         "characters of an expression": parser.MAX_TEXT,
