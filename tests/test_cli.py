@@ -66,10 +66,10 @@ def test_what_a_picture_tells_of_itself(here: Path, shell: InProcess) -> None:
     scene = clfractal.load_scene(header["clfractal"])
     assert (scene.renderer.samples, scene.renderer.precision) == (2, "float64")
     assert scene == clfractal.load_scene(read_texts(here / "a.png")["clfractal"])
-    # The camera at (0, -3, 0) looks along +y, which is -z of camera space, and the target is in the middle.
+    # The camera at (0, -3, 0) looks along +y, which is z of camera space, and the target is in the middle.
     to_camera, to_ndc = header["worldToCamera"], header["worldToNDC"]
-    np.testing.assert_allclose(np.array([0, 0, 0, 1]) @ to_camera, [0, 0, -3, 1], atol=1e-6)
-    np.testing.assert_allclose(np.array([0, 0, 1, 1]) @ to_camera, [0, 1, -3, 1], atol=1e-6)
+    np.testing.assert_allclose(np.array([0, 0, 0, 1]) @ to_camera, [0, 0, 3, 1], atol=1e-6)
+    np.testing.assert_allclose(np.array([0, 0, 1, 1]) @ to_camera, [0, 1, 3, 1], atol=1e-6)
     projected = np.array([0, 0, 0, 1]) @ to_ndc
     np.testing.assert_allclose(projected[:2] / projected[3], [0.5, 0.5], atol=1e-6)
 

@@ -42,31 +42,32 @@ class View:
         return self.height / image_height
 
     def world_to_camera(self) -> Vector:
-        """4 x 4, for row vectors as OpenEXR has them: camera space looks along -z, x to the right, y up."""
-        rotation = np.stack([self.side, self.up, -self.axis], axis=1)
+        """4 x 4, for row vectors, as OpenEXR's standard attribute is defined: left-handed camera space with the origin
+        at the camera, x to the picture's right, y up, z along the view direction (so z is depth)."""
+        rotation = np.stack([self.side, self.up, self.axis], axis=1)
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         matrix[3, :3] = -self.origin @ rotation
         return matrix
 
     def world_to_ndc(self) -> Vector:
-        """4 x 4, for row vectors: x and y from 0 (left, bottom) to 1 across the picture after division by w; z is the
-        distance along the axis divided by w."""
+        """4 x 4, for row vectors, as OpenEXR's standard attribute is defined: after division by w, x and y go from
+        (0, 0), the upper left corner of the whole picture, to (1, 1), the lower right one. w is the depth seen from an
+        eye, else 1; z, which the standard discards, is the depth over w."""
         projection = np.zeros((4, 4))
+        shift = (self.center - self.origin) @ np.stack([self.side, self.up], axis=1)
+        left, top = 0.5 - shift[0] / self.width, 0.5 + shift[1] / self.height
+        projection[2, 2] = 1.0
         if self.eye is None:
-            offset = (self.center - self.origin) @ np.stack([self.side, self.up], axis=1)
-            projection[0, 0], projection[1, 1] = 1 / self.width, 1 / self.height
-            projection[3, 0] = 0.5 - offset[0] / self.width
-            projection[3, 1] = 0.5 - offset[1] / self.height
-            projection[2, 2], projection[3, 3] = -1.0, 1.0
+            projection[0, 0], projection[1, 1] = 1 / self.width, -1 / self.height
+            projection[3, :2] = left, top
+            projection[3, 3] = 1.0
         else:
             distance = float((self.center - self.eye) @ self.axis)
-            offset = (self.center - self.eye) @ np.stack([self.side, self.up], axis=1)
-            # A point at camera (x, y, -d) meets the plane at x * distance / d; w = d.
-            projection[0, 0], projection[1, 1] = distance / self.width, distance / self.height
-            projection[2, 0] = -(0.5 - offset[0] / self.width)
-            projection[2, 1] = -(0.5 - offset[1] / self.height)
-            projection[2, 2], projection[2, 3] = -1.0, -1.0
+            # A point at camera (x, y, d) meets the plane at x * distance / d; w = d.
+            projection[0, 0], projection[1, 1] = distance / self.width, -distance / self.height
+            projection[2, :2] = left, top
+            projection[2, 3] = 1.0
         return self.world_to_camera() @ projection
 
 
