@@ -106,6 +106,7 @@ def escape(
     from clfractal.device.tune import best_lanes
     from clfractal.formulas.catalog import load_chain
     from clfractal.render import points as launch
+    from clfractal.render.probe import probe_for
 
     chain = load_chain(formula, parameters)
     if precision not in ("float32", "float64"):
@@ -116,7 +117,7 @@ def escape(
     if places.ndim != 2 or places.shape[1] != 3:
         raise FormulaError(f"points must have shape (n, 3), got {places.shape}")
     number, chosen = cast("Precision", precision), choose(device)
-    lanes = best_lanes(chosen, number)
+    lanes = best_lanes(chosen, number, probe=probe_for(chosen.info))
     return launch.escape(
         chain, places, int(iterations), device=chosen, lanes=lanes, precision=number, bailout=bailout
     )

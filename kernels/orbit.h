@@ -118,7 +118,6 @@ INLINE sphere orbit_scalar_distance(vec point, mask active, __constant const str
 typedef struct {
     vec gradient;      // of the distance, not normalised: points away from the solid
     real smooth;       // smooth escape count
-    real trap;         // smallest |z| of the orbit
 } surface_point;
 
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
@@ -128,7 +127,6 @@ INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struc
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
     real square_before = square;
-    real trap = square;
     real count = (real)((scalar)FIRST_COUNT);
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
     mask inside = alive & ~alive;
@@ -142,7 +140,6 @@ INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struc
         z = dual_state_pick(alive, next, z);
         square_before = pick(alive, square, square_before);
         square = pick(alive, dual_state_square(next), square);
-        trap = fmin(trap, square);
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
@@ -161,7 +158,6 @@ INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struc
     surface->gradient = relative;
     const real distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
 #endif
-    surface->trap = sqrt(trap);
     // Smooth count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
     // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
     const real log_radius = (real)(orbit->log_distance_bailout);

@@ -48,8 +48,9 @@ def _measured(device: Device, on_start: Callable[[str], None]) -> tuple[str, str
     if select.is_simulator(device.info):
         return "1", "a simulator"
     try:
-        lanes = tune.best_lanes(device, "float32", probe=probe_for(device.info), on_start=on_start)
-        report = tune.lane_reports(device, "float32", (lanes,))[0]
+        probe = probe_for(device.info)
+        lanes = tune.best_lanes(device, "float32", probe=probe, on_start=on_start)
+        report = tune.lane_reports(device, "float32", (lanes,), probe=probe)[0]
     except ClfractalError as error:
         return "-", f"does not work: {error.message}" if isinstance(error, DeviceError) else error.message
     return str(lanes), f"{report.points_per_second / 1e6:.1f} Mpoints/s" if report.accepted else report.fault

@@ -21,7 +21,7 @@ LANE_COUNTS = (1, 4, 8, 16)
 DEFAULT_PROBE = "clfractal.device.probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
-_VERSION = 2  # of the probes: older measurements no longer count
+_VERSION = 3  # of the probes: older measurements no longer count
 _SECTION = "lanes"
 
 
@@ -54,7 +54,7 @@ def lane_reports(
         precision: lanes are tried for each number type alone.
         lane_counts: some of LANE_COUNTS.
         probe: the job that tries one lane count: it gets `lanes` and `precision` and returns `milliseconds`,
-            `points_per_second` and `fault`, as `device.probe.lanes_job` does.
+            `points_per_second` (of the same work on every device, since it compares them) and `fault`.
         on_start: told, once, that a measurement of some seconds begins.
 
     Raises:
@@ -112,8 +112,8 @@ def best_lanes(
         reports = lane_reports(device, precision, lane_counts, probe=probe, on_start=on_start)
         accepted = [report for report in reports if report.accepted]
         if accepted:
-            best = max(accepted, key=lambda report: report.points_per_second)
-            if precision == "float32" and probe == DEFAULT_PROBE:
+            best = min(accepted, key=lambda report: report.milliseconds)
+            if precision == "float32":
                 cache.remember(SPEEDS, device.info.key, best.points_per_second)
             return best.lanes
         faults += [f"{report.lanes} lanes: {report.fault}" for report in reports]

@@ -33,7 +33,7 @@ def probe_for(info: DeviceInfo) -> str:
 
 
 def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
-    """As `device.probe.lanes_job`, whose checks come first; `milliseconds` and `points_per_second` are of a picture."""
+    """As `device.probe.lanes_job`, whose checks come first, but `milliseconds` are those of a picture."""
     answer = probe.lanes_job(request)
     if answer["fault"]:
         return answer
@@ -44,5 +44,4 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     for _ in range(_RENDERS):
         film = Film(plan.channels, (_SIDE, _SIDE), plan.region)
         times.append(engine.render(scene, plan, device, film).kernel_ms)
-    milliseconds = max(min(times), 1e-3)
-    return {**answer, "milliseconds": milliseconds, "points_per_second": 1e3 * _SIDE**2 / milliseconds}
+    return {**answer, "milliseconds": max(min(times), 1e-3)}

@@ -56,7 +56,7 @@ def schema() -> dict[str, Any]:
     for key, entry in found["properties"].items():
         if key not in found["required"]:
             entry["default"] = plain[key]
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "clfractal scene", **found}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found, "title": "clfractal scene"}
 
 
 def _document(source: str | Path | Mapping[str, Any]) -> tuple[Document, Path]:
