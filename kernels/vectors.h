@@ -20,12 +20,12 @@ INLINE vec vec_pick(mask m, vec yes, vec no) {
     return vec_of(pick(m, yes.x, no.x), pick(m, yes.y, no.y), pick(m, yes.z, no.z));
 }
 
-// Length 1; the zero vector stays zero. Scaled by the largest component first, so that squares neither overflow nor vanish.
+// Length 1; a vector that is zero or not finite becomes zero. Scaled by the largest component first, so that squares neither
+// overflow nor vanish.
 INLINE vec vec_normalize(vec a) {
     const real largest = fmax(fmax(fabs(a.x), fabs(a.y)), fabs(a.z));
-    const mask usable = less(R(0.0), largest) & less_equal(largest, (real)(REAL_LARGEST));
-    const real shrink = pick(usable, R(1.0) / largest, R(0.0));
-    const vec b = vec_scale(a, shrink);
-    const real square = vec_dot(b, b);
-    return vec_scale(b, pick(usable, R(1.0) / sqrt(square), R(0.0)));
+    const vec b = vec_scale(a, R(1.0) / largest);
+    const real square = vec_dot(b, b);  // 1 to 3, if a is usable
+    const mask usable = less(R(0.0), square) & less_equal(square, R(4.0));
+    return vec_pick(usable, vec_scale(b, R(1.0) / sqrt(square)), vec_of(R(0.0), R(0.0), R(0.0)));
 }

@@ -20,7 +20,7 @@ from clfractal.resources import folder
 
 Floats = npt.NDArray[np.floating[Any]]
 
-_DEFINED = re.compile(r"^(?:INLINE \w+|__kernel void|#define) (\w+)|^\} (\w+);", re.MULTILINE)
+_DEFINED = re.compile(r"^(?:INLINE \w+|__kernel void|#define|#undef) (\w+)|^\} (\w+);", re.MULTILINE)
 _INCLUDES = re.compile(r'^#include "(?:lanes|vectors|structs|formula|orbit|numbers/\w+)\.h"\n', re.MULTILINE)
 
 HEAD = "".join(
@@ -35,9 +35,9 @@ def kernel_file(name: str) -> str:
 
 
 def numbered(text: str, number: int) -> str:
-    """The text with `_f<number>` after every name that it defines."""
+    """The text with `_f<number>` after every name that it defines (but not after members, `light->color`)."""
     names = {first or second for first, second in _DEFINED.findall(text)}
-    pattern = rf"\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
+    pattern = rf"(?<!->)\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
     return re.sub(pattern, rf"\1_f{number}", text)
 
 

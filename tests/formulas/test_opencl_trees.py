@@ -11,10 +11,12 @@ import pytest
 from hypothesis import Phase, given, settings
 
 from clfractal.device.structs import Precision
+from clfractal.errors import Where
 from clfractal.formulas import catalog
 from clfractal.formulas.backends import DualBackend, NumpyBackend, constant_dual, seeded
 from clfractal.formulas.chain import Chain, single
 from clfractal.formulas.evaluate import evaluate
+from clfractal.formulas.language import parse
 from clfractal.formulas.nodes import Call, Name, Node
 from clfractal.formulas.opencl import write_formula
 from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
@@ -25,6 +27,17 @@ from tests.formulas.trees import VARIABLES, tame_tree
 # Three trees make a formula; a formula is applied once to points of space.
 FORMULAS = 16
 POINTS = 64
+# Faults of the past, and what random trees seldom have: bounds of a clamp that cross, nested powers, unlike branches.
+CHOSEN = (
+    *("clamp(x, 1, y)", "clamp(y, x, -1)", "clamp(z, x, y)*clamp(x, -1, 0.5)"),
+    *("log(x) + log(y*y)", "min(max(x, y, z), x*y, 0.3)**2", "cpow_re(x, y, -3) - cpow_im(x*y, z, 2.5)"),
+    *(
+        "where(x > y or not z < 0 and x != 1, sqrt(x)/y, y**-2)",
+        "mod(x, y)*mod(z, 0.7)",
+        "(x*x + 0.1)**(y*z)",
+    ),
+    *("x**3.5 - abs(y)**-0.5", "atan2(y, x)*atan2(x*x, -z)", "asin(x)*acos(y)/(1 + exp(-z))"),
+)
 PLANES = ("real", "dual", "d/dx", "d/dy", "d/dz")
 PRECISION: Precision = "float64"
 
@@ -40,9 +53,8 @@ def random_trees() -> tuple[Node, ...]:
         trees.append(tree)
 
     collect()
-    while len(trees) < 3 * FORMULAS:
-        trees.append(Name("x"))
-    return tuple(trees[: 3 * FORMULAS])
+    chosen = [parse(text, names=VARIABLES, where=Where()) for text in CHOSEN]
+    return tuple([*chosen, *trees, *(Name("x") for _ in range(3 * FORMULAS))][: 3 * FORMULAS])
 
 
 def chain_of(number: int) -> Chain:

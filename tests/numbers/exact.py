@@ -144,3 +144,10 @@ def finite_or_zero(a: Exact, largest: float) -> Exact:
 def arc_slope(a: float) -> Exact:
     """1/sqrt(1 - a^2) within (-1, 1), else 0."""
     return 1 / mpmath.sqrt((1 - mpf(a)) * (1 + mpf(a))) if abs(a) < 1 else mpf(0)
+
+
+def normalized(a: float, b: float, c: float) -> Exact:
+    """The first component of a vector made one long; 0 for a vector that is zero or not finite."""
+    if not finite(a, b, c) or a == b == c == 0:
+        return mpf(0)
+    return mpf(a) / mpmath.sqrt(mpf(a) ** 2 + mpf(b) ** 2 + mpf(c) ** 2)

@@ -36,6 +36,7 @@ from tests.numbers.exact import (
     mod_choices,
     modulo,
     mpf,
+    normalized,
     power,
     sign,
     total,
@@ -330,6 +331,14 @@ def table(precision: str) -> list[Operation]:
                 added=_axis(axis),
             )
             for axis in "xyz"
+        ),
+        Operation(
+            "normalize",
+            3,
+            normalized,
+            (8.0, 8.0),
+            "vec_normalize(vec_of(a, b, c)).x",
+            loose=lambda *v: finite(*v) and not smallest * 8 < max(map(abs, v)) < largest / 8,
         ),
         Operation("less", 2, lambda a, b: float(a < b), real="pick(less(a, b), R(1.0), R(0.0))"),
         Operation("less_equal", 2, lambda a, b: float(a <= b), real="pick(less_equal(a, b), R(1.0), R(0.0))"),

@@ -17,6 +17,7 @@ _HEAD = """\
 #include "lanes.h"
 #include "numbers/real.h"
 #include "numbers/dual.h"
+#include "vectors.h"
 
 INLINE real load_lanes(__global const scalar *from) {
     scalar each[LANES];

@@ -1,0 +1,103 @@
+"""The whole programs of every library formula build, without a warning, at every lane count.
+
+All formulas of an entry point share one build: what stands before the generated text is the same for all,
+and what comes after it gets a number. Only the front end of the driver's compiler is asked (no optimiser);
+that the code it makes runs is the matter of the other tests.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+import pytest
+
+from clfractal.device import compiler, program
+from clfractal.device.select import Device, choose, has_float64
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+from clfractal.device.tune import accepted_lanes
+from clfractal.files.channels import CHANNELS
+from clfractal.formulas import catalog
+from clfractal.formulas.opencl import write_formula
+from clfractal.render import layout, surface
+from clfractal.render.plan import Plan
+from clfractal.render.tiles import Region
+from clfractal.scene.load import load_scene
+from tests.formulas.opencl_batch import numbered
+
+SCENE = """\
+version: 1
+formula: {name: %s}
+camera: {position: [0, -3, 0], target: [0, 0, 0]}
+coloring: {by: %s}
+"""
+FORMULA = '#line 1 "generated/formula.h"'
+
+
+@lru_cache
+def device() -> Device:
+    return choose()
+
+
+def points_text(name: str, precision: Precision, lanes: int) -> str:
+    formula = write_formula(catalog.load_chain(name))
+    return flatten(
+        "points.cl",
+        generated={"formula.h": formula.text, "structs.h": layout.struct_text()},
+        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
+    ).text
+
+
+def surface_text(name: str, precision: Precision, lanes: int, coloring: str = "iterations") -> str:
+    scene = load_scene(SCENE % (name, coloring))
+    plan = Plan(precision, lanes, 1, Region(0, 0, 64, 64), tuple(CHANNELS))
+    text: str = surface.program_text(scene, plan).text
+    return text
+
+
+def whole_text(name: str, precision: Precision, lanes: int) -> str:
+    """The renderer's program and, behind it, what the one for lists of points has of its own."""
+    own = points_text(name, precision, lanes).rpartition('"kernels/points.cl"\n')[2]
+    assert "__kernel void escape_counts" in own
+    return surface_text(name, precision, lanes) + own
+
+
+def together(texts: list[str]) -> str:
+    """Texts that are equal up to the formula as one: the head once, then all tails, numbered."""
+    parts = [text.partition(FORMULA) for text in texts]
+    head = parts[0][0]
+    assert all(part[0] == head for part in parts)
+    return head + "\n".join(FORMULA + numbered(part[2], n) for n, part in enumerate(parts))
+
+
+def build(text: str, precision: Precision) -> None:
+    flags = [*program.math_flags(precision), "-cl-opt-disable", "-Werror"]
+    compiler.compile_source(device(), text, flags)
+
+
+def test_every_lane_count_in_float32() -> None:
+    for lanes in accepted_lanes(device(), "float32"):
+        build(together([whole_text(name, "float32", lanes) for name in catalog.names()]), "float32")
+
+
+def test_one_lane_count_in_float64() -> None:
+    if not has_float64(device().info):
+        return
+    lanes = accepted_lanes(device(), "float64")[-1]
+    build(together([whole_text(name, "float64", lanes) for name in catalog.names()]), "float64")
+
+
+@pytest.mark.parametrize("coloring", ["solid", "normal"])
+def test_every_coloring(coloring: str) -> None:
+    lanes = accepted_lanes(device(), "float32")[-1]
+    build(surface_text("hast", "float32", lanes, coloring), "float32")
+
+
+def test_a_fault_in_one_formula_is_noticed() -> None:
+    texts = [points_text(name, "float32", 1) for name in catalog.names()]
+    texts[3] = re.sub(r"\breal_mul\(", "real_mult(", texts[3].split(FORMULA)[1]).join(
+        [texts[3].split(FORMULA)[0] + FORMULA, ""]
+    )
+    with pytest.raises(compiler.BuildFailureError, match="real_mult"):
+        build(together(texts), "float32")
