@@ -110,7 +110,7 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
 #else
         const mask touched = outside & less(radius, cone) & (less_equal(retry_t, t) | less(radius, retry_radius));
 #endif
-        const mask narrow = refine ? bracketed & less(high - low, R(0.0625) * cone) : inside;
+        const mask narrow = refine ? bracketed & less_equal(high - low, R(0.0625) * cone) : inside;
 #if HAS_DERIVATIVE
         const mask done = touched | narrow;
 #else
