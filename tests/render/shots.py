@@ -1,0 +1,136 @@
+"""Scenes whose pictures are known from mathematics, and rendering them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.device.tune import best_lanes
+from clfractal.render import engine
+from clfractal.render.film import Film
+from clfractal.render.plan import Plan, make_plan
+from clfractal.render.view import View, camera_view
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+
+Floats = npt.NDArray[np.float64]
+
+CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
+
+# Squaring the quaternion x + iy + jz squares its length, so after n applications |z| <= 4 is the ball of radius
+# 4^(2^-n) exactly.
+BALL_ITERATIONS = 8
+BALL_RADIUS = 4.0 ** (2.0**-BALL_ITERATIONS)
+BALL: dict[str, Any] = {
+    "variables": ["x", "y", "z"],
+    "map": ["x*x - y*y - z*z", "2*x*y", "2*x*z"],
+    "add": "none",
+    "degree": 2,
+    "bounds": {"center": [0, 0, 0], "radius": 1.5},
+    "bailout": 4,
+}
+# With a scalar derivative the march takes its other way, without the proof of hits.
+QUICK_BALL = {**BALL, "derivative": "2*sqrt(x*x + y*y + z*z)*dr"}
+# A box with its top at z = 0 and a sphere that hovers over it, as the last solid of a map that does nothing.
+SPHERE_CENTER, SPHERE_RADIUS = np.array([0.2, -0.1, 0.9]), 0.3
+SOLIDS: dict[str, Any] = {
+    "variables": ["x", "y", "z"],
+    "map": ["x", "y", "z"],
+    "add": "none",
+    "degree": 1,
+    "let": {"qx": "abs(x) - 1.2", "qy": "abs(y) - 1.2", "qz": "abs(z + 0.25) - 0.25"},
+    "shape": "min(sqrt((x - 0.2)**2 + (y + 0.1)**2 + (z - 0.9)**2) - 0.3,"
+    " sqrt(max(qx, 0)**2 + max(qy, 0)**2 + max(qz, 0)**2) + min(max(qx, qy, qz), 0))",
+    "bounds": {"center": [0, 0, 0], "radius": 2},
+    "bailout": 10,
+}
+
+PERSPECTIVE = {"position": [1.5, -2.5, 1.2], "target": [0.1, 0.05, 0], "up": [0.1, 0, 1], "fov": 48}
+ORTHOGRAPHIC = {"projection": "orthographic", "position": [1, -2, 1.5], "target": [0, 0.1, 0], "height": 2.6}
+
+
+def scene_of(
+    formula: Mapping[str, Any],
+    camera: Mapping[str, Any],
+    size: tuple[int, int] = (64, 64),
+    **sections: Any,
+) -> Scene:
+    """A scene of a whole `formula` section, or of an inline formula (with enough iterations for a ball)."""
+    if "map" in formula:
+        formula = {"inline": dict(formula), "iterations": BALL_ITERATIONS}
+    image = {"width": size[0], "height": size[1]}
+    return load_scene(
+        {"version": 1, "formula": dict(formula), "image": image, "camera": dict(camera), **sections}
+    )
+
+
+def plan_of(scene: Scene, device: Device, precision: Precision = "float32", **settings: Any) -> Plan:
+    settings = {"lanes": None, "channels": CHANNELS, **settings}
+    if settings["lanes"] is None:
+        settings["lanes"] = best_lanes(device, precision)
+    return make_plan(scene, precision=precision, **settings)
+
+
+def shoot(scene: Scene, device: Device, precision: Precision = "float32", **settings: Any) -> Film:
+    """The picture; settings as for `make_plan`."""
+    plan = plan_of(scene, device, precision, **settings)
+    film = Film(plan.channels, (scene.image.width, scene.image.height), plan.region)
+    engine.render(scene, plan, device, film)
+    return film
+
+
+def stacked(film: Film, names: Sequence[str] = CHANNELS) -> npt.NDArray[np.float32]:
+    """Channels as one array of shape (height, width, channels)."""
+    return np.stack([film[name] for name in names], axis=-1)
+
+
+def points_of(film: Film) -> Floats:
+    return stacked(film, ("P.X", "P.Y", "P.Z")).astype(float)
+
+
+def normals_of(film: Film) -> Floats:
+    return stacked(film, ("N.X", "N.Y", "N.Z")).astype(float)
+
+
+def rays(
+    scene: Scene, across: float | Floats = 0.5, below: float | Floats = 0.5
+) -> tuple[Floats, Floats, Floats]:
+    """Origins, directions (length 1) and pixel footprints per unit of distance (perspective) or absolute
+    (orthographic), written down from the definition of a pinhole and a parallel camera; shapes (height, width, 3)
+    and (height, width)."""
+    camera, width, height = scene.camera, scene.image.width, scene.image.height
+    position, target = np.array(camera.position), np.array(camera.target)
+    forward = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(forward, camera.up)
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    x = (np.arange(width)[None, :] + across - width / 2) / height + np.zeros((height, 1))
+    y = (height / 2 - np.arange(height)[:, None] - below) / height + np.zeros((1, width))
+    if camera.projection == "perspective":
+        side = 2 * np.tan(np.radians(camera.fov) / 2)
+        toward = forward + side * (x[..., None] * right + y[..., None] * up)
+        length = np.linalg.norm(toward, axis=-1)
+        return np.broadcast_to(position, toward.shape), toward / length[..., None], side / height / length
+    origin = position + camera.height * (x[..., None] * right + y[..., None] * up)
+    footprint = np.full((height, width), camera.height / height)
+    return origin, np.broadcast_to(forward, origin.shape), footprint
+
+
+def to_sphere(
+    origin: Floats, direction: Floats, center: npt.ArrayLike, radius: float
+) -> tuple[Floats, Floats]:
+    """Distance along rays to a sphere (inf where they miss), and the least distance of each ray from its centre."""
+    offset = origin - np.asarray(center)
+    middle = -(offset * direction).sum(-1)
+    nearest = np.linalg.norm(offset + middle[..., None] * direction, axis=-1)
+    half = np.sqrt(np.maximum(radius**2 - nearest**2, 0))
+    return np.where(nearest < radius, middle - half, np.inf), nearest
+
+
+def view_of(scene: Scene) -> View:
+    return camera_view(scene.camera, scene.image.width, scene.image.height)

@@ -1,0 +1,222 @@
+"""Light on known surfaces: Eq. 5 evaluated in NumPy, shadows where geometry puts them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.render.film import Film
+from clfractal.scene.model import Scene
+from tests.render.shots import (
+    BALL,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    QUICK_BALL,
+    SOLIDS,
+    SPHERE_CENTER,
+    SPHERE_RADIUS,
+    Floats,
+    points_of,
+    rays,
+    scene_of,
+    shoot,
+    stacked,
+    to_sphere,
+)
+
+MATERIAL: dict[str, Any] = {
+    "color": [0.9, 0.5, 0.2],
+    "ambient": 0.15,
+    "diffuse": 0.7,
+    "specular": 0.6,
+    "shininess": 12,
+}
+LIGHTS: dict[str, list[dict[str, Any]]] = {
+    "directional": [{"direction": [-1, 2, -1.5], "color": [1, 0.8, 0.6], "intensity": 1.7}],
+    "point": [{"type": "point", "position": [1.5, -2, 2], "color": [0.2, 0.4, 1], "intensity": 1.2}],
+    "inverse square": [
+        {"type": "point", "position": [0.5, -1.8, 1.1], "intensity": 2.5, "falloff": "inverse_square"}
+    ],
+    "several": [
+        {"direction": [-1, 2, -1.5], "color": [1, 0.8, 0.6], "intensity": 0.4},
+        {"direction": [1, 0.1, 0], "color": [0.1, 0, 0.9]},
+        {
+            "type": "point",
+            "position": [1.5, -2, 2],
+            "color": [0.2, 0.4, 1],
+            "intensity": 1.2,
+            "shadow": False,
+        },
+        {"type": "point", "position": [-3, -2, 2], "intensity": 9, "falloff": "inverse_square"},
+    ],
+    "none": [],
+}
+
+
+@pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "scalar rule"])
+@pytest.mark.parametrize("lights", LIGHTS)
+def test_equation_5(device: Device, formula: dict[str, Any], lights: str) -> None:
+    """A ball shadows no point that faces the light, so every hit pixel has Eq. 5 with s = 1: no acne at any angle."""
+    scene = scene_of(
+        formula, PERSPECTIVE, lights=LIGHTS[lights], material=MATERIAL, renderer={"detail": 0.25}
+    )
+    film = shoot(scene, device)
+    hit = film["A"] == 1
+    points = points_of(film)
+    normals = points / np.linalg.norm(points, axis=-1, keepdims=True).clip(1e-9)
+    expected = eq5(scene, points, normals, rays(scene)[1])
+    assert hit.sum() > 1000
+    np.testing.assert_allclose(colors(film)[hit], expected[hit], atol=3e-4)
+    if lights == "none":
+        assert not colors(film)[hit].any()
+
+
+@pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "scalar rule"])
+@pytest.mark.parametrize("detail", [0.25, 1.0, 4.0])
+def test_no_acne(device: Device, formula: dict[str, Any], detail: float) -> None:
+    """Lit from everywhere, grazing light included: what faces a light is as bright as without shadows."""
+    for direction in ([0, 1, 0], [-1, 0.02, 0], [0.03, 0, -1], [1, 1, 1], [0.3, -0.9, 0.1]):
+        for camera in (PERSPECTIVE, ORTHOGRAPHIC):
+            pictures = [
+                colors(
+                    shoot(
+                        scene_of(
+                            formula,
+                            camera,
+                            (64, 64),
+                            lights=[{"direction": direction, "shadow": shadow}],
+                            renderer={"detail": detail},
+                        ),
+                        device,
+                        channels=("R", "G", "B"),
+                    )
+                )
+                for shadow in (True, False)
+            ]
+            assert np.array_equal(*pictures)
+
+
+def test_shadow_of_parallel_light(device: Device) -> None:
+    """On the box's top a point is dark exactly if its line to the light meets the sphere; footprints decide at the rim."""
+    direction = np.array([-0.5, 0.3, -1.0])
+    scene = scene_of(
+        SOLIDS, PERSPECTIVE, (240, 180), lights=[{"direction": direction.tolist()}], material=MATERIAL
+    )
+    film = shoot(scene, device)
+    points, top = box_top(film)
+    toward = -direction / np.linalg.norm(direction)
+    _, passing = to_sphere(points, np.broadcast_to(toward, points.shape), SPHERE_CENTER, SPHERE_RADIUS)
+    check_shadow(film, scene, points, top, passing)
+
+
+def test_shadow_of_a_point_light(device: Device) -> None:
+    """The same from a light above; one that stands between sphere and box casts no shadow of the sphere."""
+    for position, casts in (([0.5, -0.3, 1.8], True), ([0.2, -0.1, 0.4], False)):
+        light = {"type": "point", "position": position}
+        scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[light], material=MATERIAL)
+        film = shoot(scene, device)
+        points, top = box_top(film)
+        toward = np.array(position) - points
+        toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
+        _, passing = to_sphere(points, toward, SPHERE_CENTER, SPHERE_RADIUS)
+        check_shadow(film, scene, points, top, passing if casts else np.full_like(passing, 9.0), some=casts)
+
+
+def test_lights_without_shadow_shine_through(device: Device) -> None:
+    light = {"direction": [-0.5, 0.3, -1.0], "shadow": False}
+    scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[light], material=MATERIAL)
+    film = shoot(scene, device)
+    points, top = box_top(film)
+    normals = np.broadcast_to(np.array([0.0, 0, 1]), points.shape)
+    np.testing.assert_allclose(colors(film)[top], eq5(scene, points, normals, rays(scene)[1])[top], atol=1e-4)
+
+
+def test_light_from_behind_a_surface(device: Device) -> None:
+    """The ambient part alone: where the normal turns away from the light, and beneath the box."""
+    scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[{"direction": [0, 0, 1]}], material=MATERIAL)
+    film = shoot(scene, device)
+    _, top = box_top(film)
+    ambient = np.array(MATERIAL["color"]) * MATERIAL["ambient"]
+    np.testing.assert_allclose(colors(film)[top], np.broadcast_to(ambient, (top.sum(), 3)), atol=1e-6)
+
+
+def test_coloring_by_normal(device: Device) -> None:
+    """The thesis stores (n + 1)/2 as red, green and blue (sec. 3.2.1)."""
+    flat = {**MATERIAL, "ambient": 1, "diffuse": 0, "specular": 0}
+    scene = scene_of(BALL, PERSPECTIVE, coloring={"by": "normal"}, material=flat)
+    film = shoot(scene, device)
+    hit = film["A"] == 1
+    normals = stacked(film, ("N.X", "N.Y", "N.Z"))
+    np.testing.assert_allclose(colors(film)[hit], (normals[hit] + 1) / 2, atol=1e-6)
+
+
+def check_shadow(
+    film: Film,
+    scene: Scene,
+    points: Floats,
+    top: npt.NDArray[np.bool_],
+    passing: Floats,
+    *,
+    some: bool = True,
+) -> None:
+    """Dark points have the ambient part of Eq. 5 alone. Shadow rays start three footprints above the surface and count
+    as blocked within one footprint of it: nearer than six to the rim either is right."""
+    footprint = (rays(scene)[2] * np.where(top, film["Z"], 1)) * 1.1
+    dark = top & (passing < SPHERE_RADIUS - 6 * footprint)
+    lit = top & (passing > SPHERE_RADIUS + 6 * footprint)
+    normals = np.broadcast_to(np.array([0.0, 0, 1]), points.shape)
+    full = eq5(scene, points, normals, rays(scene)[1])
+    ambient = eq5(scene, points, normals, rays(scene)[1], lit=False)
+    assert lit.sum() > 1000
+    np.testing.assert_allclose(colors(film)[lit], full[lit], atol=2e-4)
+    np.testing.assert_allclose(colors(film)[dark], ambient[dark], atol=1e-5)
+    if some:
+        assert dark.sum() > 150
+
+
+def box_top(film: Film) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Positions, moved down onto the plane z = 0, and which pixels show the box's top, away from its edges and
+    from the sphere."""
+    points = points_of(film)
+    top = (film["A"] > 0) & (np.abs(points[..., 2]) < 0.1) & (np.abs(points[..., :2]).max(-1) < 1.1)
+    top &= film["N.Z"] > 0.9999
+    return points, top
+
+
+def eq5(scene: Scene, points: Floats, normals: Floats, directions: Floats, *, lit: bool = True) -> Floats:
+    """Englund 2010, Eq. 5, for arrays of shape (..., 3)."""
+    material = scene.material
+    body = np.array(material.color)
+    total = np.zeros(points.shape)
+    for light in scene.lights:
+        strength = np.full(points.shape[:-1], light.intensity)
+        if light.type == "point":
+            offset = np.array(light.position) - points
+            distance = np.linalg.norm(offset, axis=-1)
+            toward = offset / distance[..., None]
+            if light.falloff == "inverse_square":
+                strength = strength / distance**2
+        else:
+            toward = np.broadcast_to(
+                -np.array(light.direction) / np.linalg.norm(light.direction), points.shape
+            )
+        facing = (normals * toward).sum(-1)
+        mirrored = 2 * facing[..., None] * normals - toward
+        highlight = np.maximum((mirrored * -directions).sum(-1), 0) ** material.shininess
+        shines = lit & (facing > 0)
+        diffuse = np.where(shines, material.diffuse * facing, 0.0)
+        specular = np.where(shines, material.specular * highlight, 0.0)
+        added = (material.ambient + diffuse)[..., None] * body + specular[..., None]
+        total += np.array(light.color) * strength[..., None] * added
+    return total
+
+
+def colors(
+    film: Film | Mapping[str, npt.NDArray[np.float32]], names: Sequence[str] = ("R", "G", "B")
+) -> npt.NDArray[np.float32]:
+    return np.stack([film[name] for name in names], axis=-1)
