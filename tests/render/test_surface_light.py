@@ -98,7 +98,7 @@ def test_no_acne(device: Device, formula: dict[str, Any], detail: float) -> None
                 )
                 for shadow in (True, False)
             ]
-            assert np.array_equal(*pictures)
+            assert np.array_equal(pictures[0], pictures[1])
 
 
 def test_shadow_of_parallel_light(device: Device) -> None:

@@ -1,0 +1,172 @@
+"""Background, coverage, and several samples a pixel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device
+from tests.render.shots import (
+    BALL_RADIUS,
+    CHANNELS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    QUICK_BALL,
+    Floats,
+    normals_of,
+    points_of,
+    rays,
+    scene_of,
+    shoot,
+    stacked,
+    to_sphere,
+)
+
+GRADIENT = {"top": [0.1, 0.4, 2.0], "bottom": [0.5, 0.0, 1.0]}
+# Ambient light alone: every sample of the ball has this colour.
+FLAT: dict[str, Any] = {
+    "lights": [{"shadow": False}],
+    "material": {"color": [0.25, 0.5, 1.0], "ambient": 1, "diffuse": 0, "specular": 0},
+}
+RGB = ("R", "G", "B")
+
+
+def test_background(device: Device) -> None:
+    """Linear between its colours from the picture's upper rim to its lower one."""
+    scene = scene_of(QUICK_BALL, PERSPECTIVE, (40, 50), background=GRADIENT)
+    film = shoot(scene, device)
+    share = ((np.arange(50) + 0.5) / 50)[:, None, None]
+    expected = (1 - share) * np.array(GRADIENT["top"]) + share * np.array(GRADIENT["bottom"])
+    miss = film["A"] == 0
+    assert miss.sum() > 500
+    np.testing.assert_allclose(
+        stacked(film, RGB)[miss], np.broadcast_to(expected, (50, 40, 3))[miss], rtol=1e-6
+    )
+
+
+def test_background_of_a_region(device: Device) -> None:
+    """A region shows its part of the whole picture's background."""
+    scene = scene_of(QUICK_BALL, PERSPECTIVE, (40, 50), background=GRADIENT)
+    whole, part = shoot(scene, device), shoot(scene, device, region=(3, 31, 20, 19))
+    assert np.array_equal(stacked(part), stacked(whole)[31:50, 3:23])
+
+
+@pytest.mark.parametrize("samples", [1, 16])
+def test_transparent(device: Device, samples: int) -> None:
+    """R, G, B are premultiplied: the colour times the coverage, 0 where nothing is hit."""
+    scene = scene_of(QUICK_BALL, PERSPECTIVE, background="transparent", **FLAT)
+    film = shoot(scene, device, samples=samples)
+    coverage = film["A"]
+    if samples == 1:
+        assert set(np.unique(coverage)) == {0, 1}
+    else:
+        assert np.array_equal(coverage * 16, np.round(coverage * 16))
+        assert len(np.unique(coverage)) > 5
+    np.testing.assert_allclose(stacked(film, RGB), coverage[..., None] * np.array([0.25, 0.5, 1]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("samples", [16, 64])
+def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None:
+    """Seen from infinity the ball is a disc. Independent samples would have a standard error of sqrt(p (1 - p) / N) in a
+    pixel that the disc covers by p; stratified ones halve it at least, and the whole area is better still."""
+    scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (48, 48), renderer={"detail": 0.01}, **FLAT)
+    coverage = shoot(scene, device, samples=samples, channels=("A",))["A"].astype(float)
+    fine = np.mean(
+        [
+            to_sphere(*rays(scene, (i + 0.5) / 32, (j + 0.5) / 32)[:2], (0, 0, 0), BALL_RADIUS)[1]
+            < BALL_RADIUS
+            for i in range(32)
+            for j in range(32)
+        ],
+        axis=0,
+    )
+    rim = (fine > 0) & (fine < 1)
+    assert np.array_equal(coverage[~rim], fine[~rim])
+    assert rim.sum() > 100
+    error = (coverage - fine)[rim]
+    independent = np.sqrt((fine * (1 - fine))[rim].mean() / samples)
+    assert np.sqrt((error**2).mean()) < 0.5 * independent
+    # All of it; a ray that passes the ball within two hit distances may hit it too.
+    pixel = 2.6 / 48
+    least, most = (np.pi * (BALL_RADIUS + 2 * detail * pixel) ** 2 for detail in (0, 0.01))
+    assert 0.9995 * least < coverage.sum() * pixel**2 < 1.0005 * most
+
+
+def test_averages_are_of_linear_light(device: Device) -> None:
+    """A pixel half covered has the mean of the numbers in R, G, B, whatever the exposure of a PNG would be."""
+    same = {"top": [0.1, 0.2, 3.0], "bottom": [0.1, 0.2, 3.0]}
+    film = shoot(scene_of(QUICK_BALL, PERSPECTIVE, background=same, **FLAT), device, samples=8)
+    a = film["A"][..., None]
+    assert ((a > 0) & (a < 1)).any()
+    np.testing.assert_allclose(
+        stacked(film, RGB), a * np.array([0.25, 0.5, 1]) + (1 - a) * np.array(same["top"]), rtol=2e-6
+    )
+
+
+@pytest.mark.parametrize("samples", [2, 5, 16])
+def test_data_channels_take_the_nearest_sample(device: Device, samples: int) -> None:
+    """Depth, point and normal of one ray, that of the sample nearest to the pixel's centre: hit or not, no averages."""
+    scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (48, 48), renderer={"detail": 0.01, "seed": 7})
+    film = shoot(scene, device, samples=samples)
+    across, below = sample_places(48, 48, samples, 7)
+    chosen = ((across - 0.5) ** 2 + (below - 0.5) ** 2).argmin(axis=-1)[..., None]
+    u, v = (np.take_along_axis(place, chosen, axis=-1)[..., 0] for place in (across, below))
+    origin, direction, _ = rays(scene, u, v)
+    distance, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
+    sure = np.abs(nearest - BALL_RADIUS) > 1e-2
+    hit = np.isfinite(film["Z"])
+    assert np.array_equal(hit[sure], np.isfinite(distance)[sure])
+    points, facing = points_of(film), nearest < 0.9 * BALL_RADIUS
+    expected = origin + np.where(np.isfinite(distance), distance, 0)[..., None] * direction
+    np.testing.assert_allclose(points[facing], expected[facing], atol=5e-3)
+    # On that ray, to rounding: a mean of two rays would lie beside it.
+    offset = points - origin
+    aside = offset - (offset * direction).sum(-1, keepdims=True) * direction
+    assert np.abs(aside[hit]).max() < 2e-6
+    np.testing.assert_allclose(np.linalg.norm(normals_of(film)[hit], axis=-1), 1, atol=1e-5)
+    assert np.isfinite(stacked(film, [name for name in CHANNELS if name != "Z"])).all()
+
+
+def test_samples_are_stratified() -> None:
+    """The places that the device is compared with: one sample in each of N strips, in both directions."""
+    for samples in (4, 16, 64):
+        for place in sample_places(8, 8, samples, 3):
+            # The random turn moves all strips alike, so that they are as wide again.
+            ordered = np.sort(place, axis=-1)
+            gaps = np.diff(np.concatenate([ordered, ordered[..., :1] + 1], axis=-1), axis=-1)
+            np.testing.assert_allclose(gaps, 1 / samples, atol=1e-6)
+
+
+def test_seed_and_region_of_samples(device: Device) -> None:
+    """Another seed, other places; the same seed, the same picture, in a region too."""
+    scenes = [scene_of(QUICK_BALL, PERSPECTIVE, renderer={"seed": seed}) for seed in (0, 1)]
+    first, second = (stacked(shoot(scene, device, samples=4)) for scene in scenes)
+    assert not np.array_equal(first, second)
+    assert np.abs(first[..., 3] - second[..., 3]).mean() < 0.02
+    part = stacked(shoot(scenes[0], device, samples=4, region=(17, 5, 40, 33)))
+    assert np.array_equal(part, first[5:38, 17:57])
+
+
+def sample_places(width: int, height: int, samples: int, seed: int) -> tuple[Floats, Floats]:
+    """Places of the samples in their pixels, from the left and from the top, shape (height, width, samples): a Hammersley
+    set turned by a hash of the pixel's place."""
+    x = np.arange(width, dtype=np.uint32)[None, :]
+    y = np.arange(height, dtype=np.uint32)[:, None]
+    turn = murmur_finish(x + murmur_finish(y + murmur_finish(np.array([seed], np.uint32))))
+    number = np.arange(samples)
+    reversed_bits = np.array([int(f"{n:032b}"[::-1], 2) / 2**32 for n in number])
+    across = (number + 0.5) / samples + (turn[..., None] >> 8) / 2**24
+    below = reversed_bits + (murmur_finish(turn)[..., None] >> 8) / 2**24
+    return across % 1, below % 1
+
+
+def murmur_finish(a: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
+    """The finaliser of MurmurHash3."""
+    a = a ^ (a >> np.uint32(16))
+    a = a * np.uint32(0x85EBCA6B)
+    a = a ^ (a >> np.uint32(13))
+    a = a * np.uint32(0xC2B2AE35)
+    return a ^ (a >> np.uint32(16))

@@ -1,0 +1,103 @@
+"""The View: rays through pixel centres, and the matrices that picture files carry."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from tests.render.shots import BALL, BALL_RADIUS, points_of, rays, scene_of, shoot, view_of
+
+CAMERAS: dict[str, dict[str, Any]] = {
+    "perspective": {"position": [1.5, -2.5, 1.2], "target": [0.1, 0.05, 0], "up": [0.1, 0, 1], "fov": 48},
+    "wide": {"position": [0.3, 0.2, 1.7], "target": [0.3, 0.1, 0], "up": [0, 1, 0.4], "fov": 100},
+    "orthographic": {
+        "projection": "orthographic",
+        "position": [1, -2, 1.5],
+        "target": [0, 0.1, 0],
+        "up": [0.3, 0.1, 1],
+        "height": 2.6,
+    },
+}
+SIZES = [(64, 64), (90, 40), (33, 70)]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_axes(camera: str, size: tuple[int, int]) -> None:
+    """Right-handed: side, up and the way back to the viewer; the target is in the middle; pixels are square."""
+    scene = scene_of(BALL, CAMERAS[camera], size)
+    view = view_of(scene)
+    frame = np.stack([view.side, view.up, -view.axis])
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(frame) == pytest.approx(1)
+    assert view.up @ np.array(scene.camera.up) > 0
+    to_target = np.array(scene.camera.target) - view.origin
+    assert np.linalg.norm(np.cross(to_target, view.axis)) == pytest.approx(0, abs=1e-12)
+    assert view.width / size[0] == pytest.approx(view.height / size[1])
+    assert view.pixel_size(size[1]) == pytest.approx(view.height / size[1])
+
+
+def test_field_of_view() -> None:
+    """The angle between the rays through the middles of the picture's upper and lower rim is the camera's."""
+    view = view_of(scene_of(BALL, CAMERAS["perspective"]))
+    assert view.eye is not None
+    rim = [view.center + sign * view.up * view.height / 2 - view.eye for sign in (1, -1)]
+    cosine = rim[0] @ rim[1] / np.linalg.norm(rim[0]) / np.linalg.norm(rim[1])
+    assert np.degrees(np.arccos(cosine)) == pytest.approx(48)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_world_to_camera(camera: str, size: tuple[int, int]) -> None:
+    """OpenEXR: left-handed, x right, y up, z along the view; the origin is the camera."""
+    view = view_of(scene_of(BALL, CAMERAS[camera], size))
+    matrix = view.world_to_camera()
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(-1)  # from right-handed to left-handed space
+    for point, expected in (
+        (view.origin, [0, 0, 0, 1]),
+        (view.origin + 2 * view.axis, [0, 0, 2, 1]),
+        (view.origin + view.side, [1, 0, 0, 1]),
+        (view.origin + view.up, [0, 1, 0, 1]),
+    ):
+        np.testing.assert_allclose([*point, 1] @ matrix, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_world_to_ndc(camera: str, size: tuple[int, int]) -> None:
+    """OpenEXR: (0, 0) is the upper left, (1, 1) the lower right of the display window: every point of a pixel's ray
+    comes to that pixel's centre."""
+    scene = scene_of(BALL, CAMERAS[camera], size)
+    matrix = view_of(scene).world_to_ndc()
+    origin, direction, _ = rays(scene)
+    width, height = size
+    for distance in (0.3, 1.0, 7.0):
+        points = origin + distance * direction
+        projected = np.concatenate([points, np.ones((*points.shape[:-1], 1))], axis=-1) @ matrix
+        where = projected[..., :2] / projected[..., 3:]
+        expected = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+        np.testing.assert_allclose(where, np.stack(expected, axis=-1), atol=1e-12)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_rendered_points_are_where_their_pixels_are(device: Device, camera: str) -> None:
+    """P of every hit pixel, projected by the matrix in the file, is that pixel's centre; its depth is Z."""
+    scene = scene_of(BALL, CAMERAS[camera], (90, 40))
+    film = shoot(scene, device)
+    view = view_of(scene)
+    hit = film["A"] > 0
+    assert hit.sum() > 200
+    points = np.concatenate([points_of(film)[hit], np.ones((hit.sum(), 1))], axis=-1)
+    projected = points @ view.world_to_ndc()
+    pixels = projected[:, :2] / projected[:, 3:] * [90, 40]
+    rows, columns = np.nonzero(hit)
+    np.testing.assert_allclose(pixels, np.stack([columns + 0.5, rows + 0.5], axis=-1), atol=1e-3)
+    np.testing.assert_allclose((points @ view.world_to_camera())[:, 2], film["Z"][hit], atol=3e-6)
+    # And it is the near side of the ball.
+    origin = rays(scene)[0][hit]
+    assert (
+        np.linalg.norm(points[:, :3] - origin, axis=-1) < np.linalg.norm(origin, axis=-1) + BALL_RADIUS / 4
+    ).all()
