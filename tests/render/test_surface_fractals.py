@@ -1,0 +1,115 @@
+"""Fractals' normals and smooth counts against maps written by hand, differentiated by differences in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from tests.render.shots import Floats, normals_of, points_of, scene_of, shoot
+
+Map = Callable[[Floats, Floats], Floats]
+
+
+def mandelbulb(z: Floats, c: Floats) -> Floats:
+    """White's rule of power 8 with its trigonometry: elevation from the axis, and azimuth."""
+    r = np.linalg.norm(z, axis=-1)
+    theta, phi = np.arccos(z[..., 2] / r), np.arctan2(z[..., 1], z[..., 0])
+    direction = [np.sin(8 * theta) * np.cos(8 * phi), np.sin(8 * theta) * np.sin(8 * phi), np.cos(8 * theta)]
+    result: Floats = (r**8)[..., None] * np.stack(direction, axis=-1) + c
+    return result
+
+
+def hast(z: Floats, c: Floats) -> Floats:
+    """Englund 2010, Eq. 4."""
+    a, b, d = np.moveaxis(z, -1, 0)
+    r = np.sqrt(b * b + d * d)
+    parts = [a * a - b * b - d * d, 2 * a * (b * np.abs(b) - d * d) / r, 4 * a * b * d / r]
+    return np.stack(parts, axis=-1) + c
+
+
+def julia(z: Floats, c: Floats) -> Floats:
+    """The square of the quaternion (s, v): (s s - v.v, 2 s v), plus a constant."""
+    s, v = z[..., :1], z[..., 1:]
+    square = np.concatenate([s * s - (v * v).sum(-1, keepdims=True), 2 * s * v], axis=-1)
+    result: Floats = square + np.array([-0.2, 0.6, 0.2, 0.2])
+    return result
+
+
+CASES: dict[str, tuple[dict[str, Any], Map, int]] = {
+    "mandelbulb": ({"name": "mandelbulb", "iterations": 4}, mandelbulb, 8),
+    "hast": ({"name": "hast", "iterations": 8}, hast, 2),
+    "quaternion_julia": ({"name": "quaternion_julia", "iterations": 8}, julia, 2),
+}
+CAMERA = {"position": [1.3, -2.6, 1.6], "target": [0, 0, 0], "fov": 45}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_normals_and_counts(device: Device, name: str) -> None:
+    """The normal is the direction in which |z| of the last application grows fastest; the smooth count is
+    n - log(log|z| / log R) / log d at the first n where |z| exceeds R, 1000 or less for high degrees d."""
+    formula, step, degree = CASES[name]
+    scene = scene_of(formula, CAMERA, (96, 72), lights=[])
+    film = shoot(scene, device)
+    hit = film["A"] > 0
+    assert hit.sum() > 800
+    points = points_of(film)[hit]
+    limit = scene.chain.distance_bailout
+    count, radius = last(step, points, name, limit)
+    h = 1e-6
+    gradient = np.stack(
+        [
+            np.log(last(step, points + h * axis, name, limit, count)[1])
+            - np.log(last(step, points - h * axis, name, limit, count)[1])
+            for axis in np.eye(3)
+        ],
+        axis=-1,
+    )
+    expected = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+    cosine = (normals_of(film)[hit] * expected).sum(-1)
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    # Few iterations make a smooth surface. float32 and folds of hast's map (no gradient there) spoil a few.
+    assert np.median(angle) < 0.05
+    assert np.quantile(angle, 0.99) < 1.0
+
+    smooth = count - np.clip(np.log(np.log(radius) / np.log(limit)) / np.log(degree), 0, 1)
+    difference = np.abs(film["iterations"][hit] - smooth)
+    assert np.median(difference) < 1e-3
+    assert np.quantile(difference, 0.99) < 0.02
+
+
+def test_smooth_counts_have_no_jumps(device: Device) -> None:
+    """Along a line out of the Mandelbulb the smooth count falls steadily, through every whole number."""
+    from clfractal.device.tune import best_lanes
+    from clfractal.formulas.catalog import load_chain
+    from clfractal.render.points import distances
+
+    line = np.linspace(2.0, 0.4, 8001)[:, None] * np.array([[0.48, 0.6, 0.64]])
+    lanes = best_lanes(device, "float32")
+    smooth = distances(load_chain("mandelbulb"), line, 60, device=device, lanes=lanes).smooth
+    outer = smooth[: int((smooth > 5).argmax())]
+    assert outer.max() - outer.min() > 3
+    assert np.abs(np.diff(outer)).max() < 0.1
+
+
+def last(
+    step: Map, points: Floats, name: str, limit: float, count: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """How many applications it takes until |z| > `limit` and |z| then; or |z| after `count` applications."""
+    if name == "quaternion_julia":
+        z = np.concatenate([points, np.zeros((len(points), 1))], axis=-1)
+        done = 0
+    else:
+        z, done = points.copy(), 1  # f(0) + C = C
+    c = points
+    result, at = np.zeros(len(points)), np.zeros(len(points))
+    for n in range(done, 40):
+        radius = np.linalg.norm(z, axis=-1)
+        now = (at == 0) & (radius > limit) if count is None else count == n
+        result[now], at[now] = radius[now], n
+        z = step(np.where(at[:, None] > 0, 0.5, z), c)
+    assert (result > 0).all()
+    return at, result
