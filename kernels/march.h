@@ -67,31 +67,35 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
 #else
         radius = pick(proving, radius, fmin(radius, radius_before + step_before));
         // Lanes that prove a hit: arrived, given up, or one step further down.
-        const vec offset = vec_sub(point, on_ray);
+        mask failed = active & ~active;
+        if (any_lane(proving)) {
+            const vec offset = vec_sub(point, on_ray);
+            real arrival = PROOF_ARRIVED * cone;
 #if LOGARITHMIC
-        const real potential = (real)(orbit->log_distance_bailout) * exp2(-surface.smooth * (real)(orbit->log2_degree));
-        const mask low_potential = less(potential * (real)(settings->bounds_radius), PROOF_LOW * cone);
-        const mask near = here.inside | less(radius, pick(low_potential, PROOF_ARRIVED, PROOF_LANDED) * cone);
-#else
-        const mask near = here.inside | less(radius, PROOF_ARRIVED * cone);
+            const mask low = less(potential(here, surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
+            arrival = pick(low, arrival, PROOF_LANDED * cone);
 #endif
-        const real along = vec_dot(offset, r.direction);
-        const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
-        const mask arrived = proving & near & ~astray;
-        const mask failed = proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), probes));
-        found.hit |= arrived;
-        found.t = pick(arrived, t, found.t);
-        active &= ~arrived;
-        retry_t = pick(failed, t + PROOF_APART * cone, retry_t);
-        retry_radius = pick(failed, PROOF_CLOSER * radius_before, retry_radius);
-        t = pick(failed, t + PROOF_ONWARD * cone, t);
-        proving &= ~(arrived | failed);
+            const real along = vec_dot(offset, r.direction);
+            const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
+            const mask arrived = proving & (here.inside | less(radius, arrival)) & ~astray;
+            failed = proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), probes));
+            found.hit |= arrived;
+            found.t = pick(arrived, t, found.t);
+            active &= ~arrived;
+            retry_t = pick(failed, t + PROOF_APART * cone, retry_t);
+            retry_radius = pick(failed, PROOF_CLOSER * radius_before, retry_radius);
+            t = pick(failed, t + PROOF_ONWARD * cone, t);
+            proving &= ~(arrived | failed);
+        }
         const mask marching = active & ~proving & ~failed;
-        const vec downhill = vec_scale(vec_normalize(surface.gradient), R(-1.0));
-        // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
-        const mask turned = less(vec_dot(downhill, probe_downhill), R(0.0));
-        const mask slow = less(R(0.5) * probe_radius, radius);
-        factor = pick(proving, factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
+        vec downhill = r.direction;
+        if (any_lane(proving | (marching & less(radius, cone)))) {
+            downhill = vec_scale(vec_normalize(surface.gradient), R(-1.0));
+            // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
+            const mask turned = less(vec_dot(downhill, probe_downhill), R(0.0));
+            const mask slow = less(R(0.5) * probe_radius, radius);
+            factor = pick(proving, factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
+        }
 #endif
 
         // Over-relaxation (Keinert et al. 2014, sec. 3.1): if this sphere does not touch the one before, something may lie

@@ -116,8 +116,9 @@ INLINE sphere orbit_scalar_distance(vec point, mask active, __constant const str
 
 // What is known of a point on the surface, from one orbit over dual numbers.
 typedef struct {
-    vec gradient;      // of the distance, not normalised: points away from the solid
-    real smooth;       // smooth escape count
+    vec gradient;        // of the distance, not normalised: points away from the solid
+    real square;         // the last |z|^2 ...
+    real square_before;  // ... and the one before it
 } surface_point;
 
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
@@ -158,20 +159,31 @@ INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struc
     surface->gradient = relative;
     const real distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
 #endif
-    // Smooth count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
-    // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
-    const real log_radius = (real)(orbit->log_distance_bailout);
-#if LOGARITHMIC
-    const real over = log2(R(0.5) * log(fmax(square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
-#else
-    const real over = (R(0.5) * log(square) - log_radius) / (R(0.5) * log(square / square_before));
-#endif
-    const real limit = (real)((scalar)orbit->iterations);
-    const real smooth = count - pick(is_nan(over), R(0.0), clamp(over, R(0.0), R(1.0)));
-    surface->smooth = pick(inside, limit, smooth);
+    surface->square = square;
+    surface->square_before = square_before;
     const sphere result = {pick(inside, R(0.0), distance), count, inside};
     return result;
 }
+
+// Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
+// (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
+INLINE real smooth_count(sphere end, surface_point surface, __constant const struct Orbit *orbit) {
+    const real log_radius = (real)(orbit->log_distance_bailout);
+#if LOGARITHMIC
+    const real over = log2(R(0.5) * log(fmax(surface.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
+#else
+    const real over = (R(0.5) * log(surface.square) - log_radius) / (R(0.5) * log(surface.square / surface.square_before));
+#endif
+    const real smooth = end.count - pick(is_nan(over), R(0.0), clamp(over, R(0.0), R(1.0)));
+    return pick(end.inside, (real)((scalar)orbit->iterations), smooth);
+}
+
+#if LOGARITHMIC
+// The potential G = log|z_n| / degree^n, which falls towards the solid.
+INLINE real potential(sphere end, surface_point surface, __constant const struct Orbit *orbit) {
+    return R(0.34657359028) * quick_log2(surface.square) * exp2(-end.count * (real)(orbit->log2_degree));
+}
+#endif
 
 // The distance used for marching: the cheapest that the formula offers.
 INLINE sphere orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {

@@ -49,6 +49,6 @@ __kernel void distances(__global const scalar *points, __global scalar *result, 
     store_plane(result, 2 * stride + first, normal.x);
     store_plane(result, 3 * stride + first, normal.y);
     store_plane(result, 4 * stride + first, normal.z);
-    store_plane(result, 5 * stride + first, surface.smooth);
+    store_plane(result, 5 * stride + first, smooth_count(full, surface, orbit));
     store_plane(result, 6 * stride + first, pick(full.inside, R(1.0), R(0.0)));
 }

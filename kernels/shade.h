@@ -73,13 +73,13 @@ INLINE color palette_color(real where, __global const float *palette) {
 }
 
 // The surface's own colour M.
-INLINE color surface_color(vec normal, surface_point surface, __constant const struct Material *material,
+INLINE color surface_color(vec normal, real smooth, __constant const struct Material *material,
                            __global const float *palette) {
 #if COLORING == COLORING_NORMAL
     // The thesis stores normals as (n + 1) / 2 in RGB (sec. 3.2.1).
     return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
 #elif COLORING == COLORING_ITERATIONS
-    return palette_color(surface.smooth * (real)(material->palette_scale) + (real)(material->palette_offset), palette);
+    return palette_color(smooth * (real)(material->palette_scale) + (real)(material->palette_offset), palette);
 #else
     return color_splat(material->color);
 #endif

@@ -139,8 +139,8 @@ __kernel void surface(__global float *film, __global uint *statistics, __global 
                     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.inside;
                     normal = vec_pick(flat, vec_scale(eye_ray.direction, R(-1.0)), normal);
                     result.normal = normal;
-                    result.smooth = surface.smooth;
-                    surface_tint = surface_color(normal, surface, material, palette);
+                    result.smooth = smooth_count(there, surface, orbit);
+                    surface_tint = surface_color(normal, result.smooth, material, palette);
                     radiance = color_pick(hit, color_of(R(0.0), R(0.0), R(0.0)), radiance);
                 }
             } else {
