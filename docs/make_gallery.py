@@ -47,8 +47,10 @@ building its program takes when a formula is rendered for the first time.
 
 
 def scene_paths() -> list[Path]:
-    """The scenes, by name."""
-    return sorted(resources.folder("scenes").glob("*.yaml"))
+    """The scenes, those of the thesis's formulas first, then by name."""
+    first = ("mandelbulb", "hast")
+    paths = sorted(resources.folder("scenes").glob("*.yaml"))
+    return sorted(paths, key=lambda path: [not path.stem.startswith(name) for name in first])
 
 
 def comment_of(scene: Path) -> list[str]:
