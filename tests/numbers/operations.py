@@ -237,6 +237,8 @@ def table(precision: str) -> list[Operation]:
             *_texts("rsqrt", "a"),
             lambda a: (-(mpf(a) ** -1.5) / 2 if a > 0 else INF,),
             lambda a: 10,
+            # fmax(-0, 0) is either zero
+            choices=lambda a: [(-INF, (INF,))] if a == 0 else [],
         ),
         unary("exp", total(mpmath.exp, INF, 0.0), (3.0, 3.0), mpmath.exp, 3),
         Operation("log", 1, logarithm, (3.0, 3.0), *_texts("log", "a"), log_slopes, lambda a: divided),
