@@ -1,0 +1,221 @@
+"""One picture, however it is cut, ordered, interrupted or packed: the same bits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device, has_float64
+from clfractal.device.tune import accepted_lanes, best_lanes
+from clfractal.render import engine
+from clfractal.render.engine import Progress
+from clfractal.render.film import Film
+from clfractal.render.store import JournalFilm
+from clfractal.render.tiles import TileGrid
+from clfractal.scene.model import Scene
+from tests.render.shots import CHANNELS, ORTHOGRAPHIC, PERSPECTIVE, plan_of, scene_of, shoot, stacked
+
+SIZE = (100, 75)  # no multiple of a tile's side, in neither direction
+LIGHTS: list[dict[str, Any]] = [
+    {"direction": [-1, 1, -1]},
+    {"type": "point", "position": [2, -2, 1], "color": [0.3, 0.4, 0.6], "falloff": "inverse_square"},
+]
+CAMERA = {"position": [1.3, -2.6, 1.6], "target": [0, 0, 0], "fov": 45}
+SCENES: dict[str, Scene] = {
+    "mandelbulb": scene_of({"name": "mandelbulb", "iterations": 8}, CAMERA, SIZE, lights=LIGHTS),
+    "hast": scene_of(
+        {"name": "hast", "iterations": 20}, CAMERA, SIZE, lights=LIGHTS, renderer={"samples": 3}
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def wholes(device: Device) -> dict[str, npt.NDArray[np.float32]]:
+    """Each scene in one go."""
+    return {name: stacked(shoot(scene, device)) for name, scene in SCENES.items()}
+
+
+def same(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32]) -> bool:
+    """Equal bits, which tells 0 from -0."""
+    return a.shape == b.shape and np.array_equal(a.view(np.uint32), b.view(np.uint32))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_again(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
+    assert same(stacked(shoot(SCENES[name], device)), wholes[name])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_tile_by_tile(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
+    """`render_tile`, which knows nothing of the other tiles."""
+    scene = SCENES[name]
+    plan = plan_of(scene, device)
+    grid = TileGrid(plan.region)
+    assert grid.count == 12
+    for index in (0, 3, 5, 6, 11):
+        tile = grid.tile(index)
+        pixels = np.moveaxis(engine.render_tile(scene, plan, device, tile), 0, -1)
+        expected = wholes[name][tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
+        assert same(np.ascontiguousarray(pixels), np.ascontiguousarray(expected))
+
+
+@pytest.mark.parametrize(
+    "region", [(0, 0, 100, 75), (13, 7, 50, 41), (33, 40, 1, 1), (64, 32, 36, 43), (99, 0, 1, 75)]
+)
+@pytest.mark.parametrize("name", SCENES)
+def test_regions(
+    device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str, region: tuple[int, int, int, int]
+) -> None:
+    """A part is the part of the whole, wherever it begins in its tiles."""
+    x, y, width, height = region
+    part = stacked(shoot(SCENES[name], device, region=region))
+    assert same(part, np.ascontiguousarray(wholes[name][y : y + height, x : x + width]))
+
+
+@pytest.mark.parametrize("capacity", [1, 3, 12])
+@pytest.mark.parametrize("name", SCENES)
+def test_batches(
+    device: Device,
+    wholes: dict[str, npt.NDArray[np.float32]],
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    capacity: int,
+) -> None:
+    """How many tiles are launched at once, in which order."""
+    monkeypatch.setattr(engine, "CAPACITY", capacity)
+    assert same(stacked(shoot(SCENES[name], device)), wholes[name])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_tiles_in_parts(
+    device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """A budget so short that every tile takes many launches."""
+    monkeypatch.setattr(engine, "BATCH_SECONDS", 1e-6)
+    monkeypatch.setattr(engine, "CAPACITY", 1)
+    launches = []
+    scene = SCENES[name]
+    plan = plan_of(scene, device)
+    film = Film(plan.channels, SIZE, plan.region)
+    state = engine.render(scene, plan, device, film, lambda progress: launches.append(progress.tiles_done))
+    assert len(launches) > 24
+    assert state.tiles_done == 12
+    assert same(stacked(film), wholes[name])
+
+
+def test_statistics_do_not_depend_on_batches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays, steps and applications are counted once each, in parts of tiles too."""
+    scene = SCENES["hast"]
+    plan = plan_of(scene, device)
+
+    def counted() -> tuple[int, int, int, int]:
+        film = Film(plan.channels, SIZE, plan.region)
+        state = engine.render(scene, plan, device, film)
+        return state.rays, state.steps, state.iterations, state.bad_distances
+
+    at_once = counted()
+    assert at_once[0] == 3 * 100 * 75
+    monkeypatch.setattr(engine, "BATCH_SECONDS", 1e-6)
+    assert counted() == at_once
+
+
+def test_the_rest_of_a_film(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
+    """A film half filled with another render's tiles is completed, and what is there stays."""
+    scene = SCENES["mandelbulb"]
+    plan = plan_of(scene, device)
+    film = Film(plan.channels, SIZE, plan.region)
+    for index in (1, 5, 6, 10):
+        film.put(index, engine.render_tile(scene, plan, device, film.grid.tile(index)))
+    marked = film.grid.tile(11)
+    film.put(11, np.full((len(CHANNELS), marked.height, marked.width), 7, np.float32))
+    seen: list[tuple[int, int]] = []
+    engine.render(scene, plan, device, film, lambda p: seen.append((p.tiles_before, p.tiles_done)))
+    assert all(before == 5 for before, _ in seen)
+    assert seen[-1] == (5, 12)
+    result = stacked(film)
+    assert (result[marked.y :, marked.x :] == 7).all()
+    result[marked.y :, marked.x :] = wholes["mandelbulb"][marked.y :, marked.x :]
+    assert same(result, wholes["mandelbulb"])
+
+
+def test_interrupted_and_resumed(
+    device: Device,
+    wholes: dict[str, npt.NDArray[np.float32]],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> None:
+    """A journal left by a render that ended after some tiles is continued to the same picture."""
+    monkeypatch.setattr(engine, "CAPACITY", 1)
+    scene = SCENES["hast"]
+    plan = plan_of(scene, device)
+
+    def stop(progress: Progress) -> None:
+        if progress.tiles_done == 5:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "picture.partial"
+    first = JournalFilm(path, {"scene": "hast"}, plan.channels, SIZE, plan.region)
+    with pytest.raises(KeyboardInterrupt):
+        engine.render(scene, plan, device, first, stop)
+    first.close()
+    again = JournalFilm(path, {"scene": "hast"}, plan.channels, SIZE, plan.region, resume=True)
+    assert again.done.sum() == 5
+    engine.render(scene, plan, device, again)
+    assert again.done.all()
+    assert same(stacked(again.to_film()), wholes["hast"])
+    again.discard()
+
+
+def test_fewer_channels_are_the_same(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
+    """A channel does not depend on which others are wanted, nor on their order."""
+    names = ("Z", "R", "N.Y")
+    film = shoot(SCENES["mandelbulb"], device, channels=names)
+    for name in names:
+        expected = wholes["mandelbulb"][..., CHANNELS.index(name)]
+        assert same(film[name], np.ascontiguousarray(expected)), name
+
+
+@pytest.mark.parametrize("name", ["mandelbulb"])
+def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
+    """Packets of another width are another program, whose compiler may fuse other products with sums: the last bits
+    differ, and with them what decides at the rim of a fractal. One pixel in two hundred may."""
+    for lanes in accepted_lanes(device, "float32"):
+        if lanes != best_lanes(device, "float32"):
+            close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
+
+
+@pytest.mark.parametrize("name", ["mandelbulb"])
+def test_float64_shows_the_same(
+    device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str
+) -> None:
+    if has_float64(device.info):
+        close(stacked(shoot(SCENES[name], device, "float64")), wholes[name])
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+def test_size_of_the_picture_moves_nothing(device: Device, camera: dict[str, Any]) -> None:
+    """With three times the pixels every third one has the same ray, in the middle of the coarse one."""
+    formula = {"name": "mandelbulb", "iterations": 8}
+    coarse, fine = (
+        shoot(scene_of(formula, camera, (20 * n, 15 * n), renderer={"detail": 0.01}), device) for n in (1, 3)
+    )
+    a, b = stacked(coarse), stacked(fine)[1::3, 1::3]
+    hit = (a[..., CHANNELS.index("A")] > 0) & (b[..., CHANNELS.index("A")] > 0)
+    assert hit.sum() > 40
+    difference = np.abs(a[hit] - b[hit])[:, CHANNELS.index("Z")]
+    assert np.median(difference) < 5e-3
+
+
+def close(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32]) -> None:
+    """Colours, points and normals agree to a hundredth in all but 0.5 % of the pixels, and to a thousandth in the mean."""
+    chosen = [CHANNELS.index(name) for name in ("R", "G", "B", "A", "P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z")]
+    difference = np.abs(a[..., chosen] - b[..., chosen])
+    assert np.isfinite(difference).all()
+    assert (difference.max(axis=-1) > 0.01).mean() < 0.005
+    assert difference.mean() < 0.001
+    depth = CHANNELS.index("Z")
+    assert (np.isfinite(a[..., depth]) != np.isfinite(b[..., depth])).mean() < 0.005
