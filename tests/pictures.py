@@ -24,7 +24,7 @@ from clfractal.scene.model import Scene
 
 WIDTH, HEIGHT = 96, 54
 GOLDEN = Path(__file__).parent / "golden"
-FAILURES = Path("test-failures")
+FAILURES = Path(__file__).resolve().parents[1] / "test-failures"
 
 Picture = npt.NDArray[np.uint8]
 

@@ -29,9 +29,10 @@ from tests.pictures import (
     small_picture,
 )
 
-# In levels of 8 bits. Between PoCL 3.1, the PoCL wheel and Intel's runtime the means are at most MEASURED_MEAN,
-# the blocks' at most MEASURED_BLOCK.
-MEAN_LIMIT = 1.5
+# In levels of 8 bits. PoCL 3.1 and the PoCL wheel give the same pictures, bit for bit; Intel's runtime differs
+# in five scenes, by a mean of at most 0.27 and in a block by at most 8.7 (both in hast_above,
+# the one with the finest spray).
+MEAN_LIMIT = 1.0
 BLOCK_LIMIT = 14.0
 BLOCK = 6
 
