@@ -6,6 +6,10 @@ from hypothesis import HealthCheck, settings
 
 # The same examples on every run: a failure must be repeatable on another machine.
 settings.register_profile(
-    "repeatable", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow], max_examples=100
+    "repeatable",
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[HealthCheck.too_slow],
+    max_examples=100,
 )
 settings.load_profile("repeatable")
