@@ -27,6 +27,10 @@ _NOISE = "driver.log"
 _NOISE_SHOWN = 20_000  # characters
 
 
+class DriverAbortedError(DeviceError):
+    """The driver ended its process by a signal."""
+
+
 def run(
     job: str,
     device: Device,
@@ -101,7 +105,7 @@ def _answer(folder: Path, status: int | None, device_name: str, doing: str, time
             f"{device_name}: the driver took more than {timeout_s:g} s while {doing}", details=noise
         )
     if status < 0:
-        raise DeviceError(
+        raise DriverAbortedError(
             f"{device_name}: the driver aborted (signal {-status}) while {doing}", details=noise
         )
     try:

@@ -129,15 +129,25 @@ def _compile(
 
 
 def _compile_in_child(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="clfractal-") as temporary:
-        failure = isolate.run(
+    request = {"text": text, "flags": list(flags), "warm": None if warm is None else warm.as_data()}
+
+    def attempt(folder: str) -> str | None:
+        failure: str | None = isolate.run(
             "clfractal.device.compiler:compile_job",
             device,
-            {"text": text, "flags": list(flags), "warm": None if warm is None else warm.as_data()},
+            request,
             doing="building a program",
             timeout_s=BUILD_TIMEOUT_S,
-            folder=Path(temporary),
+            folder=Path(folder),
         )
+        return failure
+
+    with tempfile.TemporaryDirectory(prefix="clfractal-") as temporary:
+        try:
+            failure = attempt(temporary)
+        except isolate.DriverAbortedError:
+            # Intel's compiler crashes on one text in some ten, at random, and builds it the next time.
+            failure = attempt(temporary)
         if failure is not None:
             raise BuildFailureError(failure)
         return (Path(temporary) / compiler.BINARY).read_bytes()
