@@ -26,7 +26,7 @@ from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser
-from clfractal.scene import load, parts
+from clfractal.scene import lighting, load, parts
 from tests.shell import SCENE, InProcess
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -160,7 +160,7 @@ def test_keys_defaults_and_ranges_of_a_scene(heading: str) -> None:
 def test_limits_of_scene_files() -> None:
     limits = {
         "pixels": parts.MAX_PIXELS,
-        "lights": parts.MAX_LIGHTS,
+        "lights": lighting.MAX_LIGHTS,
         "bytes of a text file": regular.MAX_BYTES,
         "values in a file": document.MAX_NODES,
         "levels of nesting": document.MAX_DEPTH,

@@ -12,8 +12,9 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.language import Chain
 from clfractal.render.tiles import Region
 from clfractal.render.view import View
+from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import Gradient, PointLight
+from clfractal.scene.parts import Gradient
 
 VIEW = Struct(
     "View",

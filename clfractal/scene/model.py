@@ -10,17 +10,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import Field
 
 from clfractal.scene.base import Section
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.formula import FormulaSpec
-from clfractal.scene.parts import (
-    Background,
-    Camera,
-    Coloring,
-    Image,
-    Lights,
-    Material,
-    Output,
-    Renderer,
-)
+from clfractal.scene.lighting import Environment, Fog, Lights
+from clfractal.scene.parts import Background, Camera, Image, Material, Output
+from clfractal.scene.surface import Renderer
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
@@ -39,6 +33,8 @@ class Scene(Section):
     material: Material = Field(default_factory=dict, validate_default=True)
     coloring: Coloring = Field(default_factory=dict, validate_default=True)
     background: Background = Field(default_factory=dict, validate_default=True)
+    environment: Environment | None = None
+    fog: Fog | None = None
     output: Output = Field(default_factory=dict, validate_default=True)
 
     @cached_property

@@ -15,7 +15,7 @@ from clfractal.files.srgb import decode
 if TYPE_CHECKING:
     from cmap import Colormap
 
-    from clfractal.scene.parts import Coloring, Stop
+    from clfractal.scene.coloring import Coloring, Stop
 
 SIZE = 256
 _WHERE = Where(path="coloring.palette")

@@ -1,9 +1,10 @@
-"""The parts of a scene around its formula: picture, camera, renderer, lights, material, colours and output.
+"""The parts of a scene around its formula: picture, camera, material, background and output.
 
 A camera, renderer or light with a `projection` or `type` is one class here and one entry in its union; a new
 kind is added by writing its class and naming it there.
 """
 
+from math import radians, tan
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, model_validator
@@ -13,7 +14,6 @@ from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.scene.base import (
     Amount,
     Color,
-    Coordinate,
     Fraction,
     Position,
     Reflectance,
@@ -28,9 +28,6 @@ from clfractal.scene.base import (
 
 MAX_SIDE = 65_536
 MAX_PIXELS = 2**30
-MAX_LIGHTS = 64
-
-Radius = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 
 
 class Image(Section):
@@ -74,6 +71,31 @@ class PerspectiveCamera(CameraBase):
     tag = "perspective"
     projection: Literal["perspective"] = "perspective"
     fov: float = Field(45.0, ge=1e-6, lt=180, description="vertical angle of view, degrees")
+    f_number: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
+        None, description="focal length over the lens's diameter; a pinhole, everything sharp, if null"
+    )
+    focus_distance: Annotated[float, Field(strict=True, ge=-1e6, le=1e6)] | None = Field(
+        None, description="what is sharp, measured along the view axis, scene units; the target's if null"
+    )
+    sensor_height: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
+        0.024, description="height of the sensor behind the lens, scene units (24 mm if they are metres)"
+    )
+
+    @model_validator(mode="after")
+    def _focus_in_front(self) -> Self:
+        if self.focus_distance is not None and self.focus_distance <= 0:
+            raise problem(
+                f"must be in front of the camera: above 0, got {self.focus_distance:g}", "focus_distance"
+            )
+        return self
+
+    @property
+    def lens_radius(self) -> float:
+        """Half the lens's diameter, scene units; 0 for a pinhole."""
+        if self.f_number is None:
+            return 0.0
+        focal_length = self.sensor_height / (2 * tan(radians(self.fov) / 2))
+        return focal_length / self.f_number / 2
 
 
 class OrthographicCamera(CameraBase):
@@ -90,77 +112,6 @@ Camera = Annotated[
 ]
 
 
-class Ball(Section):
-    """A ball in space that holds everything to be seen."""
-
-    center: Position = Field((0.0, 0.0, 0.0), description="scene units")
-    radius: Radius = Field(description="scene units")
-
-
-class SurfaceRenderer(Section):
-    """The boundary of the set, found by marching along each ray by a bound of the distance."""
-
-    tag = "surface"
-    type: Literal["surface"] = "surface"
-    detail: float = Field(
-        1.0, ge=0.01, le=100, description="distance that counts as a hit, in pixel footprints"
-    )
-    max_steps: int = Field(1000, ge=1, le=100_000, description="most distance evaluations along a ray")
-    over_relaxation: float = Field(
-        1.3, ge=1, lt=2, description="factor on steps, taken back where it is unsafe"
-    )
-    step_scale: Annotated[float, Field(strict=True, gt=0, le=2)] | None = Field(
-        None, description="factor on distances; the formula's own if null"
-    )
-    bounds: Ball | None = Field(None, description="where to look; the formula's own if null")
-    samples: int = Field(1, ge=1, le=65_536, description="rays per pixel")
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of the samples in a pixel")
-    precision: Literal["auto", "float32", "float64"] = Field(
-        "auto", description="number type of the rays; auto: float64 where pixels are too fine for float32"
-    )
-
-
-# With one class there is nothing to choose; a second makes this a union like Camera's.
-Renderer = Annotated[Annotated[SurfaceRenderer, Tag("surface")], chosen_by("type", "surface")]
-
-
-class LightBase(Section):
-    """What every light has."""
-
-    color: Color = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
-    intensity: Amount = Field(1.0, description="factor on the colour")
-    shadow: bool = Field(True, description="whether it is blocked by the set")
-
-
-class DirectionalLight(LightBase):
-    """Light from infinitely far away."""
-
-    tag = "directional"
-    type: Literal["directional"] = "directional"
-    direction: Position = Field((-1.0, 1.0, -1.0), description="where the light travels to")
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        if length(self.direction) < 1e-12:
-            raise problem("must not be zero", "direction")
-        return self
-
-
-class PointLight(LightBase):
-    """Light from a point."""
-
-    tag = "point"
-    type: Literal["point"] = "point"
-    position: Position = Field(description="scene units")
-    falloff: Literal["none", "inverse_square"] = Field("none", description="how it weakens with distance")
-
-
-Light = Annotated[
-    Annotated[DirectionalLight, Tag("directional")] | Annotated[PointLight, Tag("point")],
-    chosen_by("type", "directional"),
-]
-
-
 class Material(Section):
     """How the surface answers light: the thesis's Phong model (Eq. 5)."""
 
@@ -171,41 +122,7 @@ class Material(Section):
     diffuse: Amount = Field(0.9, description="part that is scattered")
     specular: Amount = Field(0.3, description="part that is mirrored")
     shininess: float = Field(30.0, ge=0.1, le=1e5, description="exponent of the highlight")
-
-
-class Stop(Section):
-    """A colour at a place of a palette; between two stops colours are mixed in linear light."""
-
-    at: Fraction = Field(description="place in the palette, 0 to 1")
-    color: Color = Field(description="linear Rec. 709")
-
-
-class Coloring(Section):
-    """Where the material's colour comes from.
-
-    `solid`: material.color. `normal`: the normal's x, y, z as red, green, blue, from -1..1 to 0..1.
-    `iterations`: the palette at frac(scale * smooth escape count + offset).
-    """
-
-    by: Literal["solid", "normal", "iterations"] = Field("solid", description="what chooses the colour")
-    palette: (
-        Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
-        | Annotated[tuple[Stop, ...], Field(strict=False, min_length=1, max_length=256), Tag("stops")]
-    ) = Field(
-        "viridis",
-        discriminator=chosen_by_word("name", "stops"),
-        description="a palette's name, or stops in order of `at`",
-    )
-    scale: Coordinate = Field(0.1, description="palettes per unit")
-    offset: Coordinate = Field(0.0, description="start in the palette")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if not isinstance(self.palette, str):
-            for index in range(1, len(self.palette)):
-                if self.palette[index].at < self.palette[index - 1].at:
-                    raise problem("must not be below the stop before it", f"palette.{index}.at")
-        return self
+    reflection: Fraction = Field(0.0, description="part of the surroundings that is mirrored sharply")
 
 
 class Gradient(Section):
@@ -264,4 +181,3 @@ Background = Annotated[
     Annotated[Gradient, Tag("gradient")] | Annotated[Literal["transparent"], Tag("transparent")],
     chosen_by_word("transparent", "gradient"),
 ]
-Lights = Annotated[tuple[Light, ...], Field(strict=False, max_length=MAX_LIGHTS)]

@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.errors import SceneError
 from clfractal.scene.palette import palette_table
-from clfractal.scene.parts import Coloring
+from clfractal.scene.coloring import Coloring
 
 
 def coloring(palette: object) -> Coloring:

@@ -1,0 +1,91 @@
+"""Where the surface's colour comes from."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, Tag, model_validator
+
+from clfractal.scene.base import (
+    Color,
+    Coordinate,
+    Fraction,
+    Position,
+    Section,
+    chosen_by_word,
+    length,
+    problem,
+)
+from clfractal.scene.surface import Length
+
+
+class Stop(Section):
+    """A colour at a place of a palette; between two stops colours are mixed in linear light."""
+
+    at: Fraction = Field(description="place in the palette, 0 to 1")
+    color: Color = Field(description="linear Rec. 709")
+
+
+class Trap(Section):
+    """A shape in the formula's space; the colour follows how near the orbit comes to it."""
+
+    shape: Literal["point", "axis", "plane", "sphere"] = Field(
+        "point", description="what the orbit comes near to"
+    )
+    center: Position = Field((0.0, 0.0, 0.0), description="a point of it; a sphere's centre")
+    direction: Position = Field((0.0, 0.0, 1.0), description="an axis' direction, or a plane's normal")
+    radius: Length = Field(1.0, description="a sphere's radius")
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if length(self.direction) < 1e-12:
+            raise problem("must not be zero", "direction")
+        return self
+
+
+class Coloring(Section):
+    """Where the material's colour comes from: the palette at scale * quantity + offset, or a colour at once.
+
+    `solid`: material.color. `normal`: the normal's x, y, z as red, green, blue, from -1..1 to 0..1.
+    The quantities: `iterations`, the smooth escape count; `residual`, how far the pixel's points are from their
+    plane, in footprints; `thickness`, from where `along` enters the set to where it leaves it, scene units;
+    `layer_distance`, from the surface to that of `layer` iterations, scene units; `trap`, how near the orbit comes
+    to a shape.
+    """
+
+    by: Literal["solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap"] = Field(
+        "solid", description="what chooses the colour"
+    )
+    palette: (
+        Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
+        | Annotated[tuple[Stop, ...], Field(strict=False, min_length=2, max_length=256), Tag("stops")]
+    ) = Field(
+        "viridis",
+        discriminator=chosen_by_word("name", "stops"),
+        description="a palette's name, or stops in order of `at`",
+    )
+    scale: Coordinate = Field(0.1, description="palettes per unit")
+    offset: Coordinate = Field(0.0, description="start in the palette")
+    repeat: bool = Field(
+        True, description="whether the palette begins again after its end; else its ends go on"
+    )
+    along: Literal["view", "normal", "reflection"] = Field(
+        "normal", description="the way of `thickness` (view or normal) and `layer_distance`"
+    )
+    layer: int = Field(1, ge=1, le=1_000_000, description="iterations of the other layer")
+    step: Length | None = Field(
+        None, description="step along the way, scene units; 1/100 of the bounds' radius if null"
+    )
+    trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape of `trap`")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if not isinstance(self.palette, str):
+            for index in range(1, len(self.palette)):
+                if self.palette[index].at < self.palette[index - 1].at:
+                    raise problem("must not be below the stop before it", f"palette.{index}.at")
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_way(self) -> Self:
+        if self.by == "thickness" and self.along == "reflection":
+            raise problem("must be view or normal for thickness, got reflection", "along")
+        return self

@@ -1,0 +1,128 @@
+"""The surface renderer's settings: how the surface is searched, how its normals are made, how pixels are put together."""
+
+from math import isqrt
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, Tag, model_validator
+
+from clfractal.scene.base import Position, Section, chosen_by, problem
+
+Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
+
+# The normals that are made from the nine points of a 3 x 3 grid.
+GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")
+MAX_POINTS = 64
+
+
+class Ball(Section):
+    """A ball in space that holds everything to be seen."""
+
+    center: Position = Field((0.0, 0.0, 0.0), description="scene units")
+    radius: Length = Field(description="scene units")
+
+
+class Points(Section):
+    """The points of a pixel that share one march; each finds the surface on its own ray."""
+
+    pattern: Literal["grid", "stochastic"] = Field(
+        "grid", description="a square grid, or places spread by chance"
+    )
+    count: int = Field(9, ge=1, le=MAX_POINTS, description="points of a pixel")
+
+    @model_validator(mode="after")
+    def _countable(self) -> Self:
+        if self.pattern == "grid" and isqrt(self.count) ** 2 != self.count:
+            squares = ", ".join(str(n * n) for n in range(1, isqrt(MAX_POINTS) + 1))
+            raise problem(f"must be a square for a grid ({squares}), got {self.count}", "count")
+        if self.pattern == "stochastic" and self.count < 4:
+            raise problem(f"must be from 4 to {MAX_POINTS} for stochastic points, got {self.count}", "count")
+        return self
+
+
+class AmbientOcclusion(Section):
+    """How much of the surroundings a point of the surface sees."""
+
+    rays: int = Field(8, ge=1, le=1024, description="rays into the hemisphere, for each sample")
+    distance: Length | None = Field(
+        None, description="how far an obstacle counts, scene units; half the radius of the bounds if null"
+    )
+
+
+class SurfaceRenderer(Section):
+    """The boundary of the set, found by marching along each ray."""
+
+    tag = "surface"
+    type: Literal["surface"] = "surface"
+    search: Literal["distance", "steps"] = Field(
+        "distance", description="march by a bound of the distance, or by fixed steps and an inside test alone"
+    )
+    step: Length | None = Field(
+        None, description="step of the search `steps`, scene units; 1/100 of the bounds' radius if null"
+    )
+    points: Points | None = Field(
+        None, description="points of a pixel; one in its middle if null, 3 x 3 where the normal needs them"
+    )
+    normal: Literal[
+        "gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares"
+    ] = Field("gradient", description="where normals come from: the Jacobian, or the pixel's points")
+    detail: float = Field(
+        1.0, ge=0.01, le=100, description="distance that counts as a hit, in pixel footprints"
+    )
+    max_steps: int = Field(1000, ge=1, le=100_000, description="most distance evaluations along a ray")
+    over_relaxation: float = Field(
+        1.3, ge=1, lt=2, description="factor on steps, taken back where it is unsafe"
+    )
+    step_scale: Annotated[float, Field(strict=True, gt=0, le=2)] | None = Field(
+        None, description="factor on distances; the formula's own if null"
+    )
+    bounds: Ball | None = Field(None, description="where to look; the formula's own if null")
+    bounces: int = Field(
+        3, ge=0, le=16, description="most mirror reflections of a ray, where the material reflects"
+    )
+    ambient_occlusion: AmbientOcclusion | None = Field(
+        None, description="darkens what sees little of its surroundings; none if null"
+    )
+    samples: int = Field(
+        1, ge=1, le=65_536, description="rays per pixel; the most of them if `noise` is given"
+    )
+    noise: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
+        None, description="a pixel gets no more samples once its standard error is below this; all if null"
+    )
+    min_samples: int = Field(16, ge=4, le=65_536, description="samples before the noise of a pixel is judged")
+    filter: Literal["box", "tent", "blackman_harris"] = Field(
+        "box", description="how samples around a pixel are weighted"
+    )
+    filter_width: Annotated[float, Field(strict=True, ge=0.1, le=16)] | None = Field(
+        None, description="the filter's width, pixels; box 1, tent 2, blackman_harris 3 if null"
+    )
+    firefly_limit: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
+        10.0,
+        description="most light that one sample's mirror or environment rays may bring; no limit if null",
+    )
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of samples, points and rays")
+    precision: Literal["auto", "float32", "float64"] = Field(
+        "auto", description="number type of the rays; auto: float64 where pixels are too fine for float32"
+    )
+
+    @model_validator(mode="after")
+    def _enough_points(self) -> Self:
+        if self.normal == "gradient" or self.points is None:
+            return self
+        if self.normal in GRID_NORMALS and (
+            self.points.pattern != "grid" or self.points.count not in (9, 25, 49)
+        ):
+            raise problem(f"{self.normal} needs points in a grid of 9, 25 or 49", "normal")
+        if self.points.count < 4:
+            raise problem(f"{self.normal} needs at least 4 points, got {self.points.count}", "normal")
+        return self
+
+    @property
+    def used_points(self) -> Points:
+        """The points in use, where `points` leaves them to the normal."""
+        if self.points is not None:
+            return self.points
+        return Points(pattern="grid", count=1 if self.normal == "gradient" else 9)
+
+
+# With one class there is nothing to choose; a second makes this a union like Camera's.
+Renderer = Annotated[Annotated[SurfaceRenderer, Tag("surface")], chosen_by("type", "surface")]
