@@ -80,9 +80,18 @@ class Coloring(Section):
     def _in_order(self) -> Self:
         if not isinstance(self.palette, str):
             for index in range(1, len(self.palette)):
-                if self.palette[index].at < self.palette[index - 1].at:
-                    raise problem("must not be below the stop before it", f"palette.{index}.at")
+                at, before = self.palette[index].at, self.palette[index - 1].at
+                if at < before:
+                    raise problem(
+                        f"must be at least {before:g}, that of the stop before, got {at:g}",
+                        f"palette.{index}.at",
+                    )
         return self
+
+    @property
+    def uses_palette(self) -> bool:
+        """Whether the palette chooses the colour."""
+        return self.by not in ("solid", "normal")
 
     @model_validator(mode="after")
     def _has_a_way(self) -> Self:

@@ -19,13 +19,15 @@ class LightBase(Section):
         0.0, ge=0, le=170, description="its diameter as the surface sees it, degrees; 0 makes hard shadows"
     )
     rays: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
-        None, description="shadow rays for each sample; 1 for a hard shadow and 8 for a soft one if null"
+        None, description="rays of a soft shadow, for each sample, 8 if null; a hard one takes one"
     )
 
     @property
     def used_rays(self) -> int:
-        """Shadow rays for each sample, where `rays` leaves them to the light's size."""
-        return self.rays if self.rays is not None else 8 if self.angular_size > 0 else 1
+        """Shadow rays for each sample: all of a hard shadow's would be the same."""
+        if self.angular_size == 0:
+            return 1
+        return self.rays if self.rays is not None else 8
 
 
 class DirectionalLight(LightBase):

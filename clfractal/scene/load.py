@@ -11,6 +11,7 @@ from clfractal.errors import ClfractalError, FileError, FormulaError, SceneError
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.marks import Document, Node, node_from_plain, option
 from clfractal.files.regular import read_bytes, read_text_file
+from clfractal.scene.checks import check_parts
 from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
 
@@ -131,13 +132,14 @@ def _checked(document: Document, folder: Path) -> Scene:
         _ = scene.chain
     except ClfractalError as error:
         raise document.locate(error) from error
-    if scene.coloring.by == "iterations":
-        from clfractal.scene.palette import check_palette
+    try:
+        check_parts(scene)
+        if scene.coloring.uses_palette:
+            from clfractal.scene.palette import check_palette
 
-        try:
             check_palette(scene.coloring.palette)
-        except SceneError as error:
-            raise document.locate(error) from error
+    except SceneError as error:
+        raise document.locate(error) from error
     return scene
 
 

@@ -71,10 +71,13 @@ class PerspectiveCamera(CameraBase):
     tag = "perspective"
     projection: Literal["perspective"] = "perspective"
     fov: float = Field(45.0, ge=1e-6, lt=180, description="vertical angle of view, degrees")
-    f_number: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
+    f_number: Annotated[float, Field(strict=True, ge=0.01, le=1e6)] | None = Field(
         None, description="focal length over the lens's diameter; a pinhole, everything sharp, if null"
     )
-    focus_distance: Annotated[float, Field(strict=True, ge=-1e6, le=1e6)] | None = Field(
+    # Its lower bound is checked below, to say what is wrong with a negative one.
+    focus_distance: (
+        Annotated[float, Field(strict=True, le=1e6, json_schema_extra={"exclusiveMinimum": 0})] | None
+    ) = Field(
         None, description="what is sharp, measured along the view axis, scene units; the target's if null"
     )
     sensor_height: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
@@ -88,6 +91,13 @@ class PerspectiveCamera(CameraBase):
                 f"must be in front of the camera: above 0, got {self.focus_distance:g}", "focus_distance"
             )
         return self
+
+    @property
+    def used_focus_distance(self) -> float:
+        """What is sharp, measured along the view axis, scene units: the target's where it is not given."""
+        if self.focus_distance is not None:
+            return self.focus_distance
+        return length(minus(self.target, self.position))
 
     @property
     def lens_radius(self) -> float:

@@ -9,9 +9,11 @@ from clfractal.scene.base import Position, Section, chosen_by, problem
 
 Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 
-# The normals that are made from the nine points of a 3 x 3 grid.
+# The normals that are made from a middle point and the eight around it: of a grid with an odd side.
 GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")
 MAX_POINTS = 64
+# Where `min_samples` leaves it open: fewer tell too little about how much a pixel's samples scatter.
+USUAL_MIN_SAMPLES = 16
 
 
 class Ball(Section):
@@ -88,7 +90,9 @@ class SurfaceRenderer(Section):
     noise: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
         None, description="a pixel gets no more samples once its standard error is below this; all if null"
     )
-    min_samples: int = Field(16, ge=4, le=65_536, description="samples before the noise of a pixel is judged")
+    min_samples: Annotated[int, Field(strict=True, ge=4, le=65_536)] | None = Field(
+        None, description="samples before the noise of a pixel is judged; 16, or all if fewer, if null"
+    )
     filter: Literal["box", "tent", "blackman_harris"] = Field(
         "box", description="how samples around a pixel are weighted"
     )
@@ -108,13 +112,26 @@ class SurfaceRenderer(Section):
     def _enough_points(self) -> Self:
         if self.normal == "gradient" or self.points is None:
             return self
-        if self.normal in GRID_NORMALS and (
-            self.points.pattern != "grid" or self.points.count not in (9, 25, 49)
-        ):
-            raise problem(f"{self.normal} needs points in a grid of 9, 25 or 49", "normal")
-        if self.points.count < 4:
-            raise problem(f"{self.normal} needs at least 4 points, got {self.points.count}", "normal")
+        pattern, count = self.points.pattern, self.points.count
+        if self.normal in GRID_NORMALS and (pattern != "grid" or count not in (9, 25, 49)):
+            raise problem(
+                f"{self.normal} needs points in a grid of 9, 25 or 49, got {pattern} {count}", "normal"
+            )
+        if count < 4:
+            raise problem(f"{self.normal} needs at least 4 points, got {count}", "normal")
         return self
+
+    @model_validator(mode="after")
+    def _enough_samples(self) -> Self:
+        if self.noise is not None and self.min_samples is not None and self.min_samples > self.samples:
+            raise problem(f"must be at most samples ({self.samples}), got {self.min_samples}", "min_samples")
+        return self
+
+    @property
+    def used_min_samples(self) -> int:
+        """Samples before the noise of a pixel is judged, never more than `samples`."""
+        wanted = USUAL_MIN_SAMPLES if self.min_samples is None else self.min_samples
+        return min(wanted, self.samples)
 
     @property
     def used_points(self) -> Points:
