@@ -62,7 +62,7 @@ INLINE bits pixel_seed(const int *x, const int *y, uint seed, uint purpose) {
 }
 
 // Owen's scrambling of reversed digits: each bit is flipped by a random function of the seed and the bits below it (Laine and
-// Karras 2011; the constants are Vegdahl's of 2021, which flip more evenly).
+// Karras 2011, Stratified Sampling for Stochastic Transparency; the constants are Vegdahl's of 2021, which flip more evenly).
 INLINE bits scramble_reversed(bits a, bits seed) {
     a ^= a * 0x3d20adeau;
     a += seed;
@@ -146,16 +146,25 @@ INLINE void filter_offset(real u, real v, int filter, real width, real *across, 
 
 #ifdef POINT_PATTERN
 // Place of one of the POINTS points of a pixel: its offset from the centre, in pixels, within (-0.5, 0.5). A grid has
-// POINT_SIDE rows, numbered along each from the top left.
+// POINT_SIDE rows, numbered along each from the top left. Stochastic points are another set for each seed: one at a random
+// place in each of POINTS equal strips, a golden section of the pixel further along it than the last (so that no two are
+// near each other), the first anywhere; the strips upright or level, mirrored or not.
 INLINE void point_offset(int point, bits seed, real *across, real *below) {
 #if POINT_PATTERN == PATTERN_GRID
     const scalar row = (scalar)(point / POINT_SIDE), column = (scalar)(point % POINT_SIDE), side = (scalar)(POINT_SIDE);
     *across = (real)((S(2.0) * column + S(1.0) - side) / (S(2.0) * side));
     *below = (real)((S(2.0) * row + S(1.0) - side) / (S(2.0) * side));
 #else
-    unit_square((bits)((uint)point), seed, across, below);
-    *across -= R(0.5);
-    *below -= R(0.5);
+    const uint golden = 0x9e3779b9u;
+    const bits first = hash_bits(seed), turn = hash_bits(first);
+    const uint strips = (uint)(POINTS);
+    const bits within = hash_bits(seed + golden * (uint)(point + 1));
+    bits x = (bits)(0xffffffffu / strips * (uint)point) + within / strips;
+    bits y = first + golden * (uint)point;  // of 2^32, as all here
+    x ^= -(turn & 1u);
+    const bits swapped = (x ^ y) & -((turn >> 1) & 1u);
+    *across = unit_of_bits(x ^ swapped) - R(0.5);
+    *below = unit_of_bits(y ^ swapped) - R(0.5);
 #endif
 }
 #endif
