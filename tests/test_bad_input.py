@@ -73,6 +73,18 @@ def untouched(here: Path) -> bool:
         (["--set", "camera.fov=.nan"], ["camera.fov", "finite"]),
         (["--set", "camera.fov=.inf"], ["camera.fov", "finite"]),
         (["--set", "camera.fov=400"], ["camera.fov", "must be below 180, got 400"]),
+        (["--set", "renderer.step=0"], ["--set renderer.step: must be above 0, got 0"]),
+        (["--set", "renderer.step=7"], ["--set renderer.step: must be at most the diameter of the bounds"]),
+        (["--set", "renderer.points.count=8"], ["--set renderer.points.count: must be a square for a grid"]),
+        (
+            ["--set", "camera.focus_distance=-1"],
+            ["camera.focus_distance", "in front of the camera", "got -1"],
+        ),
+        (
+            ["--set", "lights=[{type: point, position: [0, 0, 0]}]"],
+            ["--set lights: 0.position: must be outside the object"],
+        ),
+        (["--set", "coloring.palette=[{at: 0, color: [1, 1, 1]}]"], ["at least 2 entries, got 1"]),
         (["--set", "nothing"], ["must be KEY=VALUE"]),
         (["--size", "0x10"], ["--size: must be at least 1, got 0"]),
         (["--size", "1000000x10"], ["--size: must be at most"]),
@@ -93,6 +105,36 @@ def untouched(here: Path) -> bool:
 def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts: list[str]) -> None:
     ended = shell("render", "scene.yaml", "-o", "old.png", "-o", "old.exr", *options)
     assert ended.is_one_line(2, *parts)
+    assert untouched(here)
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (
+            "renderer:\n  step: 3",
+            "6:9: renderer.step: must be at most the diameter of the bounds, 2.208, got 3",
+        ),
+        ("renderer:\n  points:\n    count: 10", "7:12: renderer.points.count: must be a square for a grid"),
+        (
+            "renderer: {noise: 0.1, samples: 9,\n  min_samples: 10}",
+            "6:16: renderer.min_samples: must be at most samples (9), got 10",
+        ),
+        (
+            "coloring:\n  palette:\n  - {at: 1, color: [0, 0, 0]}\n  - {at: 0, color: [0, 0, 0]}",
+            "8:10: coloring.palette.1.at: must be at least 1, that of the stop before, got 0",
+        ),
+        (
+            "lights:\n- type: point\n  position: [0.1, 0, 0]",
+            "7:13: lights.0.position: must be outside the object, where its light reaches something",
+        ),
+        ("environment:\n  intensity: 1", "6:3: environment: needs one of name or file"),
+    ],
+)
+def test_a_scene_that_cannot_work(here: Path, shell: InProcess, lines: str, message: str) -> None:
+    (here / "wrong.yaml").write_text(SCENE + lines + "\n")
+    ended = shell("render", "wrong.yaml", "-o", "old.png", "-o", "old.exr")
+    assert ended.is_one_line(2, f"wrong.yaml:{message}")
     assert untouched(here)
 
 

@@ -18,7 +18,10 @@ formula: {name: mandelbulb, parameters: {power: 8}, iterations: 12}
 image: {width: 64, height: 48}
 camera: {projection: perspective, position: [0, -3, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 45}
 lights: [{type: directional, direction: [-1, 1, -1], shadow: true}, {type: point, position: [1, 2, 3]}]
+renderer: {search: steps, step: 0.1, points: {pattern: grid, count: 9}, normal: least_squares, noise: 0.1}
 background: {top: [0.1, 0.2, 0.3], bottom: [0, 0, 0]}
+coloring: {by: trap, palette: [{at: 0, color: [0, 0, 0]}, {at: 1, color: [1, 1, 1]}], trap: {shape: axis}}
+fog: {color: [0.5, 0.5, 0.5], density: 0.2}
 output: {exposure: 0, channels: [R, G, B, A, Z]}
 """
 FORMULA = """variables: [x, y, z]
@@ -206,6 +209,8 @@ SECTIONS = [
     "material",
     "coloring",
     "background",
+    "environment",
+    "fog",
     "output",
 ]
 

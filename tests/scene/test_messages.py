@@ -74,7 +74,10 @@ CASES = [
     ("material: {color: [1, §.inf, 3]}", "material.color.1: must be a finite number, got .inf"),
     ("background: §black", "background: must be transparent or a mapping with top and bottom, got 'black'"),
     ("background: {§tpo: 1}", "background: unknown key 'tpo'; did you mean 'top'?"),
-    ("coloring: {by: §depth}", "coloring.by: must be solid, normal or iterations, got 'depth'"),
+    (
+        "coloring: {by: §depth}",
+        "coloring.by: must be solid, normal, iterations, residual, thickness, layer_distance or trap, got 'depth'",
+    ),
     (
         "coloring: {by: iterations, palette: §viridiss}",
         "coloring.palette: unknown palette 'viridiss'; did you mean 'viridis'?",
@@ -83,7 +86,122 @@ CASES = [
     ("coloring: {palette: §7}", "coloring.palette: must be text or a list, got 7"),
     (
         "coloring: {palette: [{at: 1, color: [0, 0, 0]}, {at: §0.5, color: [0, 0, 0]}]}",
-        "coloring.palette.1.at: must not be below the stop before it",
+        "coloring.palette.1.at: must be at least 1, that of the stop before, got 0.5",
+    ),
+    (
+        "coloring: {palette: §[{at: 0, color: [0, 0, 0]}]}",
+        "coloring.palette: must have at least 2 entries, got 1",
+    ),
+    (
+        "coloring: {by: trap, palette: §viridiss}",
+        "coloring.palette: unknown palette 'viridiss'; did you mean 'viridis'?",
+    ),
+    (
+        "coloring: {by: thickness, along: §reflection}",
+        "coloring.along: must be view or normal for thickness, got reflection",
+    ),
+    ("coloring: {layer: §0}", "coloring.layer: must be at least 1, got 0"),
+    ("coloring: {step: §0}", "coloring.step: must be above 0, got 0"),
+    ("coloring: {step: §100}", "coloring.step: must be at most the diameter of the bounds, 2.208, got 100"),
+    (
+        "coloring: {by: §residual}",
+        "coloring.by: residual needs at least 4 points of a pixel (renderer.points), got 1",
+    ),
+    (
+        "coloring: {trap: {shape: §cube}}",
+        "coloring.trap.shape: must be point, axis, plane or sphere, got 'cube'",
+    ),
+    ("coloring: {trap: {direction: §[0, 0, 0]}}", "coloring.trap.direction: must not be zero"),
+    ("coloring: {trap: {radius: §-1}}", "coloring.trap.radius: must be above 0, got -1"),
+    ("coloring: {trap: {§centre: [0, 0, 0]}}", "coloring.trap: unknown key 'centre'; did you mean 'center'?"),
+    # How the surface is searched, and a pixel's points.
+    ("renderer: {search: §stepps}", "renderer.search: must be distance or steps, got 'stepps'"),
+    ("renderer: {step: §0}", "renderer.step: must be above 0, got 0"),
+    ("renderer: {step: §-0.1}", "renderer.step: must be above 0, got -0.1"),
+    ("renderer: {step: §.nan}", "renderer.step: must be a finite number, got .nan"),
+    ("renderer: {step: §2.5}", "renderer.step: must be at most the diameter of the bounds, 2.208, got 2.5"),
+    (
+        "renderer: {step: §1e-7}",
+        "renderer.step: must be at least 2.208e-06, 1,000,000 steps through the bounds, got 1e-07",
+    ),
+    (
+        "renderer: {step: §2.5, bounds: {radius: 1}}",
+        "renderer.step: must be at most the diameter of the bounds, 2, got 2.5",
+    ),
+    ("renderer: {points: §9}", "renderer.points: must be a mapping, got 9"),
+    ("renderer: {points: {count: §0}}", "renderer.points.count: must be at least 1, got 0"),
+    ("renderer: {points: {count: §81}}", "renderer.points.count: must be at most 64, got 81"),
+    ("renderer: {points: {count: §9.5}}", "renderer.points.count: must be a whole number, got 9.5"),
+    (
+        "renderer: {points: {count: §8}}",
+        "renderer.points.count: must be a square for a grid (1, 4, 9, 16, 25, 36, 49, 64), got 8",
+    ),
+    (
+        "renderer: {points: {pattern: stochastic, count: §3}}",
+        "renderer.points.count: must be from 4 to 64 for stochastic points, got 3",
+    ),
+    ("renderer: {points: {pattern: §hex}}", "renderer.points.pattern: must be grid or stochastic, got 'hex'"),
+    (
+        "renderer: {normal: §one_triangle, points: {count: 16}}",
+        "renderer.normal: one_triangle needs points in a grid of 9, 25 or 49, got grid 16",
+    ),
+    (
+        "renderer: {points: {pattern: stochastic, count: 9}, normal: §eight_triangles_normal}",
+        "renderer.normal: eight_triangles_normal needs points in a grid of 9, 25 or 49, got stochastic 9",
+    ),
+    (
+        "renderer: {normal: §least_squares, points: {count: 1}}",
+        "renderer.normal: least_squares needs at least 4 points, got 1",
+    ),
+    # Samples.
+    (
+        "renderer: {samples: 8, noise: 0.01, min_samples: §16}",
+        "renderer.min_samples: must be at most samples (8), got 16",
+    ),
+    ("renderer: {min_samples: §3}", "renderer.min_samples: must be at least 4, got 3"),
+    ("renderer: {noise: §0}", "renderer.noise: must be above 0, got 0"),
+    ("renderer: {filter: §gauss}", "renderer.filter: must be box, tent or blackman_harris, got 'gauss'"),
+    ("renderer: {filter_width: §0}", "renderer.filter_width: must be at least 0.1, got 0"),
+    ("renderer: {firefly_limit: §0}", "renderer.firefly_limit: must be above 0, got 0"),
+    # Light.
+    ("renderer: {bounces: §17}", "renderer.bounces: must be at most 16, got 17"),
+    (
+        "renderer: {ambient_occlusion: {rays: §0}}",
+        "renderer.ambient_occlusion.rays: must be at least 1, got 0",
+    ),
+    (
+        "renderer: {ambient_occlusion: {distance: §0}}",
+        "renderer.ambient_occlusion.distance: must be above 0, got 0",
+    ),
+    ("lights: [{angular_size: §180}]", "lights.0.angular_size: must be at most 170, got 180"),
+    ("lights: [{rays: §0}]", "lights.0.rays: must be at least 1, got 0"),
+    (
+        "lights: [{}, {type: point, position: §[0, 0.1, 0]}]",
+        "lights.1.position: must be outside the object, where its light reaches something, got [0, 0.1, 0]",
+    ),
+    ("material: {reflection: §1.5}", "material.reflection: must be at most 1, got 1.5"),
+    ("environment: §{intensity: 2}", "environment: needs one of name or file"),
+    (
+        "environment: {name: a, file: §b.exr}",
+        "environment.file: cannot stand beside name: give one of name or file",
+    ),
+    ("environment: §sky", "environment: must be a mapping, got 'sky'"),
+    ("environment: {name: §''}", "environment.name: must not be empty, got ''"),
+    ("environment: {name: a, rotation: §400}", "environment.rotation: must be at most 360, got 400"),
+    ("environment: {name: a, rays: §-1}", "environment.rays: must be at least 0, got -1"),
+    ("fog: {density: §-1}", "fog.density: must be at least 0, got -1"),
+    ("fog: {§colour: [1, 1, 1]}", "fog: unknown key 'colour'; did you mean 'color'?"),
+    # The lens.
+    ("camera: {f_number: §0}", "camera.f_number: must be at least 0.01, got 0"),
+    (
+        "camera: {focus_distance: §-2}",
+        "camera.focus_distance: must be in front of the camera: above 0, got -2",
+    ),
+    ("camera: {focus_distance: §0}", "camera.focus_distance: must be in front of the camera: above 0, got 0"),
+    ("camera: {sensor_height: §0}", "camera.sensor_height: must be above 0, got 0"),
+    (
+        "camera: {projection: orthographic, §f_number: 2}",
+        "camera: unknown key 'f_number'; known: height, position, projection, target, up",
     ),
     ("output: {channels: [R, §Zed]}", "output.channels.1: unknown channel 'Zed'; did you mean 'Z'?"),
     ("output: {channels: [R, §R]}", "output.channels.1: channel 'R' is given twice"),

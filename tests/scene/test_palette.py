@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from clfractal.errors import SceneError
-from clfractal.scene.palette import palette_table
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.palette import palette_table
 
 
 def coloring(palette: object) -> Coloring:
@@ -38,8 +38,9 @@ def test_stops_are_mixed_in_linear_light() -> None:
     assert not table[place > 0.6].any()
 
 
-def test_one_stop_is_one_colour() -> None:
-    assert (palette_table(coloring([{"at": 0.5, "color": [1, 2, 3]}])) == [1, 2, 3]).all()
+def test_two_equal_stops_are_one_colour() -> None:
+    stop = {"at": 0.5, "color": [1, 2, 3]}
+    assert (palette_table(coloring([stop, stop])) == [1, 2, 3]).all()
 
 
 def test_a_named_palette_is_turned_into_linear_light() -> None:

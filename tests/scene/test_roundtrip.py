@@ -24,21 +24,36 @@ def optional(**values: st.SearchStrategy[Any]) -> st.SearchStrategy[dict[str, An
 coordinate = st.floats(-1e6, 1e6) | st.integers(-1000, 1000) | st.sampled_from([1e-300, -0.0, 5e-324])
 amount = st.floats(0, 1e6)
 fraction = st.floats(0, 1)
+positive = st.floats(0, 1e6, exclude_min=True)
+rays = st.integers(1, 1024)
 vector = st.lists(coordinate, min_size=3, max_size=3)
 color = st.lists(amount, min_size=3, max_size=3)
+# Lights stand outside of every formula's bounds.
+far = vector.map(lambda v: [1e5 + abs(v[0]) / 2, v[1], v[2]])
 direction = vector.filter(lambda v: sum(x * x for x in v) > 1e-6)
 places = {"position": vector, "target": vector, "up": direction}
 cameras = optional(
-    **places, projection=st.just("perspective"), fov=st.floats(1e-6, 179.999)
+    **places,
+    projection=st.just("perspective"),
+    fov=st.floats(1e-6, 179.999),
+    f_number=st.none() | st.floats(0.01, 1e6),
+    focus_distance=st.none() | positive,
+    sensor_height=positive,
 ) | st.fixed_dictionaries(
     {"projection": st.just("orthographic")}, optional={**places, "height": st.floats(1e-12, 1e6)}
 )
-common = {"color": color, "intensity": amount, "shadow": st.booleans()}
+common = {
+    "color": color,
+    "intensity": amount,
+    "shadow": st.booleans(),
+    "angular_size": st.floats(0, 170),
+    "rays": st.none() | rays,
+}
 lights = optional(**common, type=st.just("directional"), direction=direction) | st.fixed_dictionaries(
-    {"type": st.just("point"), "position": vector},
+    {"type": st.just("point"), "position": far},
     optional={**common, "falloff": st.sampled_from(["none", "inverse_square"])},
 )
-stops = st.lists(st.tuples(fraction, color), min_size=1, max_size=4).map(
+stops = st.lists(st.tuples(fraction, color), min_size=2, max_size=4).map(
     lambda found: [{"at": at, "color": c} for at, c in sorted(found, key=lambda stop: stop[0])]
 )
 inline = st.fixed_dictionaries(
@@ -68,18 +83,70 @@ formulas = st.builds(
         iterations=st.integers(1, 1_000_000), bailout=st.floats(1, 100), distance_bailout=st.floats(1, 1e6)
     ),
 )
+points = st.builds(
+    lambda pattern, count, side: {"pattern": pattern, "count": side**2 if pattern == "grid" else count},
+    st.sampled_from(["grid", "stochastic"]),
+    st.integers(4, 64),
+    st.integers(2, 8),
+)
+# A step through the bounds: they and it are given together, a part of the diameter.
+search = st.builds(
+    lambda name, ball, part: {"search": name, "bounds": ball, "step": 2 * ball["radius"] * part},
+    st.sampled_from(["distance", "steps"]),
+    st.fixed_dictionaries({"center": vector, "radius": st.floats(1e-6, 1e5)}),
+    st.floats(1e-5, 0.999),
+)
+normals = st.builds(
+    lambda name, side, given: {"normal": name, "points": given if name == "least_squares" else side},
+    st.sampled_from(["one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares"]),
+    st.none() | st.sampled_from([9, 25, 49]).map(lambda count: {"count": count}),
+    st.none() | points,
+)
+adaptive = st.builds(
+    lambda samples, noise, fewer: {
+        "samples": samples,
+        "noise": noise,
+        "min_samples": fewer and min(fewer, samples),
+    },
+    st.integers(4, 65_536),
+    st.none() | st.floats(0, 1, exclude_min=True),
+    st.none() | st.integers(4, 65_536),
+)
+
+
+def together(*parts: st.SearchStrategy[dict[str, Any]]) -> st.SearchStrategy[dict[str, Any]]:
+    """One mapping with the keys of several; what comes later wins."""
+    return st.builds(lambda *found: {key: v for each in found for key, v in each.items()}, *parts)
+
+
+usual_renderer = optional(
+    type=st.just("surface"),
+    points=st.none() | points,
+    detail=st.floats(0.01, 100),
+    max_steps=st.integers(1, 100_000),
+    over_relaxation=st.floats(1, 1.99),
+    step_scale=st.none() | st.floats(0.01, 1),
+    bounds=st.none() | st.fixed_dictionaries({"center": vector, "radius": st.floats(1e-6, 1e6)}),
+    bounces=st.integers(0, 16),
+    ambient_occlusion=st.none() | optional(rays=rays, distance=st.none() | positive),
+    samples=st.integers(1, 65_536),
+    filter=st.sampled_from(["box", "tent", "blackman_harris"]),
+    filter_width=st.none() | st.floats(0.1, 16),
+    firefly_limit=st.none() | positive,
+    seed=st.integers(0, 2**32 - 1),
+)
+nothing: st.SearchStrategy[dict[str, Any]] = st.just({})
+renderers = together(usual_renderer, nothing | search, nothing | normals, nothing | adaptive)
+environments = st.builds(
+    lambda source, rest: {**source, **rest},
+    st.sampled_from([{"name": "studio"}, {"file": "sky.exr"}]),
+    optional(
+        intensity=amount, rotation=st.floats(-360, 360), background=st.booleans(), rays=st.integers(0, 1024)
+    ),
+)
 sections = optional(
     image=optional(width=st.integers(1, 16384), height=st.integers(1, 16384)),
-    renderer=optional(
-        type=st.just("surface"),
-        detail=st.floats(0.01, 100),
-        max_steps=st.integers(1, 100_000),
-        over_relaxation=st.floats(1, 1.99),
-        step_scale=st.none() | st.floats(0.01, 1),
-        bounds=st.none() | st.fixed_dictionaries({"center": vector, "radius": st.floats(1e-6, 1e6)}),
-        samples=st.integers(1, 65_536),
-        seed=st.integers(0, 2**32 - 1),
-    ),
+    renderer=renderers,
     lights=st.lists(lights, max_size=4),
     material=optional(
         color=st.lists(fraction, min_size=3, max_size=3),
@@ -87,13 +154,25 @@ sections = optional(
         diffuse=amount,
         specular=amount,
         shininess=st.floats(0.1, 1e5),
+        reflection=fraction,
     ),
     coloring=optional(
-        by=st.sampled_from(["solid", "normal", "iterations"]),
+        by=st.sampled_from(["solid", "normal", "iterations", "thickness", "layer_distance", "trap"]),
         palette=st.sampled_from(["viridis", "magma"]) | stops,
         scale=coordinate,
         offset=coordinate,
+        repeat=st.booleans(),
+        along=st.sampled_from(["view", "normal"]),
+        layer=st.integers(1, 1_000_000),
+        trap=optional(
+            shape=st.sampled_from(["point", "axis", "plane", "sphere"]),
+            center=vector,
+            direction=direction,
+            radius=positive,
+        ),
     ),
+    environment=st.none() | environments,
+    fog=st.none() | optional(color=color, density=amount, background=st.booleans()),
     background=st.just("transparent") | optional(top=color, bottom=color),
     output=optional(
         exposure=st.floats(-100, 100),
