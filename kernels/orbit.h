@@ -77,6 +77,35 @@ INLINE sphere orbit_count(vec point, mask active, __constant const struct Orbit 
     return result;
 }
 
+// Which points belong to the solid of `limit` applications: the inside of the distances below, without the distance. The
+// solids of fewer applications hold those of more (but for an orbit that comes back from beyond the distance bailout).
+INLINE sphere orbit_solid(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    state c, z;
+    start(point, k, &c, &z);
+    real square = state_square(z);
+    real count = (real)((scalar)min(FIRST_COUNT, limit));
+    mask alive = active & less_equal(square, (real)(orbit->distance_square));
+    for (int n = FIRST_COUNT; n < limit; ++n) {
+        if (!any_lane(alive)) break;
+        const state next = apply(n, z, c, k);
+        z = state_pick(alive, next, z);
+        square = pick(alive, state_square(next), square);
+        count = pick(alive, (real)((scalar)(n + 1)), count);
+        alive &= less_equal(square, (real)(orbit->distance_square));
+    }
+#if HAS_SHAPE
+    alive = active & less_equal(solid_distance(z, k), R(0.0));
+#else
+    alive &= settled(square, orbit);
+#endif
+    const sphere result = {R(0.0), count, alive};
+    return result;
+}
+
+INLINE mask orbit_inside(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    return orbit_solid(point, active, limit, orbit, k).inside;
+}
+
 #if HAS_DERIVATIVE
 // Distance by the formula's own scalar derivative: |z| / g with g carried as one number.
 INLINE sphere orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {

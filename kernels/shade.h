@@ -16,6 +16,8 @@ INLINE color color_pick(mask m, color yes, color no) {
 INLINE color color_mix(color a, color b, real share) {
     return color_of(a.r + (b.r - a.r) * share, a.g + (b.g - a.g) * share, a.b + (b.b - a.b) * share);
 }
+INLINE color color_add(color a, color b) { return color_of(a.r + b.r, a.g + b.g, a.b + b.b); }
+INLINE color color_scale(color a, real s) { return color_of(a.r * s, a.g * s, a.b * s); }
 
 // A light as seen from a point of the surface.
 typedef struct {
@@ -40,9 +42,10 @@ INLINE incidence light_at(__constant const struct Light *light, vec point) {
     return in;
 }
 
-// What one light adds. `lit` is s of Eq. 5; `to_viewer` has length 1.
-INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, __constant const struct Light *light,
-                   __constant const struct Material *material) {
+// What one light adds. `lit` is s of Eq. 5; `open` is the part of the hemisphere that is free, which the ambient part is worth;
+// `to_viewer` has length 1.
+INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
+                   __constant const struct Light *light, __constant const struct Material *material) {
     const real facing = vec_dot(normal, in.toward);
     const mask front = lit & less(R(0.0), facing);
     const real diffuse = pick(front, (real)(material->diffuse) * facing, R(0.0));
@@ -51,18 +54,27 @@ INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask 
     const real toward_viewer = fmax(vec_dot(mirrored, to_viewer), R(0.0));
     const real highlight = (real)(material->specular) * pow(toward_viewer, (real)(material->shininess));
     const real specular = pick(front & less(R(0.0), toward_viewer), highlight, R(0.0));
-    const real body = (real)(material->ambient) + diffuse;
+    const real body = (real)(material->ambient) * open + diffuse;
     return color_of(in.strength * (real)(light->color[0]) * (body * surface.r + specular),
                     in.strength * (real)(light->color[1]) * (body * surface.g + specular),
                     in.strength * (real)(light->color[2]) * (body * surface.b + specular));
 }
 
-// A palette of PALETTE_SIZE colours over [0, 1), repeating, blended linearly between neighbours.
-INLINE color palette_color(real where, __global const float *palette) {
+// Where a quantity lies in the palette, 0 to 1: the palette repeats, or its ends go on.
+INLINE real palette_place(real quantity, __constant const struct Material *material) {
+    const real where = quantity * (real)(material->palette_scale) + (real)(material->palette_offset);
+    const real place = material->palette_repeat ? where - floor(where) : clamp(where, R(0.0), R(1.0));
+    return pick(is_nan(place), R(0.0), place);
+}
+
+// A palette of PALETTE_SIZE colours, entry i at i / (PALETTE_SIZE - 1), blended linearly between neighbours. One that repeats
+// is squeezed by a 256th, where its last colour blends into its first.
+INLINE color palette_color(real place, int repeat, __global const float *palette) {
     scalar at[LANES], red[LANES], green[LANES], blue[LANES];
-    lanes_store((where - floor(where)) * R(256.0), at);
+    const int intervals = repeat ? PALETTE_SIZE : PALETTE_SIZE - 1;
+    lanes_store(place * (real)((scalar)intervals), at);
     for (int lane = 0; lane < LANES; ++lane) {
-        const int first = clamp((int)at[lane], 0, PALETTE_SIZE - 1);
+        const int first = clamp((int)at[lane], 0, intervals - 1);
         const int second = (first + 1) & (PALETTE_SIZE - 1);
         const float share = (float)at[lane] - (float)first;
         red[lane] = mix(palette[3 * first], palette[3 * second], share);
@@ -72,15 +84,15 @@ INLINE color palette_color(real where, __global const float *palette) {
     return color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
 }
 
-// The surface's own colour M.
-INLINE color surface_color(vec normal, real smooth, __constant const struct Material *material,
+// The surface's own colour M; `quantity` is that of coloring.h.
+INLINE color surface_color(vec normal, real quantity, __constant const struct Material *material,
                            __global const float *palette) {
-#if COLORING == COLORING_NORMAL
+#if COLORING == COLORING_SOLID
+    return color_splat(material->color);
+#elif COLORING == COLORING_NORMAL
     // The thesis stores normals as (n + 1) / 2 in RGB (sec. 3.2.1).
     return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-#elif COLORING == COLORING_ITERATIONS
-    return palette_color(smooth * (real)(material->palette_scale) + (real)(material->palette_offset), palette);
 #else
-    return color_splat(material->color);
+    return palette_color(palette_place(quantity, material), material->palette_repeat, palette);
 #endif
 }

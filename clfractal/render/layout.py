@@ -12,6 +12,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.language import Chain
 from clfractal.render.tiles import Region
 from clfractal.render.view import View
+from clfractal.scene.checks import used_bounds
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient
@@ -96,6 +97,14 @@ MATERIAL = Struct(
         Field("background_bottom", "real", 3, ""),
         Field("palette_scale", "real", 0, "palettes per unit of the quantity that chooses the colour"),
         Field("palette_offset", "real", 0, "start in the palette"),
+        Field("palette_repeat", "int", 0, "1: the palette begins again after its end; 0: its ends go on"),
+        Field("coloring_step", "real", 0, "step along the way of thickness or layer distance, scene units"),
+        Field("coloring_limit", "real", 0, "longest way, scene units"),
+        Field("coloring_tests", "int", 0, "most inside tests for one end of a way"),
+        Field("layer", "int", 0, "iterations of the other layer"),
+        Field("trap_center", "real", 3, "a point of the trap, in z"),
+        Field("trap_direction", "real", 3, "its axis' or normal's direction, length 1"),
+        Field("trap_radius", "real", 0, "a sphere's radius, in z"),
         Field("transparent", "int", 0, "1: no background is composited under"),
     ],
 )
@@ -108,6 +117,8 @@ LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 EXTRA_APPLICATIONS = 24
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
+# Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
+EXTRA_TESTS = 64
 
 Record = np.ndarray[Any, np.dtype[np.void]]
 
@@ -210,6 +221,24 @@ def material_record(scene: Scene, precision: Precision) -> Record:
         "background_bottom": gradient.bottom if gradient else (0.0, 0.0, 0.0),
         "palette_scale": scene.coloring.scale,
         "palette_offset": scene.coloring.offset,
+        **_way_and_trap(scene),
         "transparent": int(gradient is None),
     }
     return MATERIAL.value(precision, values)
+
+
+def _way_and_trap(scene: Scene) -> dict[str, object]:
+    """The fields of a Material for `kernels/coloring.h`."""
+    coloring, radius = scene.coloring, used_bounds(scene)[1]
+    step = coloring.step if coloring.step is not None else radius / 100
+    direction = np.array(coloring.trap.direction, float)
+    return {
+        "palette_repeat": int(coloring.repeat),
+        "coloring_step": step,
+        "coloring_limit": 2 * radius,
+        "coloring_tests": math.ceil(2 * radius / step) + EXTRA_TESTS,
+        "layer": coloring.layer,
+        "trap_center": coloring.trap.center,
+        "trap_direction": direction / np.linalg.norm(direction),
+        "trap_radius": coloring.trap.radius,
+    }

@@ -20,11 +20,19 @@ from clfractal.render import layout
 from clfractal.render.plan import Plan
 from clfractal.render.tiles import TILE
 from clfractal.render.view import camera_view
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 
 TILE_PIXELS = TILE * TILE
 PALETTE_SIZE = 256
-COLORINGS = {"solid": 0, "normal": 1, "iterations": 2}
+COLORINGS = {
+    name: number
+    for number, name in enumerate(
+        ("solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap")
+    )
+}
+ALONG = {"view": 0, "normal": 1, "reflection": 2}
+TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
 GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
 
@@ -40,10 +48,23 @@ def defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "TILE": TILE,
         "PALETTE_SIZE": PALETTE_SIZE,
         "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
-        **{f"COLORING_{name.upper()}": number for name, number in COLORINGS.items()},
-        "COLORING": COLORINGS[scene.coloring.by],
+        **coloring_defines(scene.coloring),
         **names,
     }
+
+
+def coloring_defines(coloring: Coloring) -> dict[str, object]:
+    """What `kernels/coloring.h` and `shade.h` need to know when they are compiled."""
+    families = (
+        ("COLORING", COLORINGS, coloring.by),
+        ("ALONG", ALONG, coloring.along),
+        ("TRAP", TRAPS, coloring.trap.shape),
+    )
+    result: dict[str, object] = {}
+    for family, numbers, chosen in families:
+        result.update({f"{family}_{name.upper()}": number for name, number in numbers.items()})
+        result[family] = numbers[chosen]
+    return result
 
 
 def program_text(scene: Scene, plan: Plan) -> FlatText:
@@ -164,7 +185,7 @@ class SurfaceWorker:
         ]
 
     def _palette(self) -> Floats:
-        if self.scene.coloring.by != "iterations":
+        if not self.scene.coloring.uses_palette:
             return np.zeros(3, np.float32)
         from clfractal.scene.palette import palette_table
 

@@ -1,0 +1,138 @@
+// The quantity that chooses a surface point's place in the palette, by COLORING: its smooth escape count, how uneven the
+// surface is there, how thick the set is behind it, how far off the surface of another iteration count lies, or how near
+// its orbit comes to a shape.
+//
+// The build defines COLORING (COLORING_SOLID, _NORMAL, _ITERATIONS, _RESIDUAL, _THICKNESS, _LAYER_DISTANCE, _TRAP), ALONG
+// (ALONG_VIEW, _NORMAL, _REFLECTION) and TRAP (TRAP_POINT, _AXIS, _PLANE, _SPHERE).
+
+#define WAY_GROWTH R(0.015625)   // part of a full step that the first one takes; they double until full
+#define WAY_TOLERANCE R(1e-4)    // part of a full step to which a crossing is narrowed down
+#define ENTRANCE_REACH R(4.0)    // footprints: how far behind a point of the surface the set may begin ...
+#define ENTRANCE_START R(0.0625) // ... and the first place to look
+
+// A crossing of the solid's surface on a way, as distances from where it starts.
+typedef struct {
+    mask found;
+    real before;  // the last place of the one side ...
+    real beyond;  // ... and the first of the other
+} gate;
+
+// Follows a way until it is inside (`inward` 1) or outside (0) the solid of `limit` applications: from the distance `begin`
+// in steps of `shortest`, doubled until they are `longest`, then by bisection. What is thinner than a step may be missed.
+INLINE gate way_until(int inward, vec from, vec direction, real begin, real shortest, real longest, real farthest, int limit,
+                      mask active, __constant const struct Material *material, __constant const struct Orbit *orbit,
+                      __constant const scalar *k) {
+    gate met = {active & ~active, begin, (real)(REAL_LARGEST)};
+    real t = begin;
+    // No finer than the number type tells places apart.
+    const real size = fmax(fmax(fabs(from.x), fabs(from.y)), fabs(from.z));
+    const real coarse = (real)(material->coloring_step) * WAY_TOLERANCE;
+    for (int i = 0; i < material->coloring_tests; ++i) {
+        if (!any_lane(active)) break;
+        const mask inside = orbit_inside(vec_along(from, t, direction), active, limit, orbit, k);
+        const mask there = active & (inward ? inside : ~inside);
+        met.beyond = pick(there, t, met.beyond);
+        met.before = pick(active & ~there, t, met.before);
+        met.found |= there;
+        const real tolerance = fmax(coarse, R(2.0) * (real)(REAL_EPSILON) * (size + fabs(t)));
+        active &= (met.found & less(tolerance, met.beyond - met.before)) | (~met.found & less(met.before, farthest));
+        const real step = clamp(met.before - begin, shortest, longest);
+        t = pick(met.found, R(0.5) * (met.before + met.beyond), fmin(met.before + step, farthest));
+    }
+    return met;
+}
+
+// How long the way from a point of the surface through the set is, from where it enters the set to where it first leaves it:
+// 0 where the set does not begin within a few footprints or a step, at most `coloring_limit`. `direction` has length 1.
+INLINE real set_thickness(vec point, vec direction, real cone, mask active, __constant const struct Material *material,
+                          __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const real step = (real)(material->coloring_step), limit = (real)(material->coloring_limit);
+    real begin = R(0.0), shortest = fmax(ENTRANCE_START * cone, WAY_TOLERANCE * step);
+    real longest = fmax(ENTRANCE_REACH * cone, step), farthest = longest;
+    real entrance = R(0.0), thickness = R(0.0);
+    // One loop for both ends, so that the orbit is compiled once.
+    for (int end = 0; end < 2; ++end) {
+        const gate met = way_until(end == 0, point, direction, begin, shortest, longest, farthest, orbit->iterations, active,
+                                   material, orbit, k);
+        const real middle = R(0.5) * (met.before + met.beyond);
+        if (end == 0) {
+            active = met.found;
+            entrance = middle;
+            begin = pick(active, met.beyond, R(0.0));
+            shortest = WAY_GROWTH * step;
+            longest = step;
+            farthest = begin + limit;
+        } else {
+            thickness = pick(met.found, fmin(middle - entrance, limit), limit);
+        }
+    }
+    return pick(active, thickness, R(0.0));
+}
+
+// How far the surface of `layer` applications is from a point of the scene's own: outwards where that is a larger solid (fewer
+// applications) and inwards where it is a smaller one, never negative, at most `coloring_limit`; exact to the footprint that
+// the point may lie before its own surface. `outward` has length 1.
+INLINE real layer_distance(vec point, vec outward, mask active, __constant const struct Material *material,
+                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const real step = (real)(material->coloring_step), limit = (real)(material->coloring_limit);
+    const int inward = material->layer > orbit->iterations;
+    const gate met = way_until(inward, point, vec_scale(outward, inward ? R(-1.0) : R(1.0)), R(0.0), WAY_GROWTH * step, step,
+                               limit, material->layer, active, material, orbit, k);
+    return pick(met.found, fmin(R(0.5) * (met.before + met.beyond), limit), limit);
+}
+
+// From the first three variables of z to the trap: its point, the axis or plane through it, or the sphere around it.
+INLINE real trap_distance(int shape, state z, __constant const struct Material *material) {
+    const vec offset = vec_sub(vec_of(z.s0, z.s1, z.s2), vec_splat(material->trap_center));
+    const vec direction = vec_splat(material->trap_direction);
+    const real along = vec_dot(offset, direction);
+    if (shape == TRAP_PLANE) return fabs(along);
+    const vec arm = shape == TRAP_AXIS ? vec_along(offset, -along, direction) : offset;
+    const real radius = shape == TRAP_SPHERE ? (real)(material->trap_radius) : R(0.0);
+    return fabs(sqrt(vec_dot(arm, arm)) - radius);
+}
+
+// How near z comes to the trap after one application or more, the one that leaves the bailout included. An orbit that is
+// outside from the start has only its start.
+INLINE real orbit_trap(int shape, vec point, mask active, __constant const struct Material *material,
+                       __constant const struct Orbit *orbit, __constant const scalar *k) {
+    state c, z;
+    start(point, k, &c, &z);
+    const real at_start = trap_distance(shape, z, material);
+    real nearest = FIRST_COUNT > 0 ? at_start : (real)(REAL_LARGEST);
+    mask alive = active & less_equal(state_square(z), (real)(orbit->bailout_square));
+    for (int n = FIRST_COUNT; n < orbit->iterations; ++n) {
+        if (!any_lane(alive)) break;
+        const state next = apply(n, z, c, k);
+        z = state_pick(alive, next, z);
+        nearest = pick(alive, fmin(nearest, trap_distance(shape, next, material)), nearest);
+        alive &= less_equal(state_square(z), (real)(orbit->bailout_square));
+    }
+    return pick(less(nearest, (real)(REAL_LARGEST)), nearest, at_start);
+}
+
+// What chooses the colour of a point of the surface, in scene units (a trap's: those of z; `smooth`: applications; `residual`:
+// footprints). `view_direction` leads from the viewer to the point, length 1; `cone` is the footprint there.
+INLINE real coloring_quantity(vec point, vec normal, vec view_direction, real cone, real smooth, real residual, mask active,
+                              __constant const struct Material *material, __constant const struct Orbit *orbit,
+                              __constant const scalar *k) {
+#if COLORING == COLORING_RESIDUAL
+    return residual;
+#elif COLORING == COLORING_THICKNESS
+    const vec way = ALONG == ALONG_VIEW ? view_direction : vec_scale(normal, R(-1.0));
+    return set_thickness(point, way, cone, active, material, orbit, k);
+#elif COLORING == COLORING_LAYER_DISTANCE
+#if ALONG == ALONG_VIEW
+    const vec outward = vec_scale(view_direction, R(-1.0));
+#elif ALONG == ALONG_REFLECTION
+    const vec outward = vec_along(view_direction, R(-2.0) * vec_dot(view_direction, normal), normal);
+#else
+    const vec outward = normal;
+#endif
+    return layer_distance(point, outward, active, material, orbit, k);
+#elif COLORING == COLORING_TRAP
+    return orbit_trap(TRAP, point, active, material, orbit, k);
+#else
+    return smooth;
+#endif
+}
