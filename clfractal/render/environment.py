@@ -1,0 +1,126 @@
+"""What a kernel needs of an environment map: its pixels, and tables to choose directions by brightness.
+
+The buffer's layout stands at the head of kernels/environment.h. Directions are chosen cell by cell of a grid
+of latitudes and longitudes, at most COLUMNS x ROWS, and uniformly on the sphere within a cell: the density
+per steradian is constant there.
+
+A cell's density is proportional to sqrt(mean * maximum) of the luminance in it, of the very light that the
+kernel shows: blended linearly between pixels. It is the root mean square where one spot of a cell shines and
+the rest is black, hence nearly the density of least variance (Pharr, Jakob, Humphreys, Physically Based
+Rendering, 3rd ed., 13.10); and it is above 0 wherever light comes from, so that no sample's weight is infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.scene.lighting import Environment
+
+COLUMNS, ROWS = 1024, 512
+"""Largest grid of the tables: 4 MB, and cells smaller than the sun."""
+
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, item 3.2
+_LEAST = 1e-6  # of the mean brightness, wherever there is light: no cell is too rare for float32
+_PIXELS_AT_ONCE = 1 << 21
+
+Floats = npt.NDArray[np.float32]
+Doubles = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PackedEnvironment:
+    """The buffer for the kernel (one-dimensional float32), the map's size and that of its tables."""
+
+    data: Floats
+    width: int
+    height: int
+    columns: int
+    rows: int
+
+
+def pack_environment(pixels: Floats) -> PackedEnvironment:
+    """Puts tables and pixels into one buffer.
+
+    Args:
+        pixels: shape (height, width, 3), linear Rec. 709, finite and not negative; width at least height.
+    """
+    height, width, _ = pixels.shape
+    columns, rows = min(width, COLUMNS), min(height, ROWS)
+    brightness = _brightness(pixels, columns, rows)
+    borders = np.cos(np.linspace(0.0, math.pi, rows + 1))
+    areas = (borders[:-1] - borders[1:]) * (2 * math.pi / columns)  # of a cell, steradians
+    shares = brightness * areas[:, None]
+    total = shares.sum()
+    if total > 0:
+        density = brightness / total
+    else:  # all black: whatever is chosen has no light
+        density = np.full((rows, columns), 1 / (4 * math.pi))
+        shares = np.broadcast_to(areas[:, None], (rows, columns))
+    by_column = np.stack([_cumulative(row) for row in shares])
+    by_row = _cumulative(shares.sum(axis=1))
+    parts = [borders, by_row, by_column, density, pixels]
+    data = np.concatenate([np.asarray(part, np.float32).reshape(-1) for part in parts])
+    return PackedEnvironment(data, width, height, columns, rows)
+
+
+def material_fields(environment: Environment | None, packed: PackedEnvironment | None) -> Mapping[str, Any]:
+    """The fields of `layout.MATERIAL` that tell the kernel of the map; zeros without one."""
+    angle = math.radians(environment.rotation) if environment else 0.0
+    return {
+        "environment_intensity": environment.intensity if environment else 0.0,
+        "environment_turn": (math.cos(angle), math.sin(angle)),
+        "environment_width": packed.width if packed else 0,
+        "environment_height": packed.height if packed else 0,
+        "environment_columns": packed.columns if packed else 0,
+        "environment_rows": packed.rows if packed else 0,
+    }
+
+
+def _cumulative(shares: Doubles) -> Doubles:
+    """Sums from 0 to exactly 1; equal steps where there is nothing to share."""
+    sums = np.concatenate([[0.0], np.cumsum(shares)])
+    return sums / sums[-1] if sums[-1] > 0 else np.linspace(0.0, 1.0, len(sums))
+
+
+def _brightness(pixels: Floats, columns: int, rows: int) -> Doubles:
+    """sqrt(mean * maximum) of the luminance blended between pixels, for each cell, shape (rows, columns)."""
+    height, width, _ = pixels.shape
+    means = np.empty((height, columns))
+    maxima = np.empty((height, columns))
+    band = max(1, _PIXELS_AT_ONCE // width)
+    for first in range(0, height, band):
+        luminance = pixels[first : first + band] @ _LUMINANCE
+        around = np.concatenate([luminance[:, -1:], luminance, luminance[:, :1]], axis=1)
+        means[first : first + band], maxima[first : first + band] = _reduce(around, columns)
+    # A bound is enough: the largest of the sums is at most the sum of the largest.
+    mean = _reduce(np.concatenate([means[:1], means, means[-1:]]).T, rows)[0].T
+    maximum = _reduce(np.concatenate([maxima[:1], maxima, maxima[-1:]]).T, rows)[1].T
+    brightness: Doubles = np.sqrt(mean * maximum)
+    return np.where(maximum > 0, np.maximum(brightness, _LEAST * brightness.mean()), 0.0)
+
+
+def _reduce(values: Doubles, cells: int) -> tuple[Doubles, Doubles]:
+    """Mean and maximum, in each of `cells` equal parts of a row, of straight lines between pixels' middles.
+
+    `values` has the pixels of a row, and one more at either end, along its last axis.
+    """
+    count = values.shape[-1] - 2
+    borders = np.arange(cells + 1) * (count / cells) + 0.5  # the middle of values[i] lies at i
+    left = np.minimum(np.floor(borders).astype(int), count)
+    part = borders - left
+    start, step = values[..., left], values[..., left + 1] - values[..., left]
+    at_borders = start + part * step
+    # Exact integrals of the lines: whole ones by sums, and what is left of the last.
+    whole = np.cumsum((values[..., :-1] + values[..., 1:]) / 2, axis=-1)
+    whole = np.concatenate([np.zeros((*values.shape[:-1], 1)), whole], axis=-1)
+    integral = whole[..., left] + part * (start + 0.5 * part * step)
+    mean = np.maximum(np.diff(integral, axis=-1), 0.0) * (cells / count)
+    # Every cell holds the middle of a pixel, since there are no more cells than pixels.
+    inside = np.maximum.reduceat(values[..., : count + 1], np.ceil(borders[:-1]).astype(int), axis=-1)
+    return mean, np.maximum(inside, np.maximum(at_borders[..., :-1], at_borders[..., 1:]))
