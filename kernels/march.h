@@ -1,13 +1,5 @@
 // Sphere tracing (Hart 1996) of a packet: steps of the distance to the solid until a ray's pixel cone touches it.
 
-typedef struct {
-    mask hit;
-    real t;       // distance along the ray; of a hit, a point still outside the solid
-    real steps;   // distance evaluations
-    real count;   // formula applications of all of them
-    real bad;     // steps that the distance called safe and that ended inside
-} crossing;
-
 // A distance can be far too small where the map stretches space unevenly, and a cone that touches it is no proof of a
 // surface. With the gradient at hand a hit is proved: the touching point descends towards the solid, and counts if it
 // arrives within the pixel. Formulas with a scalar rule of their own are nearly conformal and need no proof.
@@ -26,9 +18,11 @@ typedef struct {
 #define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
 
-// Marches the active lanes. `refine` (the same for all lanes) narrows a step that ended inside down to the surface;
-// without it such a lane is simply a hit, which is all that a shadow needs.
-INLINE crossing march(ray r, mask active, int refine, __constant const struct March *settings,
+// Marches the active lanes towards one goal, the same for all lanes:
+//   GOAL_SURFACE  the surface: hits are proved, and a step that ended inside is narrowed down to it
+//   GOAL_SHADOW   whether anything is in the way: a step that ended inside is a hit
+//   GOAL_TOUCH    how far a whole pixel's cone is free: the first touch, without proof, a point still outside
+INLINE crossing march(ray r, mask active, int goal, __constant const struct March *settings,
                       __constant const struct Orbit *orbit, __constant const scalar *k) {
     crossing found = {active & ~active, r.near, R(0.0), R(0.0), R(0.0)};
     real t = r.near;
@@ -114,12 +108,18 @@ INLINE crossing march(ray r, mask active, int refine, __constant const struct Ma
 #else
         const mask touched = outside & less(radius, cone) & (less_equal(retry_t, t) | less(radius, retry_radius));
 #endif
-        const mask narrow = refine ? bracketed & less_equal(high - low, R(0.0625) * cone) : inside;
+        const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(high - low, R(0.0625) * cone) : inside;
 #if HAS_DERIVATIVE
         const mask done = touched | narrow;
 #else
-        // A bracketed lane has seen the inside already.
+        // A bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be
+        // proved again.
+#if POINTS > 1
+        const mask proved = less(fabs(t - r.known), (real)(settings->known_reach) * cone);
+        const mask done = narrow | (touched & (goal == GOAL_TOUCH ? touched : bracketed | proved));
+#else
         const mask done = narrow | (touched & bracketed);
+#endif
         proving |= touched & ~done;
         probe = vec_pick(proving, vec_along(point, factor * fmax(radius, PROOF_LANDED * cone), downhill), probe);
         probe_downhill = downhill;

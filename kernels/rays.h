@@ -5,16 +5,21 @@ typedef struct {
     real near, far;   // the part of the ray to search, distances from the origin
     real footprint;   // a pixel's width at distance 0 ...
     real spread;      // ... and how much it grows per unit of distance
+    real known;       // distance of a hit that is proved already, on a ray of the same pixel
 } ray;
 
-// The ray through the picture at (x, y), in pixels from the top left corner.
-INLINE ray camera_ray(real x, real y, __constant const struct View *view) {
+#define RAY_NOTHING_KNOWN ((real)(REAL_LARGEST))
+
+// The ray through the picture at (x, y), in pixels from the top left corner, and through the lens at (lens_x, lens_y), in
+// lens radii from its middle.
+INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, __constant const struct View *view) {
     const real across = x - (real)(view->center_x);
     const real below = y - (real)(view->center_y);
     const vec on_plane = vec_along(vec_along(vec_splat(view->center), across, vec_splat(view->right)), below, vec_splat(view->down));
     ray r;
     r.near = R(0.0);
     r.far = (real)(REAL_LARGEST);
+    r.known = RAY_NOTHING_KNOWN;
     if (view->perspective) {
         // Relative to the eye, so that a far-off camera loses no more digits than it must.
         const vec from_eye = vec_sub(on_plane, vec_splat(view->eye));
@@ -23,6 +28,15 @@ INLINE ray camera_ray(real x, real y, __constant const struct View *view) {
         r.direction = vec_scale(from_eye, inverse);
         r.footprint = R(0.0);
         r.spread = (real)(view->pixel_size) * inverse;
+#if HAS_LENS
+        // A thin lens: whatever its point, all rays of a pixel meet again in the plane of focus.
+        const real to_focus = (real)(view->focus_distance) / vec_dot(r.direction, vec_splat(view->axis));
+        const vec on_lens = vec_along(vec_along(vec_of(R(0.0), R(0.0), R(0.0)), lens_x * (real)(view->lens_radius),
+                                                vec_splat(view->side)),
+                                      lens_y * (real)(view->lens_radius), vec_splat(view->up));
+        r.direction = vec_normalize(vec_sub(vec_scale(r.direction, to_focus), on_lens));
+        r.origin = vec_add(r.origin, on_lens);
+#endif
     } else {
         r.origin = on_plane;
         r.direction = vec_splat(view->axis);
@@ -44,3 +58,18 @@ INLINE mask ray_clip(ray *r, __constant const scalar *center, scalar radius) {
     r->far = fmin(r->far, middle + half_chord);
     return less(R(0.0), half_square) & less(r->near, r->far);
 }
+
+// What a march finds.
+typedef struct {
+    mask hit;
+    real t;       // distance along the ray; of a hit, a point still outside the solid
+    real steps;   // points of the ray that were tried
+    real count;   // formula applications of all of them
+    real bad;     // steps that the distance called safe and that ended inside
+} crossing;
+
+// What a march is after (see march.h and march_steps.h).
+#define GOAL_SURFACE 0
+#define GOAL_SHADOW 1
+#define GOAL_TOUCH 2
+#define GOAL_POINT 3

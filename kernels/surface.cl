@@ -12,9 +12,22 @@
 #include "formula.h"
 #include "orbit.h"
 #include "rays.h"
+#if SEARCH == SEARCH_STEPS
+#include "march_steps.h"
+#else
 #include "march.h"
-#include "shade.h"
+#endif
 #include "sampling.h"
+#include "shade.h"
+#include "normals.h"
+#include "coloring.h"
+#if HAS_ENVIRONMENT
+#include "environment.h"
+#endif
+#include "spot.h"
+#include "pixel_points.h"
+#include "secondary.h"
+#include "shot.h"
 
 #define TILE_PIXELS (TILE * TILE)
 
@@ -26,169 +39,132 @@ INLINE int morton_column(int m) {
     return (m | (m >> 4)) & 0x00ff00ff;
 }
 
-INLINE void write_channel(__global float *film, int slot, const int *pixel, real value) {
+INLINE void write_channel(__global float *film, int slot, const int *place, real value) {
     if (slot < 0) return;
     scalar each[LANES];
     lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) film[slot * TILE_PIXELS + pixel[lane]] = (float)each[lane];
+    for (int lane = 0; lane < LANES; ++lane) film[slot * TILE_PIXELS + place[lane]] = (float)each[lane];
 }
 
-// Everything a sample contributes to the film.
+// Sums over the shots of a pixel, and what the one nearest to its middle found.
 typedef struct {
     color radiance;
-    real coverage;
+    real coverage, shots;
+    real brightness, brightness_square;   // of each shot, for its noise
+    real coverage_square;
+    real nearest;                         // distance squared of the kept shot from the middle, pixels
     real depth;
     vec normal, point;
     real smooth, steps;
-} sample_result;
+} pixel;
+
+INLINE void pixel_add(pixel *p, shot s, mask active, real offset) {
+    const real one = pick(active, R(1.0), R(0.0));
+    p->radiance = color_pick(active, color_add(p->radiance, s.radiance), p->radiance);
+    p->coverage += pick(active, s.coverage, R(0.0));
+    p->shots += one;
+    // Data channels take the sample nearest the pixel's centre, never an average.
+    const mask nearer = active & less(offset, p->nearest);
+    const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
+    p->nearest = pick(nearer, offset, p->nearest);
+    p->depth = pick(nearer, pick(s.hit, s.depth, (real)(INFINITY)), p->depth);
+    p->normal = vec_pick(nearer, vec_pick(s.hit, s.normal, zero), p->normal);
+    p->point = vec_pick(nearer, vec_pick(s.hit, s.point, zero), p->point);
+    p->smooth = pick(nearer, pick(s.hit, s.smooth, R(0.0)), p->smooth);
+    p->steps = pick(nearer, s.steps, p->steps);
+}
+
+#if ADAPTIVE
+// Adds a shot to what tells a pixel's noise: brightness as the eye sees it, the square root of luminance, and coverage.
+INLINE void noise_add(pixel *p, shot s, mask active) {
+    const real luminance = R(0.2126) * s.radiance.r + R(0.7152) * s.radiance.g + R(0.0722) * s.radiance.b;
+    const real seen = pick(active, sqrt(fmax(luminance, R(0.0))), R(0.0));
+    p->brightness += seen;
+    p->brightness_square += seen * seen;
+    p->coverage_square += pick(active, s.coverage * s.coverage, R(0.0));
+}
+
+// The standard error of a pixel's mean, the larger one of brightness and coverage.
+INLINE real noise_of(const pixel *p) {
+    const real share = R(1.0) / p->shots;
+    const real mean = p->brightness * share, coverage = p->coverage * share;
+    const real variance = fmax(p->brightness_square * share - mean * mean, p->coverage_square * share - coverage * coverage);
+    return sqrt(fmax(variance, R(0.0)) / fmax(p->shots - R(1.0), R(1.0)));
+}
+#endif
 
 __kernel void surface(__global float *film, __global uint *statistics, __global const int2 *corners,
                       __constant const struct View *view, __constant const struct March *settings,
                       __constant const struct Orbit *orbit, __constant const scalar *k,
                       __constant const struct Material *material, __constant const struct Light *lights,
-                      __global const float *palette, __constant const int *slots, int channel_count, int first_packet) {
+                      __global const float *palette, __global const float *environment, __constant const int *slots,
+                      int channel_count, int first_packet) {
     const int packet = (int)get_global_id(0) + first_packet;
     const int tile = (int)get_global_id(1);
     const int first = packet * LANES;
     const int2 corner = corners[tile];
+    const world w = {view, settings, orbit, k, material, lights, palette, environment};
 
-    // Which pixels: place in the tile, and the part of them that lies in the rendered region.
-    int pixel[LANES];
-    scalar wanted[LANES];
+    // Which pixels: place in the tile and in the picture, and the part of them that lies in the rendered region.
+    int place[LANES], columns[LANES], rows[LANES];
+    scalar wanted[LANES], x[LANES], y[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
         const int column = morton_column(first + lane), row = morton_column((first + lane) >> 1);
-        const int x = corner.x + column, y = corner.y + row;
-        pixel[lane] = row * TILE + column;
-        wanted[lane] = (x >= view->region_left && x < view->region_right && y >= view->region_top && y < view->region_bottom)
+        columns[lane] = corner.x + column;
+        rows[lane] = corner.y + row;
+        place[lane] = row * TILE + column;
+        x[lane] = (scalar)columns[lane] + S(0.5);
+        y[lane] = (scalar)rows[lane] + S(0.5);
+        wanted[lane] = (columns[lane] >= view->region_left && columns[lane] < view->region_right &&
+                        rows[lane] >= view->region_top && rows[lane] < view->region_bottom)
                            ? S(1.0) : S(0.0);
     }
     const mask in_region = less(R(0.0), lanes_load(wanted));
+    const real middle_x = lanes_load(x), middle_y = lanes_load(y);
 
-    color sum = color_of(R(0.0), R(0.0), R(0.0));
-    real coverage = R(0.0), bad = R(0.0), steps = R(0.0), count = R(0.0);
-    real nearest_offset = (real)(REAL_LARGEST);
-    sample_result kept = {0};
+    pixel p = {0};
+    p.nearest = (real)(REAL_LARGEST);
+    tally cost = {R(0.0), R(0.0), R(0.0)};
+    mask active = in_region;
     for (int sample = 0; sample < settings->samples; ++sample) {
-        // The ray of each lane's sample.
-        scalar x[LANES], y[LANES], offset[LANES];
-        for (int lane = 0; lane < LANES; ++lane) {
-            const int px = corner.x + pixel[lane] % TILE, py = corner.y + pixel[lane] / TILE;
-            scalar across, below;
-            sample_offset(px, py, sample, settings->samples, (uint)settings->seed, &across, &below);
-            x[lane] = (scalar)px + across;
-            y[lane] = (scalar)py + below;
-            offset[lane] = (across - S(0.5)) * (across - S(0.5)) + (below - S(0.5)) * (below - S(0.5));
+        if (!any_lane(active)) break;
+        // One sample lies in the middle.
+        real across = R(0.0), below = R(0.0);
+        if (settings->samples > 1) {
+            real u, v;
+            unit_square((bits)((uint)sample), pixel_seed(columns, rows, (uint)settings->seed, PURPOSE_PIXEL), &u, &v);
+            filter_offset(u, v, settings->filter, (real)(settings->filter_width), &across, &below);
         }
-        const real picture_y = lanes_load(y);
-        ray leg_ray = camera_ray(lanes_load(x), picture_y, view);
-        const ray eye_ray = leg_ray;
-        mask leg_active = in_region & ray_clip(&leg_ray, settings->bounds_center, settings->bounds_radius);
-
-        sample_result result;
-        mask hit = leg_active & ~leg_active;
-        vec start = eye_ray.origin;
-        color surface_tint = color_of(R(0.0), R(0.0), R(0.0));
-        color radiance = color_mix(color_splat(material->background_top), color_splat(material->background_bottom),
-                                   clamp(picture_y / (real)((scalar)view->height), R(0.0), R(1.0)));
-        incidence in;
-        real cone = R(0.0);
-        // Leg 0 is the ray from the eye; each further leg is the shadow ray to one light. One loop, so that the march is
-        // compiled once.
-        for (int leg = 0; leg <= settings->light_count; ++leg) {
-            __constant const struct Light *light = lights + max(leg - 1, 0);
-            mask occluded = leg_active & ~leg_active;
-            if (leg > 0) {
-                if (!any_lane(hit)) break;
-                in = light_at(light, start);
-                leg_active = hit & less(R(0.0), vec_dot(result.normal, in.toward));
-                if (light->shadow == 0) leg_active = leg_active & ~leg_active;
-                // Leave the surface far enough for the ray not to meet the very bump it starts from.
-                leg_ray.origin = vec_along(start, cone * (real)(settings->shadow_lift), result.normal);
-                leg_ray.direction = in.toward;
-                leg_ray.near = R(0.0);
-                leg_ray.far = in.distance;
-                leg_ray.footprint = cone * (real)(settings->shadow_detail);
-                leg_ray.spread = R(0.0);
-                leg_active &= ray_clip(&leg_ray, settings->bounds_center, settings->bounds_radius);
-            }
-            if (any_lane(leg_active)) {
-                const crossing met = march(leg_ray, leg_active, leg == 0, settings, orbit, k);
-                occluded = met.hit;
-                count += met.count;
-                bad += leg == 0 ? met.bad : R(0.0);
-                if (leg == 0) {
-                    hit = met.hit;
-                    result.steps = met.steps;
-                    steps += met.steps;
-                    result.depth = met.t;
-                } else {
-                    steps += met.steps;
-                }
-            }
-            if (leg == 0) {
-                if (!any_lane(leg_active)) result.steps = R(0.0);
-                if (any_lane(hit)) {
-                    // The surface itself: normal from the Jacobian, colour.
-                    start = vec_along(eye_ray.origin, result.depth, eye_ray.direction);
-                    cone = eye_ray.footprint + eye_ray.spread * result.depth;
-                    surface_point surface;
-                    const sphere there = orbit_dual_distance(start, hit, orbit, k, &surface);
-                    count += pick(hit, there.count, R(0.0));
-                    vec normal = vec_normalize(surface.gradient);
-                    // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
-                    const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.inside;
-                    normal = vec_pick(flat, vec_scale(eye_ray.direction, R(-1.0)), normal);
-                    result.normal = normal;
-                    result.smooth = smooth_count(there, surface, orbit);
-                    surface_tint = surface_color(normal, result.smooth, material, palette);
-                    radiance = color_pick(hit, color_of(R(0.0), R(0.0), R(0.0)), radiance);
-                }
-            } else {
-                const color added = phong(surface_tint, result.normal, vec_scale(eye_ray.direction, R(-1.0)), in, ~occluded,
-                                          light, material);
-                radiance = color_pick(hit, color_of(radiance.r + added.r, radiance.g + added.g, radiance.b + added.b), radiance);
-            }
-        }
-
-        // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
-        if (material->transparent) radiance = color_pick(hit, radiance, color_of(R(0.0), R(0.0), R(0.0)));
-        sum = color_of(sum.r + radiance.r, sum.g + radiance.g, sum.b + radiance.b);
-        coverage += pick(hit, R(1.0), R(0.0));
-
-        // Data channels take the sample nearest the pixel's centre, never an average.
-        const real sample_distance = lanes_load(offset);
-        const mask nearer = less(sample_distance, nearest_offset);
-        nearest_offset = pick(nearer, sample_distance, nearest_offset);
-        const mask keep = nearer & hit;
-        const real along_axis = vec_dot(vec_sub(start, vec_splat(view->eye)), vec_splat(view->axis));
-        const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
-        kept.depth = pick(nearer, pick(hit, along_axis, (real)(INFINITY)), kept.depth);
-        kept.normal = vec_pick(nearer, vec_pick(keep, result.normal, zero), kept.normal);
-        kept.point = vec_pick(nearer, vec_pick(keep, start, zero), kept.point);
-        kept.smooth = pick(nearer, pick(keep, result.smooth, R(0.0)), kept.smooth);
-        kept.steps = pick(nearer, result.steps, kept.steps);
+        const shot s = take_shot(middle_x + across, middle_y + below, sample, columns, rows, active, w, &cost);
+        pixel_add(&p, s, active, across * across + below * below);
+#if ADAPTIVE
+        noise_add(&p, s, active);
+        // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
+        if (sample + 1 >= settings->min_samples && (sample & 3) == 3) active &= less((real)(settings->noise), noise_of(&p));
+#endif
     }
 
     film += tile * channel_count * TILE_PIXELS;
-    const real share = R(1.0) / (real)((scalar)settings->samples);
-    write_channel(film, slots[CHANNEL_R], pixel, sum.r * share);
-    write_channel(film, slots[CHANNEL_G], pixel, sum.g * share);
-    write_channel(film, slots[CHANNEL_B], pixel, sum.b * share);
-    write_channel(film, slots[CHANNEL_A], pixel, coverage * share);
-    write_channel(film, slots[CHANNEL_Z], pixel, kept.depth);
-    write_channel(film, slots[CHANNEL_NX], pixel, kept.normal.x);
-    write_channel(film, slots[CHANNEL_NY], pixel, kept.normal.y);
-    write_channel(film, slots[CHANNEL_NZ], pixel, kept.normal.z);
-    write_channel(film, slots[CHANNEL_PX], pixel, kept.point.x);
-    write_channel(film, slots[CHANNEL_PY], pixel, kept.point.y);
-    write_channel(film, slots[CHANNEL_PZ], pixel, kept.point.z);
-    write_channel(film, slots[CHANNEL_ITERATIONS], pixel, kept.smooth);
-    write_channel(film, slots[CHANNEL_STEPS], pixel, kept.steps);
+    const real share = R(1.0) / fmax(p.shots, R(1.0));
+    write_channel(film, slots[CHANNEL_R], place, p.radiance.r * share);
+    write_channel(film, slots[CHANNEL_G], place, p.radiance.g * share);
+    write_channel(film, slots[CHANNEL_B], place, p.radiance.b * share);
+    write_channel(film, slots[CHANNEL_A], place, p.coverage * share);
+    write_channel(film, slots[CHANNEL_Z], place, p.depth);
+    write_channel(film, slots[CHANNEL_NX], place, p.normal.x);
+    write_channel(film, slots[CHANNEL_NY], place, p.normal.y);
+    write_channel(film, slots[CHANNEL_NZ], place, p.normal.z);
+    write_channel(film, slots[CHANNEL_PX], place, p.point.x);
+    write_channel(film, slots[CHANNEL_PY], place, p.point.y);
+    write_channel(film, slots[CHANNEL_PZ], place, p.point.z);
+    write_channel(film, slots[CHANNEL_ITERATIONS], place, p.smooth);
+    write_channel(film, slots[CHANNEL_STEPS], place, p.steps);
+    write_channel(film, slots[CHANNEL_SAMPLES], place, p.shots);
 
     // Per packet: rays, distance evaluations, formula applications, steps that ended inside.
     statistics += 4 * (tile * (TILE_PIXELS / LANES) + packet);
-    statistics[0] = (uint)lanes_sum(pick(in_region, (real)((scalar)settings->samples), R(0.0)));
-    statistics[1] = (uint)lanes_sum(steps);
-    statistics[2] = (uint)lanes_sum(count);
-    statistics[3] = (uint)lanes_sum(bad);
+    statistics[0] = (uint)lanes_sum(p.shots);
+    statistics[1] = (uint)lanes_sum(cost.steps);
+    statistics[2] = (uint)lanes_sum(cost.count);
+    statistics[3] = (uint)lanes_sum(cost.bad);
 }

@@ -16,6 +16,9 @@ INLINE vec vec_along(vec from, real distance, vec direction) {
     return vec_of(from.x + distance * direction.x, from.y + distance * direction.y, from.z + distance * direction.z);
 }
 INLINE real vec_dot(vec a, vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+INLINE vec vec_cross(vec a, vec b) {
+    return vec_of(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+}
 INLINE vec vec_pick(mask m, vec yes, vec no) {
     return vec_of(pick(m, yes.x, no.x), pick(m, yes.y, no.y), pick(m, yes.z, no.z));
 }

@@ -41,6 +41,7 @@ _TABLE = (
     Channel("P.Z", "data", "float", 0.0, "point hit, z, scene units"),
     Channel("iterations", "data", "float", 0.0, "smooth escape count"),
     Channel("steps", "data", "float", 0.0, "distance evaluations of the ray"),
+    Channel("samples", "data", "float", 0.0, "samples of the pixel"),
 )
 
 CHANNELS: dict[str, Channel] = {channel.name: channel for channel in _TABLE}

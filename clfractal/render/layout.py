@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.language import Chain
+from clfractal.render.environment import PackedEnvironment, material_fields
 from clfractal.render.tiles import Region
 from clfractal.render.view import View
 from clfractal.scene.checks import used_bounds
@@ -27,6 +29,10 @@ VIEW = Struct(
         Field("axis", "real", 3, "view direction, length 1"),
         Field("center_x", "real", 0, "the plane's middle in the picture, pixels from the left"),
         Field("center_y", "real", 0, "the same, pixels from the top"),
+        Field("side", "real", 3, "the picture's right, length 1"),
+        Field("up", "real", 3, "the picture's up, length 1"),
+        Field("lens_radius", "real", 0, "half the lens's diameter, scene units; 0 for a pinhole"),
+        Field("focus_distance", "real", 0, "of the plane that is sharp, along the axis, scene units"),
         Field("pixel_size", "real", 0, "height of a pixel on the plane, scene units"),
         Field("perspective", "int", 0, "1: rays leave the eye; 0: rays are parallel to the axis"),
         Field("height", "int", 0, "height of the picture, pixels"),
@@ -62,9 +68,25 @@ MARCH = Struct(
         Field("shadow_lift", "real", 0, "where shadow rays start, in footprints above the surface"),
         Field("shadow_detail", "real", 0, "hit distance of shadow rays, in footprints over detail"),
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
-        Field("samples", "int", 0, "rays per pixel"),
+        Field("step", "real", 0, "step of the search by steps, scene units"),
+        Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
+        Field("point_share", "real", 0, "footprint of one of a pixel's points, in the pixel's"),
+        Field("known_reach", "real", 0, "how far a proved hit proves its neighbours', in a point's cones"),
+        Field("samples", "int", 0, "shots per pixel, at most"),
+        Field("min_samples", "int", 0, "shots before the noise is judged"),
+        Field("noise", "real", 0, "standard error at which a pixel is done"),
+        Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
+        Field("filter_width", "real", 0, "its width, pixels"),
         Field("seed", "uint", 0, "chooses the places of the samples"),
+        Field("bounces", "int", 0, "most mirror reflections"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("light_rays", "int", 0, "most shadow rays that a light has"),
+        Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
+        Field("map_rays", "int", 0, "rays into the hemisphere, spread like the environment's light"),
+        Field("ambient_far", "real", 0, "how long these rays are, scene units"),
+        Field("occlusion_distance", "real", 0, "how far an obstacle counts as occlusion, scene units"),
+        Field("occlusion_share", "real", 0, "what one ray adds to the open part; 0: no ambient occlusion"),
+        Field("firefly_limit", "real", 0, "brightest that mirrored light or the environment's may be"),
     ],
 )
 
@@ -82,6 +104,9 @@ LIGHT = Struct(
         Field("kind", "int", 0, "LIGHT_DIRECTIONAL or LIGHT_POINT"),
         Field("inverse_square", "int", 0, "1: weakens with the square of the distance"),
         Field("shadow", "int", 0, "1: blocked by the set"),
+        Field("spread", "real", 0, "1 - cos of half its angular size"),
+        Field("rays", "int", 0, "shadow rays of a shot"),
+        Field("share", "real", 0, "one over that"),
     ],
 )
 
@@ -105,7 +130,18 @@ MATERIAL = Struct(
         Field("trap_center", "real", 3, "a point of the trap, in z"),
         Field("trap_direction", "real", 3, "its axis' or normal's direction, length 1"),
         Field("trap_radius", "real", 0, "a sphere's radius, in z"),
+        Field("reflection", "real", 0, "part that is mirrored sharply"),
+        Field("fog_color", "real", 3, "linear Rec. 709"),
+        Field("fog_density", "real", 0, "per scene unit"),
+        Field("fog_background", "int", 0, "1: the fog covers what is past the set"),
+        Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
+        Field("environment_intensity", "real", 0, "factor on the environment's light"),
+        Field("environment_turn", "real", 2, "cosine and sine of its turn about z"),
+        Field("environment_width", "int", 0, "size of the map, pixels"),
+        Field("environment_height", "int", 0, ""),
+        Field("environment_columns", "int", 0, "size of its tables, cells"),
+        Field("environment_rows", "int", 0, ""),
     ],
 )
 
@@ -117,6 +153,10 @@ LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 EXTRA_APPLICATIONS = 24
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
+# In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
+TOUCH = 0.75
+FILTERS = ("box", "tent", "blackman_harris")
+FILTER_WIDTHS = {"box": 1.0, "tent": 2.0, "blackman_harris": 3.0}
 # Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
 EXTRA_TESTS = 64
 
@@ -136,6 +176,10 @@ def view_record(view: View, width: int, height: int, region: Region, precision: 
         "down": view.up * (-view.height / height),
         "eye": view.origin,
         "axis": view.axis,
+        "side": view.side,
+        "up": view.up,
+        "lens_radius": view.lens_radius,
+        "focus_distance": view.focus_distance,
         "center_x": width / 2,
         "center_y": height / 2,
         "pixel_size": view.pixel_size(height),
@@ -169,23 +213,63 @@ def orbit_record(chain: Chain, iterations: int, precision: Precision, bailout: f
 
 
 def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
-    """The settings of the march."""
+    """The settings of the march, of a pixel's shots and of the rays that they send."""
     chain, renderer = scene.chain, scene.renderer
-    bounds = renderer.bounds
+    center, radius = used_bounds(scene)
+    points = renderer.used_points.count
+    point_share = 1 / math.sqrt(points)
+    occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
+    half = radius / 2
+    distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
+    width = renderer.filter_width
+    largest = float(np.finfo(np.float32).max) / 16
     values = {
-        "bounds_center": bounds.center if bounds else chain.center,
-        "bounds_radius": bounds.radius if bounds else chain.radius,
+        "bounds_center": center,
+        "bounds_radius": radius,
         "step_scale": renderer.step_scale if renderer.step_scale is not None else chain.step_scale,
         "relaxation": renderer.over_relaxation,
         "detail": renderer.detail,
         "shadow_lift": SHADOW_LIFT * renderer.detail,
         "shadow_detail": SHADOW_DETAIL,
         "max_steps": renderer.max_steps,
+        "step": renderer.step if renderer.step is not None else radius / 100,
+        "touch_share": max(TOUCH / renderer.detail, point_share),
+        "point_share": point_share,
+        "known_reach": 1 / (point_share * renderer.detail),
         "samples": samples,
+        "min_samples": min(renderer.used_min_samples, samples),
+        "noise": renderer.noise or 0.0,
+        "filter": FILTERS.index(renderer.filter),
+        "filter_width": width if width is not None else FILTER_WIDTHS[renderer.filter],
         "seed": renderer.seed,
+        "bounces": renderer.bounces if scene.material.reflection > 0 else 0,
         "light_count": len(scene.lights),
+        "light_rays": max((light.used_rays for light in scene.lights), default=1),
+        "cosine_rays": rays.cosine,
+        "map_rays": rays.map,
+        "ambient_far": distance if not rays.lit else largest,
+        "occlusion_distance": distance,
+        "occlusion_share": 1 / rays.cosine if occlusion is not None else 0.0,
+        "firefly_limit": renderer.firefly_limit if renderer.firefly_limit is not None else largest,
     }
     return MARCH.value(precision, values)
+
+
+@dataclass(frozen=True, slots=True)
+class HemisphereRays:
+    """Rays of a shot into the hemisphere: spread like the cosine, like the environment's light, and whether that lights."""
+
+    cosine: int
+    map: int
+    lit: bool
+
+
+def hemisphere_rays(scene: Scene) -> HemisphereRays:
+    """Ambient occlusion and the environment's light share the rays that are spread like the cosine."""
+    occlusion = scene.renderer.ambient_occlusion
+    open_rays = occlusion.rays if occlusion is not None else 0
+    lit_rays = scene.environment.rays if scene.environment is not None else 0
+    return HemisphereRays(max(open_rays, (lit_rays + 1) // 2), lit_rays // 2, lit_rays > 0)
 
 
 def light_records(scene: Scene, precision: Precision) -> Record:
@@ -202,14 +286,20 @@ def light_records(scene: Scene, precision: Precision) -> Record:
                 "kind": LIGHT_POINT if point else LIGHT_DIRECTIONAL,
                 "inverse_square": int(isinstance(light, PointLight) and light.falloff == "inverse_square"),
                 "shadow": int(light.shadow),
+                # 1 - cos a = 2 sin(a/2)^2, which keeps its digits for the smallest lights.
+                "spread": 2 * math.sin(math.radians(light.angular_size) / 4) ** 2,
+                "rays": light.used_rays,
+                "share": 1 / light.used_rays,
             }
         )
     return LIGHT.array(precision, rows) if rows else np.zeros(1, LIGHT.dtype(precision))
 
 
-def material_record(scene: Scene, precision: Precision) -> Record:
-    """Material, colouring and background."""
-    material, background = scene.material, scene.background
+def material_record(
+    scene: Scene, precision: Precision, environment: PackedEnvironment | None = None
+) -> Record:
+    """Material, colouring, background, and how the packed environment is laid out."""
+    material, background, fog = scene.material, scene.background, scene.fog
     gradient = background if isinstance(background, Gradient) else None
     values = {
         "color": material.color,
@@ -222,7 +312,13 @@ def material_record(scene: Scene, precision: Precision) -> Record:
         "palette_scale": scene.coloring.scale,
         "palette_offset": scene.coloring.offset,
         **_way_and_trap(scene),
+        "reflection": material.reflection,
+        "fog_color": fog.color if fog else (0.0, 0.0, 0.0),
+        "fog_density": fog.density if fog else 0.0,
+        "fog_background": int(fog is not None and fog.background),
+        "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),
+        **material_fields(scene.environment, environment),
     }
     return MATERIAL.value(precision, values)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,7 @@ from clfractal.render.tiles import TILE
 from clfractal.render.view import camera_view
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
 
 TILE_PIXELS = TILE * TILE
 PALETTE_SIZE = 256
@@ -33,6 +35,9 @@ COLORINGS = {
 }
 ALONG = {"view": 0, "normal": 1, "reflection": 2}
 TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
+NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
+# Distance evaluations that bring a point to a fixed part of its footprint from the set.
+POLISH = 5
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
 GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
 
@@ -48,8 +53,38 @@ def defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "TILE": TILE,
         "PALETTE_SIZE": PALETTE_SIZE,
         "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
+        **feature_defines(scene),
         **coloring_defines(scene.coloring),
         **names,
+    }
+
+
+def feature_defines(scene: Scene) -> dict[str, object]:
+    """How the surface is searched and shaded, as far as the program's text depends on it."""
+    renderer = scene.renderer
+    points = renderer.used_points
+    normal_counts = {"gradient": points.count, "eight_triangles_shading": 8}
+    positions = points.count > 1 and (renderer.normal != "gradient" or scene.coloring.by == "residual")
+    rays = layout.hemisphere_rays(scene)
+    return {
+        "SEARCH_DISTANCE": 0,
+        "SEARCH_STEPS": 1,
+        "SEARCH": int(renderer.search == "steps"),
+        "POINTS": points.count,
+        "POINT_PATTERN": int(points.pattern == "stochastic"),
+        "POINT_SIDE": math.isqrt(points.count),
+        **{f"NORMAL_{name.upper()}": number for number, name in enumerate(NORMALS)},
+        "NORMAL": NORMALS.index(renderer.normal),
+        "NORMAL_COUNT": normal_counts.get(renderer.normal, 1),
+        "GEOMETRIC": int(positions),
+        # A binary search ends where the surface is; a march, somewhere within the point's footprint.
+        "POLISH": POLISH if positions and renderer.search == "distance" else 0,
+        "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
+        "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
+        "HAS_ENVIRONMENT": int(scene.environment is not None),
+        "HAS_SOFT_LIGHT": int(any(light.angular_size > 0 for light in scene.lights)),
+        "HAS_FOG": int(scene.fog is not None),
+        "ADAPTIVE": int(renderer.noise is not None),
     }
 
 
@@ -181,6 +216,7 @@ class SurfaceWorker:
             layout.material_record(scene, plan.precision),
             layout.light_records(scene, plan.precision),
             self._palette(),
+            np.zeros(4, np.float32),
             np.array(slots, np.int32),
         ]
 

@@ -25,6 +25,8 @@ class View:
         axis: unit vector from the viewer to the plane, the view direction.
         width, height: of the plane, scene units.
         eye: shape (3,), or None for an eye at infinity (orthographic).
+        lens_radius: half the lens's diameter, scene units; 0 for a pinhole.
+        focus_distance: of the plane that is sharp, from the eye along `axis`, scene units.
         origin: the point from which depth (channel Z) is measured along `axis`: the eye, or the orthographic camera.
     """
 
@@ -36,6 +38,8 @@ class View:
     height: float
     eye: Vector | None
     origin: Vector
+    lens_radius: float = 0.0
+    focus_distance: float = 1.0
 
     def pixel_size(self, image_height: int) -> float:
         """Height of a pixel on the plane, scene units."""
@@ -84,9 +88,13 @@ def camera_view(camera: PerspectiveCamera | OrthographicCamera, width: int, heig
     side = np.cross(axis, np.array(camera.up, float))
     side /= np.linalg.norm(side)
     up = np.cross(side, axis)
+    lens_radius, focus_distance = 0.0, distance
     if isinstance(camera, PerspectiveCamera):
+        lens_radius = camera.lens_radius
+        focus_distance = camera.focus_distance if camera.focus_distance is not None else distance
         plane_height = 2.0 * distance * float(np.tan(np.radians(camera.fov) / 2))
         center, eye = target, position
     else:
         plane_height, center, eye = camera.height, position, None
-    return View(center, side, up, axis, plane_height * width / height, plane_height, eye, position)
+    plane_width = plane_height * width / height
+    return View(center, side, up, axis, plane_width, plane_height, eye, position, lens_radius, focus_distance)

@@ -1,0 +1,237 @@
+// One shot at a pixel: its ray from the eye, the points that share its march, and what lights them, in one loop of legs
+// around one march, so that the march is compiled once. Legs of a path, in order:
+//
+//   STAGE_EYE      the ray from the eye, or after a bounce the mirrored one. With several points to the pixel the ray only
+//                  finds out how far the pixel's whole cone is free
+//   STAGE_POINT    each point of the pixel, from there on
+//   STAGE_AMBIENT  rays into the hemisphere, for ambient occlusion and the environment's light
+//   STAGE_LIGHT    shadow rays to each light
+#define STAGE_EYE 0
+#define STAGE_POINT 1
+#define STAGE_AMBIENT 2
+#define STAGE_LIGHT 3
+
+typedef struct {
+    color radiance;       // over the background; premultiplied where that is transparent
+    mask hit;             // of the rest: where any point of the pixel found the surface
+    real coverage;        // part of the points that did
+    real depth;           // along the view axis
+    vec normal, point;
+    real smooth, steps;   // escape count; distance evaluations of the rays from the eye
+} shot;
+
+// The shot at (x, y), in pixels from the picture's top left corner. `index` counts the shots at each lane's pixel, whose
+// column and row `columns` and `rows` tell.
+INLINE shot take_shot(real x, real y, int sample, const int *columns, const int *rows, mask wanted, world w, tally *cost) {
+    const vec none = vec_of(R(0.0), R(0.0), R(0.0));
+    const bits index = (bits)((uint)sample);
+    const uint seed = (uint)w.settings->seed;
+    real lens_x = R(0.0), lens_y = R(0.0);
+#if HAS_LENS
+    unit_square(index, pixel_seed(columns, rows, seed, PURPOSE_LENS), &lens_x, &lens_y);
+    unit_disk(lens_x, lens_y, &lens_x, &lens_y);
+#endif
+    const ray eye_ray = camera_ray(x, y, lens_x, lens_y, w.view);
+
+    shot result;
+    result.steps = R(0.0);
+    result.hit = wanted & ~wanted;
+    result.coverage = R(0.0);
+    result.depth = R(0.0);
+    result.normal = none;
+    result.point = none;
+    result.smooth = R(0.0);
+
+    color seen = color_of(R(0.0), R(0.0), R(0.0));   // light of the path so far
+    color gathered = seen;                           // light of the present spot
+    real through = R(1.0);                           // part of what comes next that reaches the eye
+    real fog = R(0.0);
+    real open = R(1.0);
+    ray path = eye_ray;
+    mask on_path = wanted;
+    spot here;
+    here.point = none;
+    here.normal = none;
+    here.cone = R(0.0);
+    here.smooth = R(0.0);
+    here.residual = R(0.0);
+    here.tint = seen;
+#if POINTS > 1
+    pixel_points points = points_begin(columns, rows, sample, seed);
+#endif
+    int stage = STAGE_EYE, turn = 0, bounce = 0;
+    for (;;) {
+        // The leg's ray.
+        ray leg = path;
+        mask active = on_path;
+        int goal = GOAL_SURFACE;
+        incidence in;
+        in.strength = R(0.0);
+        const int light_index = stage == STAGE_LIGHT ? turn / w.settings->light_rays : 0;
+        __constant const struct Light *light = w.lights + light_index;
+        if (stage == STAGE_EYE) {
+            active &= ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
+#if POINTS > 1
+            if (bounce == 0) {
+                goal = GOAL_TOUCH;
+                leg.footprint *= (real)(w.settings->touch_share);
+                leg.spread *= (real)(w.settings->touch_share);
+            }
+#endif
+        }
+#if POINTS > 1
+        else if (stage == STAGE_POINT) {
+            leg = points_ray(&points, turn, x, y, lens_x, lens_y, w);
+            active = points.touched & ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
+            goal = SEARCH == SEARCH_STEPS ? GOAL_POINT : GOAL_SURFACE;
+        }
+#endif
+        else {
+            goal = GOAL_SHADOW;
+#if HAS_AMBIENT
+            if (stage == STAGE_AMBIENT) in = ambient_ray(&here, turn, sample, columns, rows, bounce, w);
+#endif
+            if (stage == STAGE_LIGHT) {
+                in = light_at(light, here.point);
+#if HAS_SOFT_LIGHT
+                in.toward = soft_light(in.toward, light, light_index, turn % w.settings->light_rays, sample, columns, rows,
+                                       bounce, w);
+#endif
+                if (light->shadow == 0) active = active & ~active;
+            }
+            active &= less(R(0.0), vec_dot(here.normal, in.toward));
+            // Leave the surface far enough for the ray not to meet the very bump it starts from.
+            leg.origin = vec_along(here.point, here.cone * (real)(w.settings->shadow_lift), here.normal);
+            leg.direction = in.toward;
+            leg.near = R(0.0);
+            leg.far = in.distance;
+            leg.footprint = here.cone * (real)(w.settings->shadow_detail);
+            leg.spread = R(0.0);
+            active &= ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
+        }
+
+        crossing met = {active & ~active, R(0.0), R(0.0), R(0.0), R(0.0)};
+        if (any_lane(active)) {
+            met = march(leg, active, goal, w.settings, w.orbit, w.k);
+            cost->steps += met.steps;
+            cost->count += met.count;
+            if (stage <= STAGE_POINT) cost->bad += met.bad;
+            if (stage <= STAGE_POINT && bounce == 0) result.steps += met.steps;
+        }
+        vec normal = none;
+        real smooth = R(0.0);
+        if (goal != GOAL_SHADOW && goal != GOAL_TOUCH && any_lane(met.hit)) {
+            surface_at(leg, &met, met.hit, w, &normal, &smooth, cost);
+        }
+
+        // What it tells, and the next leg.
+        if (stage == STAGE_AMBIENT || stage == STAGE_LIGHT) {
+            const vec to_viewer = vec_scale(path.direction, R(-1.0));
+#if HAS_AMBIENT
+            if (stage == STAGE_AMBIENT) {
+                const color more = ambient_light(&here, turn, in, met, w, &open);
+                gathered = color_pick(on_path, color_add(gathered, more), gathered);
+                if (++turn < w.settings->cosine_rays + w.settings->map_rays) continue;
+                gathered = limited(gathered, w.settings);
+                stage = STAGE_LIGHT;
+                turn = 0;
+                if (w.settings->light_count > 0) continue;
+            } else
+#endif
+            {
+                const color more = lit_by(&here, in, ~met.hit, open, to_viewer, light, w.material);
+                gathered = color_pick(on_path, color_add(gathered, color_scale(more, (real)(light->share))), gathered);
+                ++turn;
+                // Lights that need fewer rays than the one that needs most.
+                if (turn % w.settings->light_rays >= light->rays) turn = (light_index + 1) * w.settings->light_rays;
+                if (turn < w.settings->light_count * w.settings->light_rays) continue;
+            }
+        } else {
+            mask found = met.hit;
+#if POINTS > 1
+            if (bounce == 0) {
+                if (stage == STAGE_EYE) {
+                    points_touched(&points, met, eye_ray, w);
+                    stage = STAGE_POINT;
+                    turn = 0;
+                    if (any_lane(met.hit)) continue;
+                } else {
+                    points_add(&points, turn, leg, met, normal, smooth, w);
+                    if (++turn < POINTS) continue;
+                }
+                found = points_spot(&points, eye_ray, &here, &result.coverage, w);
+            } else
+#endif
+            {
+                here.point = vec_along(leg.origin, met.t, leg.direction);
+                here.cone = leg.footprint + leg.spread * met.t;
+                here.normal = normal;
+                here.smooth = smooth;
+                here.residual = R(0.0);
+                for (int i = 0; i < NORMAL_COUNT; ++i) {
+                    here.normals[i] = normal;
+                    here.weights[i] = i == 0 ? R(1.0) : R(0.0);
+                }
+                here.tint = surface_color(normal, smooth, w.material, w.palette);
+                if (bounce == 0) result.coverage = pick(found, R(1.0), R(0.0));
+            }
+#if !COLORING_PER_POINT
+            if (any_lane(found)) here.tint = surface_tint(&here, path.direction, found, w);
+#endif
+            if (bounce == 0) {
+                result.hit = found;
+                result.point = here.point;
+                result.normal = here.normal;
+                result.smooth = here.smooth;
+                result.depth = vec_dot(vec_sub(here.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
+#if HAS_FOG
+                const real way = vec_dot(vec_sub(here.point, eye_ray.origin), eye_ray.direction);
+                fog = R(1.0) - exp(-(real)(w.material->fog_density) * way);
+#endif
+            } else {
+                const color missed = limited(color_scale(sky(path.direction, y, 1, w), through), w.settings);
+                seen = color_pick(on_path & ~found, color_add(seen, missed), seen);
+            }
+            on_path &= found;
+            if (!any_lane(on_path)) break;
+            gathered = color_of(R(0.0), R(0.0), R(0.0));
+            open = R(1.0);
+            turn = 0;
+#if HAS_AMBIENT
+            open = w.settings->occlusion_share > S(0.0) ? R(0.0) : R(1.0);
+            stage = STAGE_AMBIENT;
+            continue;
+#endif
+            stage = STAGE_LIGHT;
+            if (w.settings->light_count > 0) continue;
+        }
+
+        // The spot is lit; what it mirrors comes next.
+        const int last = bounce == w.settings->bounces;
+        const real own = last ? R(1.0) : R(1.0) - (real)(w.material->reflection);
+        color added = color_scale(gathered, through * own);
+        if (bounce > 0) added = limited(added, w.settings);
+        seen = color_pick(on_path, color_add(seen, added), seen);
+        if (last) break;
+        through *= (real)(w.material->reflection);
+        path.origin = vec_along(here.point, here.cone * (real)(w.settings->shadow_lift), here.normal);
+        path.direction = vec_along(path.direction, R(-2.0) * vec_dot(path.direction, here.normal), here.normal);
+        path.footprint = here.cone;
+        path.spread = eye_ray.spread + (eye_ray.footprint / fmax(result.depth, here.cone));
+        path.near = R(0.0);
+        path.far = (real)(REAL_LARGEST);
+        stage = STAGE_EYE;
+        ++bounce;
+    }
+    color background = sky(eye_ray.direction, y, 0, w);
+#if HAS_FOG
+    const color mist = color_splat(w.material->fog_color);
+    seen = color_mix(seen, mist, fog);
+    if (w.material->fog_background) background = mist;
+#endif
+    // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
+    if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
+    seen = color_pick(result.hit, seen, background);
+    result.radiance = color_mix(background, seen, result.coverage);
+    return result;
+}

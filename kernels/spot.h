@@ -1,0 +1,96 @@
+// What a shot reads, the spot of the surface that it finds, and what is known and seen there.
+#define COLORING_PER_POINT \
+    (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
+
+// What a packet has cost.
+typedef struct {
+    real steps, count, bad;
+} tally;
+
+// What a shot reads, in one place.
+typedef struct {
+    __constant const struct View *view;
+    __constant const struct March *settings;
+    __constant const struct Orbit *orbit;
+    __constant const scalar *k;
+    __constant const struct Material *material;
+    __constant const struct Light *lights;
+    __global const float *palette;
+    __global const float *environment;
+} world;
+
+// A place on the surface, and how it looks.
+typedef struct {
+    vec point;
+    vec normals[NORMAL_COUNT];   // several where shading is averaged over them, each with its weight
+    real weights[NORMAL_COUNT];
+    vec normal;                  // the one that stands for all: shadows, reflections, channel N
+    real cone;                   // the pixel's footprint there
+    real smooth, residual;       // escape count; distance of the pixel's points from their plane, in footprints
+    color tint;
+} spot;
+
+// What is seen where nothing is hit, by rays from the eye (`mirrored` 0) and by mirrored ones.
+INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
+#if HAS_ENVIRONMENT
+    if (mirrored || w.material->environment_seen) return environment_color(direction, w.material, w.environment);
+#endif
+    const real share = mirrored ? R(0.5) - R(0.5) * direction.z : picture_y / (real)((scalar)w.view->height);
+    return color_mix(color_splat(w.material->background_top), color_splat(w.material->background_bottom),
+                     clamp(share, R(0.0), R(1.0)));
+}
+
+// The surface where a march has ended: its exact normal and escape count, and with POLISH a place that does not depend on
+// how the march came there: where the distance is half the cone, by the secant method (the slope is that of a distance, -1,
+// at first). Normals from the positions of points need it.
+INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, real *smooth, tally *cost) {
+    surface_point surface;
+    sphere there;
+#if POLISH
+    const real cone = (real)(w.settings->detail) * (r.footprint + r.spread * met->t);
+    const real wanted = R(0.5) * cone;
+    real t = met->t, before = met->t, height_before = R(0.0);
+    for (int i = 0; i < POLISH; ++i) {
+        there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, w.orbit, w.k, &surface);
+        cost->count += pick(active, there.count, R(0.0));
+        cost->steps += pick(active, R(1.0), R(0.0));
+        if (i == POLISH - 1) break;
+        const real height = there.step * (real)(w.settings->step_scale) - wanted;
+        const real slope = (height - height_before) / (t - before);
+        const mask usable = less(slope, R(0.0)) & less(R(-1e6), slope);
+        const real move = i == 0 ? height : pick(usable, -height / slope, height);
+        before = t;
+        height_before = height;
+        t += clamp(move, -cone, cone);
+    }
+    met->t = pick(active, t, met->t);
+#else
+    there = orbit_dual_distance(vec_along(r.origin, met->t, r.direction), active, w.orbit, w.k, &surface);
+    cost->count += pick(active, there.count, R(0.0));
+#endif
+    *normal = vec_normalize(surface.gradient);
+    // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
+    const mask flat = less(vec_dot(*normal, *normal), R(0.5)) | there.inside;
+    *normal = vec_pick(flat, vec_scale(r.direction, R(-1.0)), *normal);
+    *smooth = smooth_count(there, surface, w.orbit);
+}
+
+// What one light ray adds, for every normal of the spot.
+INLINE color lit_by(const spot *s, incidence in, mask lit, real open, vec to_viewer, __constant const struct Light *light,
+                    __constant const struct Material *material) {
+    color sum = color_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < NORMAL_COUNT; ++i) {
+        const color one = phong(s->tint, s->normals[i], to_viewer, in, lit, open, light, material);
+        sum = color_add(sum, color_scale(one, s->weights[i]));
+    }
+    return sum;
+}
+
+#if !COLORING_PER_POINT
+// The colour M of a spot where one quantity chooses it from the palette.
+INLINE color surface_tint(const spot *s, vec view_direction, mask active, world w) {
+    const real quantity = coloring_quantity(s->point, s->normal, view_direction, s->cone, s->smooth, s->residual, active,
+                                            w.material, w.orbit, w.k);
+    return surface_color(s->normal, quantity, w.material, w.palette);
+}
+#endif
