@@ -5,8 +5,8 @@
 // Footprints may be of any size from 1e-15 to 1e12 in float32. A normal has length 1 and z > 0; where none can be made,
 // `usable` is false and the normal points to the viewer, (0, 0, 1). Missing points may hold anything, NaN too.
 
-// Thinnest pattern of points that still tells a plane: the square of half its width over half its length, roughly. Any three
-// points of an 8 x 8 grid that are not on one line have more than 1.3e-4; float32 rounds at some 1e-7.
+// Thinnest pattern of points that still tells a plane: the square of its width over its length. Any three or more points of
+// an 8 x 8 grid that are not on one line have 1.3e-4 at least; of points on one line rounding makes some 1e-13.
 #define THINNEST_PATTERN S(2.5e-5)
 // Least sine of the angle between two edges of a triangle, as the viewer sees it.
 #define THINNEST_TRIANGLE S(1e-4)
@@ -94,6 +94,7 @@ INLINE vec corners_normal(vec a, vec b, vec c, mask *usable) {
 // Least squares over the points of a 3 x 3 grid that were found.
 INLINE vec compass_plane(const vec *compass, const mask *found, mask *usable) {
     plane_sums sums = plane_none();
+    #pragma unroll 1
     for (int i = 0; i < 9; ++i) sums = plane_add(sums, found[i], compass[i]);
     real residual;
     return plane_normal(sums, &residual, usable);
