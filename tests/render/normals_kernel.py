@@ -1,0 +1,142 @@
+"""Runs every function of `kernels/normals.h` over packets of pixels, each with its own points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device import compiler, program
+from clfractal.device.select import Device, choose
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+
+Floats = npt.NDArray[np.floating[Any]]
+Masks = npt.NDArray[np.bool_]
+
+_TEXT = """\
+#include "lanes.h"
+#include "vectors.h"
+#include "normals.h"
+
+INLINE real load(__global const scalar *from) {
+    scalar each[LANES];
+    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
+    return lanes_load(each);
+}
+INLINE void store(__global scalar *to, real value) {
+    scalar each[LANES];
+    lanes_store(value, each);
+    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
+}
+INLINE void store_normal(__global scalar *to, int pixels, vec normal, mask usable) {
+    store(to, normal.x);
+    store(to + pixels, normal.y);
+    store(to + 2 * pixels, normal.z);
+    store(to + 3 * pixels, pick(usable, R(1.0), R(0.0)));
+}
+
+// Planes of `pixels` numbers: points[count][x, y, z, found], results[11 normals and the residual].
+__kernel void normals(__global const scalar *points, __global scalar *results, int pixels, int count) {
+    const int lane = (int)get_global_id(0) * LANES;
+    vec compass[9];
+    mask found[9];
+    plane_sums sums = plane_none();
+    for (int i = 0; i < count; ++i) {
+        __global const scalar *from = points + 4 * i * pixels + lane;
+        const vec point = vec_of(load(from), load(from + pixels), load(from + 2 * pixels));
+        const mask here = less(R(0.5), load(from + 3 * pixels));
+        sums = plane_add(sums, here, point);
+        if (i < 9) {
+            compass[i] = point;
+            found[i] = here;
+        }
+    }
+    for (int i = count; i < 9; ++i) {
+        compass[i] = vec_of(R(0.0), R(0.0), R(0.0));
+        found[i] = less(R(1.0), R(0.0));
+    }
+    __global scalar *to = results + lane;
+    mask usable;
+    real residual;
+    vec normal = plane_normal(sums, &residual, &usable);
+    store_normal(to, pixels, normal, usable);
+    normal = triangle_normal(compass, found, &usable);
+    store_normal(to + 4 * pixels, pixels, normal, usable);
+    normal = eight_mean(compass, found, &usable);
+    store_normal(to + 8 * pixels, pixels, normal, usable);
+    vec eight[8];
+    mask each[8];
+    eight_normals(compass, found, eight, each);
+    for (int i = 0; i < 8; ++i) store_normal(to + (12 + 4 * i) * pixels, pixels, eight[i], each[i]);
+    store(to + 44 * pixels, residual);
+}
+"""
+
+
+@dataclass(frozen=True)
+class Normals:
+    """Results for n pixels. Normals have the shape (n, 3), of the eight triangles (n, 8, 3); flags without the 3."""
+
+    plane: Floats
+    plane_usable: Masks
+    triangle: Floats
+    triangle_usable: Masks
+    mean: Floats
+    mean_usable: Masks
+    eight: Floats
+    eight_usable: Masks
+    residual: Floats
+
+    def methods(self) -> dict[str, tuple[Floats, Masks]]:
+        """The normals that a pixel has one of, by name."""
+        return {
+            "plane": (self.plane, self.plane_usable),
+            "triangle": (self.triangle, self.triangle_usable),
+            "mean": (self.mean, self.mean_usable),
+        }
+
+
+@cache
+def device() -> Device:
+    """The device that programs are tested on: the one users get, or CLFRACTAL_DEVICE."""
+    return choose()
+
+
+@cache
+def _program(precision: Precision, lanes: int) -> Any:
+    defines: dict[str, int] = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
+    flat = flatten("normals_test.cl", generated={"normals_test.cl": _TEXT}, defines=defines)
+    return compiler.compile_source(device(), flat.text, program.math_flags(precision))
+
+
+def run(points: Floats, found: Masks, precision: Precision, lanes: int) -> Normals:
+    """Normals of pixels with points of shape (n, count, 3), of which those in `found` (n, count) exist."""
+    pixels, count = found.shape
+    padded = np.full((count, 4, -(-pixels // lanes) * lanes), np.nan, precision)
+    padded[:, :3, :pixels] = points.transpose(1, 2, 0)
+    padded[:, 3, :pixels] = found.T
+    results = np.full((45, padded.shape[2]), np.nan, precision)
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    buffers = [cl.Buffer(device().context, flags, hostbuf=array) for array in (padded, results)]
+    kernel = cl.Kernel(_program(precision, lanes), "normals")
+    kernel.set_args(*buffers, np.int32(padded.shape[2]), np.int32(count))
+    cl.enqueue_nd_range_kernel(device().queue, kernel, (padded.shape[2] // lanes,), (1,))
+    cl.enqueue_copy(device().queue, results, buffers[1])
+    each = results[:44, :pixels].astype(np.float64).T.reshape(pixels, 11, 4)
+    usable = each[..., 3] == 1
+    return Normals(
+        plane=each[:, 0, :3],
+        plane_usable=usable[:, 0],
+        triangle=each[:, 1, :3],
+        triangle_usable=usable[:, 1],
+        mean=each[:, 2, :3],
+        mean_usable=usable[:, 2],
+        eight=each[:, 3:, :3],
+        eight_usable=usable[:, 3:],
+        residual=results[44, :pixels].astype(np.float64),
+    )
