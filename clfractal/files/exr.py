@@ -11,6 +11,8 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -80,20 +82,29 @@ def write_exr(
         _replace_attributes(path, beside, {name: (kinds[name], data) for name, data in attributes.items()})
 
 
-def read_exr(path: str | Path) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any]]:
+def read_exr(path: str | Path, *, tiles: bool = False) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any]]:
     """Reads a one-part picture stored by rows: channel -> array (height, width) as stored; and its header.
 
-    Of a damaged file the library may print warnings of its own, but it ends in one error here.
+    With `tiles` the picture may be stored by tiles too; of several levels the largest is read.
+
+    Of a damaged file the library may write lines of its own to standard error, but it ends in one error here.
 
     Raises:
         FileError: it cannot be read, is no such file, or is damaged or cut short.
     """
     header = read_header(path)
-    if not header.one_part_scanlines:
-        raise file_error(path, "holds tiles, several parts or deep pixels, which are not read", "")
+    if not (header.one_part_flat if tiles else header.one_part_scanlines):
+        kinds = "several parts or deep pixels" if tiles else "tiles, several parts or deep pixels"
+        raise file_error(path, f"holds {kinds}, which are not read", "")
     try:
-        with OpenEXR.File(os.fspath(path), separate_channels=True) as file:
+        # Of pixels that cannot be read the library only prints a line, to Python's standard output.
+        with (
+            redirect_stdout(StringIO()) as said,
+            OpenEXR.File(os.fspath(path), separate_channels=True) as file,
+        ):
             planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+        if said.getvalue():
+            raise ValueError(said.getvalue())
     except (OSError, RuntimeError, ValueError, TypeError) as error:
         raise FileError(
             "is damaged: its pixels cannot be read", Where(str(path)), details=str(error)

@@ -71,6 +71,22 @@ class ExrHeader:
         """Whether the file holds one flat picture stored by rows, as ours do."""
         return not self.flags & (_TILED | _DEEP | _MULTIPART)
 
+    @property
+    def one_part_flat(self) -> bool:
+        """Whether the file holds one flat picture, stored by rows or by tiles."""
+        return not self.flags & (_DEEP | _MULTIPART)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The names of the channels, in the file's order; those before the first thing that is wrong with the list."""
+        attribute = self.attributes.get("channels")
+        names, data = [], attribute.data if attribute else b""
+        while data and data[0]:
+            name, _, rest = data.partition(b"\0")
+            names.append(name.decode("utf-8", "replace"))
+            data = rest[16:]
+        return tuple(names)
+
 
 class _DamagedError(Exception):
     """Why a file is not a whole OpenEXR file."""

@@ -1,0 +1,140 @@
+"""Reads environment maps: OpenEXR pictures of everything around, by latitude and longitude.
+
+The top row looks straight up, the bottom row straight down; from left to right the columns go around once,
+and the picture's middle is straight ahead (kernels/environment.h says how that lies in a scene). Pixels are
+areas: the middle of the first column stands half a pixel right of the picture's left side. OpenEXR's own
+words (ImfEnvmap.h) put the middles of the outermost pixels on the sides and poles; maps are not made like
+that, and the difference is half a pixel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.errors import FileError
+from clfractal.files.atomic import file_error
+from clfractal.files.exr_header import ExrHeader, read_header
+
+MAX_WIDTH = 16_384
+BRIGHTEST = 1e9
+"""Of a pixel: sums of brighter ones would leave the range of float32."""
+
+_MOST_BYTES = 8 << 30  # of all channels, as they lie in memory while the file is read
+_STRONGEST = 100.0  # factor between primaries that still are colours
+_CUBE = b"\x01"  # value of the attribute `envmap`
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+_REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # ITU-R BT.709-6, items 1.3 and 1.4
+
+Floats = npt.NDArray[np.float32]
+Doubles = npt.NDArray[np.float64]
+
+
+def read_environment(path: str | Path) -> Floats:
+    """The pixels of a latitude-longitude map, shape (height, 2 height, 3): linear Rec. 709, finite, none below 0.
+
+    The channels are R, G and B, or Y alone for grey light; half or float, in any compression, by rows or by
+    tiles. Where the file names other primaries, colours are turned into Rec. 709, adapted to its white.
+    Negative numbers become 0: light cannot be less than none, but resampling and colours outside of Rec. 709
+    leave some behind in maps that are as good as any.
+
+    Raises:
+        FileError: it cannot be read, is no OpenEXR file or a damaged one, or no such map.
+    """
+    header = read_header(path)
+    _check_shape(path, header)
+    from clfractal.files.exr import read_exr
+
+    planes, values = read_exr(path, tiles=True)
+    names = "RGB" if set("RGB") <= set(planes) else "YYY"
+    pixels = np.stack([np.asarray(planes[name], np.float32) for name in names], axis=-1)
+    del planes
+    _check_numbers(path, pixels)
+    if names == "RGB":
+        pixels = _in_rec709(pixels, values)
+    np.maximum(pixels, 0.0, out=pixels)
+    return pixels
+
+
+def _check_shape(path: str | Path, header: ExrHeader) -> None:
+    """Everything that the header tells, before any pixel is read."""
+    window = header.values().get("dataWindow")
+    envmap = header.attributes.get("envmap")
+    if not isinstance(window, tuple) or len(window) != 4 or not header.channels:
+        raise file_error(path, "is damaged: its header lacks what every picture has", "")
+    width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
+    if envmap is not None and envmap.data == _CUBE:
+        raise file_error(path, "is a cube map; an environment is a latitude-longitude map", "")
+    if width < 1 or width != 2 * height:
+        message = (
+            f"must be twice as wide as high, as latitude-longitude maps are, got {width} x {height} pixels"
+        )
+        raise file_error(path, message, "")
+    if width > MAX_WIDTH:
+        raise file_error(path, f"is too large: {width} pixels wide, at most {MAX_WIDTH:,}", "")
+    if not set("RGB") <= set(header.channels) and "Y" not in header.channels:
+        found = ", ".join(header.channels[:10])
+        raise file_error(path, f"must have the channels R, G and B, or Y; it has {found[:200]}", "")
+    if 4 * width * height * len(header.channels) > _MOST_BYTES:
+        raise file_error(
+            path, f"is too large: {len(header.channels)} channels of {width} x {height} pixels", ""
+        )
+
+
+def _check_numbers(path: str | Path, pixels: Floats) -> None:
+    """Refuses what no light is: damage is better seen here than as spots in a picture."""
+    # NaN wins in both.
+    limits = pixels.min(initial=0.0), pixels.max(initial=0.0)
+    if -np.inf < limits[0] and limits[1] <= BRIGHTEST:
+        return
+    for what, wrong in (
+        ("of NaN", np.isnan(pixels)),
+        ("of infinite light", np.isinf(pixels)),
+        (f"brighter than {BRIGHTEST:g}", pixels > BRIGHTEST),
+    ):
+        found = wrong.any(axis=-1)
+        count = int(found.sum())
+        if count:
+            row, column = divmod(int(found.argmax()), found.shape[1])
+            pixel = "pixel" if count == 1 else "pixels"
+            place = f"the first in column {column}, row {row} (counted from 0 at the top left)"
+            raise FileError(f"has {count:,} {pixel} {what}, {place}", file_error(path, "", "").where)
+
+
+def _in_rec709(pixels: Floats, values: Mapping[str, Any]) -> Floats:
+    """Colours of the primaries and white that the header names, in those of Rec. 709."""
+    given = values.get("chromaticities")
+    if not isinstance(given, tuple) or np.allclose(given, _REC709, atol=2e-3):
+        return pixels
+    if not np.isfinite(given).all() or given[7] <= 0:
+        return pixels  # no white at all: the header is of no use
+    try:
+        matrix = np.linalg.solve(_to_xyz(_REC709), _adaptation(given) @ _to_xyz(given))
+    except np.linalg.LinAlgError:
+        return pixels
+    if not np.isfinite(matrix).all() or np.abs(matrix).max() > _STRONGEST:
+        return pixels
+    return np.ascontiguousarray(pixels @ matrix.T.astype(np.float32))
+
+
+def _to_xyz(chromaticities: tuple[float, ...]) -> Doubles:
+    """The matrix from RGB to CIE XYZ, the white's Y being 1 (SMPTE RP 177-1993)."""
+    x, y = np.array(chromaticities[0::2]), np.array(chromaticities[1::2])
+    columns = np.stack([x, y, 1 - x - y])
+    white = columns[:, 3] / y[3]
+    primaries = columns[:, :3]
+    matrix: Doubles = primaries * np.linalg.solve(primaries, white)
+    return matrix
+
+
+def _adaptation(chromaticities: tuple[float, ...]) -> Doubles:
+    """From a file's white to that of Rec. 709, by the Bradford transform (ICC.1:2010, annex E)."""
+    whites = []
+    for x, y in (chromaticities[6:], _REC709[6:]):
+        whites.append(_BRADFORD @ np.array([x / y, 1.0, (1 - x - y) / y]))
+    matrix: Doubles = np.linalg.solve(_BRADFORD, np.diag(whites[1] / whites[0]) @ _BRADFORD)
+    return matrix
