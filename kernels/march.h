@@ -21,10 +21,10 @@
 // Marches the active lanes towards one goal, the same for all lanes:
 //   GOAL_SURFACE  the surface: hits are proved, and a step that ended inside is narrowed down to it
 //   GOAL_SHADOW   whether anything is in the way: a step that ended inside is a hit
-//   GOAL_TOUCH    how far a whole pixel's cone is free: the first touch, without proof, a point still outside
+//   GOAL_TOUCH    how far a whole pixel's cone is free: the first proved touch, at a point still outside
 INLINE crossing march(ray r, mask active, int goal, __constant const struct March *settings,
                       __constant const struct Orbit *orbit, __constant const scalar *k) {
-    crossing found = {active & ~active, r.near, R(0.0), R(0.0), R(0.0)};
+    crossing found = nothing_met(r.near);
     real t = r.near;
     real low = t;                            // the last point known to be outside
     real high = (real)(REAL_LARGEST);        // a point known to be inside
@@ -100,6 +100,12 @@ INLINE crossing march(ray r, mask active, int goal, __constant const struct Marc
         if (i > 0) found.bad += pick(inside & ~less(high, (real)(REAL_LARGEST)), R(1.0), R(0.0));
         high = pick(inside, t, high);
         low = pick(outside, t, low);
+#if MARCH_KEEPS_SURFACE
+        found.surface.gradient = vec_pick(outside, surface.gradient, found.surface.gradient);
+        found.surface.square = pick(outside, surface.square, found.surface.square);
+        found.surface.square_before = pick(outside, surface.square_before, found.surface.square_before);
+        found.end_count = pick(outside, here.count, found.end_count);
+#endif
 
         // The pixel's cone touches the solid, or the crossing is narrowed down.
         const mask bracketed = marching & less(high, (real)(REAL_LARGEST));
@@ -116,7 +122,7 @@ INLINE crossing march(ray r, mask active, int goal, __constant const struct Marc
         // proved again.
 #if POINTS > 1
         const mask proved = less(fabs(t - r.known), (real)(settings->known_reach) * cone);
-        const mask done = narrow | (touched & (goal == GOAL_TOUCH ? touched : bracketed | proved));
+        const mask done = narrow | (touched & (bracketed | proved));
 #else
         const mask done = narrow | (touched & bracketed);
 #endif

@@ -8,7 +8,7 @@
 //   GOAL_POINT    the binary search alone, from r.near and a whole step either way
 INLINE crossing march(ray r, mask active, int goal, __constant const struct March *settings,
                       __constant const struct Orbit *orbit, __constant const scalar *k) {
-    crossing found = {active & ~active, r.near, R(0.0), R(0.0), R(0.0)};
+    crossing found = nothing_met(r.near);
     const real step = (real)(settings->step);
     const mask searches_only = goal == GOAL_POINT ? active : active & ~active;
     mask searching = searches_only;

@@ -40,7 +40,7 @@ INLINE void points_touched(pixel_points *p, crossing met, ray eye_ray, world w) 
     p->touched = met.hit;
     p->touch_t = met.t;
     p->touch_cone = eye_ray.footprint + eye_ray.spread * met.t;
-    p->known = RAY_NOTHING_KNOWN;
+    p->known = met.t;
     p->count = R(0.0);
     p->nearest = (real)(REAL_LARGEST);
     p->point = eye_ray.origin;

@@ -59,6 +59,9 @@ INLINE mask ray_clip(ray *r, __constant const scalar *center, scalar radius) {
     return less(R(0.0), half_square) & less(r->near, r->far);
 }
 
+// A march by the Jacobian has evaluated the surface's normal when it arrives.
+#define MARCH_KEEPS_SURFACE (SEARCH == SEARCH_DISTANCE && !HAS_DERIVATIVE && !POLISH)
+
 // What a march finds.
 typedef struct {
     mask hit;
@@ -66,7 +69,27 @@ typedef struct {
     real steps;   // points of the ray that were tried
     real count;   // formula applications of all of them
     real bad;     // steps that the distance called safe and that ended inside
+#if MARCH_KEEPS_SURFACE
+    surface_point surface;  // at t, with the applications there; a gradient of 0 if t was never seen from outside
+    real end_count;
+#endif
 } crossing;
+
+INLINE crossing nothing_met(real t) {
+    crossing c;
+    c.hit = less(R(1.0), R(0.0));
+    c.t = t;
+    c.steps = R(0.0);
+    c.count = R(0.0);
+    c.bad = R(0.0);
+#if MARCH_KEEPS_SURFACE
+    c.surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
+    c.surface.square = R(1.0);
+    c.surface.square_before = R(1.0);
+    c.end_count = R(0.0);
+#endif
+    return c;
+}
 
 // What a march is after (see march.h and march_steps.h).
 #define GOAL_SURFACE 0

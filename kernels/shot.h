@@ -110,7 +110,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
             active &= ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
         }
 
-        crossing met = {active & ~active, R(0.0), R(0.0), R(0.0), R(0.0)};
+        crossing met = nothing_met(R(0.0));
         if (any_lane(active)) {
             met = march(leg, active, goal, w.settings, w.orbit, w.k);
             cost->steps += met.steps;

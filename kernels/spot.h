@@ -44,9 +44,12 @@ INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
 // how the march came there: where the distance is half the cone, by the secant method (the slope is that of a distance, -1,
 // at first). Normals from the positions of points need it.
 INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, real *smooth, tally *cost) {
+#if MARCH_KEEPS_SURFACE
+    const surface_point surface = met->surface;
+    const sphere there = {R(0.0), met->end_count, less(R(1.0), R(0.0))};
+#elif POLISH
     surface_point surface;
     sphere there;
-#if POLISH
     const real cone = (real)(w.settings->detail) * (r.footprint + r.spread * met->t);
     const real wanted = R(0.5) * cone;
     real t = met->t, before = met->t, height_before = R(0.0);
@@ -65,7 +68,8 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
     }
     met->t = pick(active, t, met->t);
 #else
-    there = orbit_dual_distance(vec_along(r.origin, met->t, r.direction), active, w.orbit, w.k, &surface);
+    surface_point surface;
+    const sphere there = orbit_dual_distance(vec_along(r.origin, met->t, r.direction), active, w.orbit, w.k, &surface);
     cost->count += pick(active, there.count, R(0.0));
 #endif
     *normal = vec_normalize(surface.gradient);
