@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from clfractal.errors import SceneError, Where, nearest
 from clfractal.files.srgb import decode
+from clfractal.scene.palettes import PALETTES, table
 
 if TYPE_CHECKING:
     from cmap import Colormap
@@ -34,7 +35,7 @@ def palette_table(coloring: Coloring) -> NDArray[np.float32]:
 
 def check_palette(palette: str | Sequence[Stop]) -> None:
     """Raises SceneError, at coloring.palette, for a name that no palette has."""
-    if isinstance(palette, str):
+    if isinstance(palette, str) and palette not in PALETTES:
         _colormap(palette)
 
 
@@ -48,6 +49,8 @@ def _from_stops(stops: Sequence[Stop]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=16)
 def _named(name: str) -> NDArray[np.float32]:
+    if name in PALETTES:
+        return table(PALETTES[name], SIZE)
     colors = np.asarray(_colormap(name)(np.linspace(0.0, 1.0, SIZE)), dtype=np.float64)
     return decode(colors[:, :3]).astype(np.float32)
 
@@ -60,11 +63,15 @@ def _colormap(name: str) -> Colormap:
         return Colormap(name)
     except Exception as error:  # cmap raises many kinds for a name it does not know
         guess = nearest(name, _names())
-        hint = f"; did you mean {guess!r}?" if guess else "; any name of cmap's catalog, such as 'viridis'"
+        hint = (
+            f"; did you mean {guess!r}?"
+            if guess
+            else f"; known: {', '.join(PALETTES)}, and the names of cmap's catalog"
+        )
         raise SceneError(f"unknown palette {name[:60]!r}{hint}", _WHERE) from error
 
 
 def _names() -> list[str]:
     from cmap import Catalog
 
-    return list({key for full in Catalog() for key in (full, full.split(":")[-1])})
+    return [*PALETTES, *{key for full in Catalog() for key in (full, full.split(":")[-1])}]

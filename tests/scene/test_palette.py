@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from clfractal.errors import SceneError
+from clfractal.files.srgb import decode
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.palette import palette_table
+from clfractal.scene.palettes import PALETTES, Palette, table
 
 
 def coloring(palette: object) -> Coloring:
@@ -75,3 +77,50 @@ print([name for name in ("cmap", "OpenEXR", "pyopencl", "mpmath", "png") if name
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# --- the project's own palettes ---
+
+
+@pytest.mark.parametrize("name", PALETTES)
+def test_an_own_palette(name: str) -> None:
+    """256 colours a screen can show, without a jump; a periodic one has none at its seam either."""
+    found = palette_table(coloring(name))
+    assert found.shape == (256, 3)
+    assert found.dtype == np.float32
+    assert found.min() >= 0
+    assert found.max() <= 1
+    assert np.abs(np.diff(found, axis=0)).max() < 0.03
+    ends = np.abs(found[0] - found[-1]).max()
+    assert ends == 0 if PALETTES[name].periodic else ends > 0.5
+
+
+@pytest.mark.parametrize("name", PALETTES)
+def test_an_own_palette_goes_through_its_colours(name: str) -> None:
+    palette = PALETTES[name]
+    codes = [list(bytes.fromhex(color)) for color in palette.colors.split()]
+    if palette.periodic:
+        codes.append(codes[0])
+    np.testing.assert_allclose(table(palette, len(codes)), decode(np.array(codes) / 255), atol=1e-6)
+
+
+def test_an_own_palette_is_even_to_the_eye() -> None:
+    """Between black and white Oklab's lightness rises evenly, and with it the cube root of linear light."""
+    found = table(Palette("000000 ffffff"), 101)
+    np.testing.assert_allclose(np.cbrt(found), np.linspace(0, 1, 101)[:, None].repeat(3, 1), atol=1e-6)
+    # Red to green passes through yellow, not through the dark olive that mixing their codes gives.
+    assert table(Palette("ff0000 00ff00"), 3)[1].max() > 0.5
+
+
+def test_those_from_dark_to_light_never_turn_back() -> None:
+    for name, palette in PALETTES.items():
+        if not palette.periodic:
+            luminance = palette_table(coloring(name)) @ [0.2126, 0.7152, 0.0722]
+            assert (np.diff(luminance) > 0).all(), name
+
+
+def test_a_misspelt_own_palette() -> None:
+    with pytest.raises(SceneError, match="unknown palette 'verdigri'; did you mean 'verdigris'"):
+        palette_table(coloring("verdigri"))
+    with pytest.raises(SceneError, match=r"known: hearth, .*, and the names of cmap's catalog"):
+        palette_table(coloring("0123456789"))
