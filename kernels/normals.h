@@ -72,7 +72,8 @@ INLINE plane_sums plane_add(plane_sums s, mask found, vec p) {
 // not usable). Not usable: fewer than three points, points on one line as the viewer sees them.
 INLINE vec plane_normal(plane_sums s, real *residual, mask *usable) {
     const real spread = s.xx * (R(1.0) + s.xy * s.xy) + s.yy;  // sums of squares of x and of y
-    const mask planar = less(R(2.5), s.n) & less((real)(THINNEST_PATTERN), (s.xx / spread) * (s.yy / spread));
+    // One of the two is exactly 0 with fewer than three points; with none 0 / 0 is no number, which is above nothing.
+    const mask planar = less((real)(THINNEST_PATTERN), (s.xx / spread) * (s.yy / spread));
     const real p2 = s.yz, p1 = s.xz - s.xy * s.yz;
     const vec normal = vec_normalize(vec_of(-p1, -p2, R(1.0)));
     const real away = sqrt(s.zz / fmax(s.n, R(1.0))) * normal.z;

@@ -277,6 +277,21 @@ def test_small_residuals_are_exact() -> None:
         np.testing.assert_allclose(found.residual, expected, rtol=0.1 if precision == "float32" else 1e-9)
 
 
+def test_a_column_that_is_upright_but_for_rounding() -> None:
+    """Two first points whose x differ by 1e-18 have no slope over x that what follows could be measured by."""
+    for size in (1e-7, 1.0, 1e3, 1e12):
+        for sliver in (1e-22, 2e-19, 1e-18, 1e-12, 1e-9):
+            column = [[sliver, -size], [0.0, size], [size, 0.0], [size, size / 2], [-size, size / 4]]
+            points = np.tile(np.array([[x, y, 2 * x - 3 * y] for x, y in column]), (2, 1, 1))
+            there = np.arange(5) < np.array([[3], [5]])
+            normal = oracle.unit(np.array([-2.0, 3.0, 1.0]))
+            for precision in PRECISIONS:
+                found = run(points, there, precision, lanes_of(precision))
+                assert found.plane_usable.all(), (size, sliver)
+                assert np.abs(found.plane - normal).max() <= 8 * epsilon(precision), (size, sliver)
+                assert (found.residual <= 8 * epsilon(precision) * size).all()
+
+
 def test_neighbours_do_not_matter() -> None:
     """A pixel's normals are the same bits whatever the other lanes of its packet hold."""
     random = np.random.default_rng(17)
