@@ -73,13 +73,18 @@ SECTIONS = {
     "camera, perspective": "PerspectiveCamera",
     "camera, orthographic": "OrthographicCamera",
     "renderer, surface": "SurfaceRenderer",
+    "renderer.points": "Points",
+    "renderer.ambient_occlusion": "AmbientOcclusion",
     "renderer.bounds": "Ball",
     "lights, directional": "DirectionalLight",
     "lights, point": "PointLight",
     "material": "Material",
     "coloring": "Coloring",
     "coloring.palette": "Stop",
+    "coloring.trap": "Trap",
     "background": "Gradient",
+    "environment": "Environment",
+    "fog": "Fog",
     "output": "Output",
 }
 
@@ -121,7 +126,7 @@ def default(entry: dict[str, Any], name: str, required: list[str]) -> str:
     if name in required:
         return "required"
     if "default" not in entry:
-        return "`{}`"  # made by a function: only `output.precision`
+        return "`{}`"  # made by a function: `output.precision` and mappings whose keys all have a default
     shown = json.dumps(plain(entry["default"])).replace('"', "")
     return f"`{shown}`"
 
