@@ -35,7 +35,7 @@ def palette_table(coloring: Coloring) -> NDArray[np.float32]:
 
 def check_palette(palette: str | Sequence[Stop]) -> None:
     """Raises SceneError, at coloring.palette, for a name that no palette has."""
-    if isinstance(palette, str) and palette not in PALETTES:
+    if isinstance(palette, str) and palette.removesuffix("_r") not in PALETTES:
         _colormap(palette)
 
 
@@ -49,8 +49,10 @@ def _from_stops(stops: Sequence[Stop]) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=16)
 def _named(name: str) -> NDArray[np.float32]:
-    if name in PALETTES:
-        return table(PALETTES[name], SIZE)
+    own = PALETTES.get(name.removesuffix("_r"))
+    if own is not None:
+        # As cmap writes it: backwards.
+        return table(own, SIZE)[:: -1 if name.endswith("_r") else 1]
     colors = np.asarray(_colormap(name)(np.linspace(0.0, 1.0, SIZE)), dtype=np.float64)
     return decode(colors[:, :3]).astype(np.float32)
 

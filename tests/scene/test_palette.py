@@ -119,6 +119,12 @@ def test_those_from_dark_to_light_never_turn_back() -> None:
             assert (np.diff(luminance) > 0).all(), name
 
 
+def test_an_own_palette_backwards_as_those_of_cmap() -> None:
+    for name in ("hearth", "gray"):
+        forwards, backwards = palette_table(coloring(name)), palette_table(coloring(name + "_r"))
+        np.testing.assert_allclose(backwards, forwards[::-1], atol=1e-6)
+
+
 def test_a_misspelt_own_palette() -> None:
     with pytest.raises(SceneError, match="unknown palette 'verdigri'; did you mean 'verdigris'"):
         palette_table(coloring("verdigri"))
