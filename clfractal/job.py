@@ -66,8 +66,11 @@ class Job:
         scene = self.resolved()
         # How files are written is free to change; the channels are compared by the journal.
         del scene["output"]
+        surroundings = self.scene.surroundings
         return {
             "scene": scene,
+            # The scene only names its map, and the file may be another one by now.
+            "environment": surroundings.digest() if surroundings is not None else None,
             "version": clfractal.__version__,
             "device": self.device.info.name,
             "driver": self.device.info.key,

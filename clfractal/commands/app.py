@@ -148,7 +148,12 @@ def check(
     from clfractal.scene.load import dump_scene, load_scene
 
     shell = _shell(context, verbose=verbose)
-    return lambda: shell.print(dump_scene(load_scene(Path(scene), overrides=overrides or ())))
+
+    def work() -> None:
+        shell.mute_drivers()  # and the library that reads environment maps
+        shell.print(dump_scene(load_scene(Path(scene), overrides=overrides or ())))
+
+    return work
 
 
 @app.command()

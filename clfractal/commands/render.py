@@ -48,9 +48,9 @@ def render_scene(order: Order, shell: Shell) -> None:
     """
     start = time.perf_counter()
     region = _region(order.region)
+    shell.mute_drivers()
     scene = _scene(order)
     outputs = _outputs(order, scene)
-    shell.mute_drivers()
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
     from clfractal import job as jobs
     from clfractal.commands import stats

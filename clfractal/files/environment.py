@@ -75,7 +75,7 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
         )
         raise file_error(path, message, "")
     if width > MAX_WIDTH:
-        raise file_error(path, f"is too large: {width} pixels wide, at most {MAX_WIDTH:,}", "")
+        raise file_error(path, f"is too large: {width:,} pixels wide, at most {MAX_WIDTH:,}", "")
     if not set("RGB") <= set(header.channels) and "Y" not in header.channels:
         found = ", ".join(header.channels[:10])
         raise file_error(path, f"must have the channels R, G and B, or Y; it has {found[:200]}", "")

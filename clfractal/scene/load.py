@@ -28,7 +28,8 @@ def load_scene(
         source: a path (of a scene file, or of a picture that holds one); YAML text (a str with a line break,
             or that begins with a brace); or plain data.
         overrides: `camera.fov=30`: a dotted key and a YAML value that replaces the file's.
-        folder: where formula files are looked for; the scene file's folder, or the current one, if not given.
+        folder: where the files that it names are looked for, formulas and an environment's map; the scene
+            file's folder, or the current one, if not given.
 
     Raises:
         SceneError, FormulaError: the first thing in the text that is wrong.
@@ -42,7 +43,7 @@ def load_scene(
 
 def with_overrides(scene: Scene, overrides: Sequence[str]) -> Scene:
     """The scene with values replaced (`camera.fov=30`); errors as for load_scene."""
-    return load_scene(scene.resolved(), overrides=overrides) if overrides else scene
+    return load_scene(scene.resolved(), overrides=overrides, folder=scene.folder) if overrides else scene
 
 
 def dump_scene(scene: Scene) -> str:
@@ -138,7 +139,15 @@ def _checked(document: Document, folder: Path) -> Scene:
             from clfractal.scene.palette import check_palette
 
             check_palette(scene.coloring.palette)
-    except SceneError as error:
+        scene = scene.placed(folder)
+        if scene.environment is not None:
+            from clfractal.scene.environment import check_name
+
+            check_name(scene.environment)
+            if scene.environment.file is not None:
+                # Kept in the scene, so that what is rendered is what was checked.
+                _ = scene.surroundings
+    except (SceneError, FileError) as error:
         raise document.locate(error) from error
     return scene
 

@@ -4,8 +4,10 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 `formula` and `camera` has a default.
 """
 
+from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field
 
@@ -18,6 +20,7 @@ from clfractal.scene.surface import Renderer
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
+    from clfractal.scene.environment import EnvironmentMap
 
 
 class Scene(Section):
@@ -48,6 +51,38 @@ class Scene(Section):
         from clfractal.formulas import catalog
 
         return catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
+
+    @cached_property
+    def folder(self) -> Path:
+        """Where the environment's file is looked for: the folder that the scene was loaded from, or the current one."""
+        return Path()
+
+    def placed(self, folder: Path) -> Self:
+        """The same scene, as loaded from another folder."""
+        copied = super().model_copy()
+        # Beside the fields, as cached properties are: it is no part of what a scene says.
+        copied.__dict__["folder"] = folder
+        copied.__dict__.pop("surroundings", None)
+        return copied
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """As of every section; the copy stays in the scene's folder."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__["folder"] = self.folder
+        return copied
+
+    @cached_property
+    def surroundings(self) -> "EnvironmentMap | None":
+        """The environment's map, None without one; of a loaded scene a map's file has been read and checked.
+
+        Raises:
+            SceneError, FileError: it is missing or wrong; the path says where.
+        """
+        if self.environment is None:
+            return None
+        from clfractal.scene.environment import read_map
+
+        return read_map(self.environment, self.folder)
 
     def resolved(self) -> dict[str, Any]:
         """Plain data (as for YAML or JSON) with every default filled in; it loads back to an equal scene."""

@@ -1,0 +1,88 @@
+"""Finds a scene's environment map, in the program or beside the scene, and keeps its pixels with the scene."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal import resources
+from clfractal.errors import FileError, SceneError, Where, unknown_name
+
+if TYPE_CHECKING:
+    from clfractal.scene.lighting import Environment
+    from clfractal.scene.model import Scene
+
+Floats = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EnvironmentMap:
+    """`pixels` has the shape (height, 2 height, 3): linear Rec. 709, finite, none below 0."""
+
+    pixels: Floats
+
+    def digest(self) -> str:
+        """A text that differs for different pixels."""
+        return hashlib.sha256(np.ascontiguousarray(self.pixels).data).hexdigest()
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """The maps that travel with the program, sorted."""
+    return tuple(sorted(path.stem for path in resources.folder("environments").glob("*.exr")))
+
+
+def environment_map(scene: Scene) -> Floats:
+    """The pixels of the scene's environment; see `EnvironmentMap` and, for errors, `read_map`.
+
+    Raises:
+        ValueError: it has none.
+    """
+    if scene.surroundings is None:
+        raise ValueError("the scene has no environment")
+    return scene.surroundings.pixels
+
+
+def check_name(environment: Environment) -> None:
+    """Raises SceneError, at environment.name, for a name that no map has."""
+    if environment.name is not None and environment.name not in names():
+        raise SceneError(
+            unknown_name("environment", environment.name, names()), Where(path="environment.name")
+        )
+
+
+def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
+    """The map of a scene that was loaded from `folder`.
+
+    Raises:
+        SceneError: at environment.name, for an unknown name.
+        FileError: at environment.file, for a file out of the folder, or whatever is wrong with it.
+    """
+    check_name(environment)
+    if environment.file is None:
+        return _shipped(environment.name or "")
+    from clfractal.files.environment import read_environment
+    from clfractal.formulas.catalog import safe_path
+
+    where = Where(path="environment.file")
+    path = safe_path(environment.file, folder, where)
+    try:
+        return EnvironmentMap(read_environment(path))
+    except FileError as error:
+        raise FileError(f"{path} {error.message}", where, details=error.details) from error
+
+
+@cache
+def _shipped(name: str) -> EnvironmentMap:
+    """A map that travels with the program: small, and read once."""
+    from clfractal.files.environment import read_environment
+
+    pixels = read_environment(resources.folder("environments") / f"{name}.exr")
+    pixels.flags.writeable = False
+    return EnvironmentMap(pixels)
