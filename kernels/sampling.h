@@ -96,7 +96,7 @@ INLINE void unit_square(bits index, bits seed, real *u, real *v) {
     *v = unit_of_bits(reversed(scramble_reversed(row, hash_bits(seed + 0x3c6ef372u))));
 }
 
-// Sine and cosine of an eighth of a turn at most, in turns, to a bit or two (Taylor).
+// Sine and cosine of an angle given in turns, at most an eighth of one either way: Taylor's series, right to a bit or two.
 INLINE void sine_cosine(real turns, real *sine, real *cosine) {
     const real a = turns * R(6.283185307179586), a2 = a * a;
 #if REAL_IS_DOUBLE
@@ -114,14 +114,15 @@ INLINE void sine_cosine(real turns, real *sine, real *cosine) {
 // Where the Blackman-Harris window (Harris 1978, 4 terms, 92 dB), 1 wide around 0, has passed the part `u` of its area. The
 // guess is within 1e-3 and each step of Newton's method about squares the error: 3e-8 (double: 1e-12), but for rounding.
 INLINE real blackman_harris_place(real u) {
-    const real left = fmin(u, R(1.0) - u);
+    const real left = fmax(fmin(u, R(1.0) - u), R(1e-10));  // less than any number of the sequence
     const real z2 = fmax(-log(R(4.0) * left * (R(1.0) - left)), R(0.0));
     real place = sqrt(z2) * (R(0.180298986) + z2 * (R(-9.05787446e-4) + z2 * (R(-2.88277177e-4) + z2 * R(8.09420688e-6))));
     for (int step = 0; step < (REAL_IS_DOUBLE ? 3 : 2); ++step) {
         real s, c;
         sine_cosine(R(0.5) * place - R(0.125), &s, &c);
         const real sine = R(1.0) - R(2.0) * s * s, cosine = R(-2.0) * s * c;  // of the angle twice that, a quarter turn on
-        const real area = place + sine * (R(0.2148965126612882) + cosine * (R(0.06267710204884452) + cosine * R(0.006908914231129709)));
+        const real area = place + sine * (R(0.2148965126612882) + cosine * (R(0.06267710204884452)
+                          + cosine * R(0.006908914231129709)));
         const real density = R(0.6061881533101046) + cosine * (R(1.263414634146341) + cosine * (R(0.7876236933797909)
                              + cosine * R(0.1302299651567944)));
         place = clamp(place - (area - (R(0.5) - left)) / density, R(0.0), R(0.5));

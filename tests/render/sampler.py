@@ -1,0 +1,148 @@
+"""Runs the functions of `sampling.h` for lists of pixels and numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from tests.formulas.opencl_batch import compile_text
+
+Array = npt.NDArray[Any]
+
+# Planes that `shapes` writes, in this order.
+SHAPES = {
+    "box": 2,
+    "tent": 2,
+    "blackman_harris": 2,
+    "disk": 2,
+    "cone": 3,
+    "hemisphere": 3,
+    "side": 3,
+    "up": 3,
+}
+
+_TEXT = """\
+#include "lanes.h"
+#include "vectors.h"
+#include "sampling.h"
+
+INLINE real load_lanes(__global const scalar *from) {
+    scalar each[LANES];
+    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
+    return lanes_load(each);
+}
+INLINE void store_lanes(__global scalar *to, real value) {
+    scalar each[LANES];
+    lanes_store(value, each);
+    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
+}
+
+__kernel void squares(__global const int *pixels, __global scalar *result, int n, uint seed, uint purpose) {
+    const int at = (int)get_global_id(0) * LANES;
+    int x[LANES], y[LANES], index[LANES];
+    for (int lane = 0; lane < LANES; ++lane) {
+        x[lane] = pixels[at + lane];
+        y[lane] = pixels[n + at + lane];
+        index[lane] = pixels[2 * n + at + lane];
+    }
+    const bits seeds = pixel_seed(x, y, seed, purpose);
+    real u, v;
+    unit_square(bits_load(index), seeds, &u, &v);
+    store_lanes(result + at, u);
+    store_lanes(result + n + at, v);
+    store_lanes(result + 2 * n + at, unit_of_bits(bits_load(index)));
+    store_lanes(result + 3 * n + at, real_of_bits(seeds >> 16));
+    store_lanes(result + 4 * n + at, real_of_bits(seeds & 0xffffu));
+}
+
+__kernel void shapes(__global const scalar *numbers, __global scalar *result, int n, scalar width) {
+    const int at = (int)get_global_id(0) * LANES;
+    numbers += at;
+    const real u = load_lanes(numbers), v = load_lanes(numbers + n), spread = load_lanes(numbers + 5 * n);
+    const vec axis = vec_of(load_lanes(numbers + 2 * n), load_lanes(numbers + 3 * n), load_lanes(numbers + 4 * n));
+    real planes[20];
+    for (int filter = 0; filter < 3; ++filter)
+        filter_offset(u, v, filter, (real)(width), planes + 2 * filter, planes + 2 * filter + 1);
+    unit_disk(u, v, planes + 6, planes + 7);
+    vec found[4];
+    found[0] = cone_direction(axis, spread, u, v);
+    found[1] = hemisphere_direction(axis, u, v);
+    make_frame(axis, found + 2, found + 3);
+    for (int one = 0; one < 4; ++one) {
+        planes[8 + 3 * one] = found[one].x;
+        planes[9 + 3 * one] = found[one].y;
+        planes[10 + 3 * one] = found[one].z;
+    }
+    for (int plane = 0; plane < 20; ++plane) store_lanes(result + plane * n + at, planes[plane]);
+}
+"""
+
+_POINTS = """
+__kernel void points(__global const int *pixels, __global scalar *result, int n, int count, uint seed) {
+    const int at = (int)get_global_id(0) * LANES;
+    int x[LANES], y[LANES];
+    for (int lane = 0; lane < LANES; ++lane) {
+        x[lane] = pixels[at + lane];
+        y[lane] = pixels[n + at + lane];
+    }
+    const bits seeds = pixel_seed(x, y, seed, PURPOSE_POINTS);
+    for (int point = 0; point < count; ++point) {
+        real across, below;
+        point_offset(point, seeds, &across, &below);
+        store_lanes(result + 2 * point * n + at, across);
+        store_lanes(result + (2 * point + 1) * n + at, below);
+    }
+}
+"""
+
+
+class Sampler:
+    """The program for one precision and lane count; with `defines`, of a pixel's points, `points` too."""
+
+    def __init__(self, device: Device, precision: Precision, lanes: int, defines: str = "") -> None:
+        self.device, self.precision, self.lanes = device, precision, lanes
+        text = defines + _TEXT + (_POINTS if defines else "")
+        self.program = compile_text(device, text, precision, lanes)
+
+    def squares(
+        self, x: Array, y: Array, index: Array, seed: int = 0, purpose: int = 0
+    ) -> tuple[Array, Array, Array]:
+        """For each pixel: the point of the square (2, n), the index as a unit number (n,), the seed (n,)."""
+        pixels = np.stack(np.broadcast_arrays(x, y, index)).astype(np.uint32).view(np.int32)
+        planes = self._run("squares", pixels, 5, np.uint32(seed), np.uint32(purpose))
+        seeds = planes[3].astype(np.int64) << 16 | planes[4].astype(np.int64)
+        return planes[:2], planes[2], seeds
+
+    def shapes(self, u: Array, v: Array, axis: Array, spread: Array, width: float) -> dict[str, Array]:
+        """Everything made of points (n,) of the square, by name; axes have the shape (3, n)."""
+        numbers = np.stack(np.broadcast_arrays(u, v, *axis, spread)).astype(self.precision)
+        planes = self._run("shapes", numbers, sum(SHAPES.values()), np.dtype(self.precision).type(width))
+        parts = np.split(planes, np.cumsum(list(SHAPES.values()))[:-1])
+        return dict(zip(SHAPES, parts, strict=True))
+
+    def points(self, x: Array, y: Array, count: int, seed: int = 0) -> Array:
+        """Offsets of each pixel's points, shape (count, 2, n)."""
+        pixels = np.stack(np.broadcast_arrays(x, y)).astype(np.int32)
+        planes = self._run("points", pixels, 2 * count, np.int32(count), np.uint32(seed))
+        return planes.reshape(count, 2, -1)
+
+    def _run(self, name: str, given: Array, planes: int, *settings: Any) -> Array:
+        """The planes that a kernel writes, shape (planes, n), in float64; n is a multiple of the lanes."""
+        n = given.shape[1]
+        assert n % self.lanes == 0
+        result = np.full((planes, n), np.nan, self.precision)
+        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+        buffers = [
+            cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(array))
+            for array in (given, result)
+        ]
+        kernel = cl.Kernel(self.program, name)
+        kernel.set_args(*buffers, np.int32(n), *settings)
+        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (n // self.lanes,), (1,))
+        cl.enqueue_copy(self.device.queue, result, buffers[1])
+        return result.astype(np.float64)

@@ -1,0 +1,444 @@
+"""`sampling.h`: the sequence of random points, and what is made of it, against mathematics."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from clfractal.device.select import choose, has_float64
+from clfractal.device.structs import Precision
+from clfractal.device.tune import accepted_lanes
+from tests.render.sampler import Array, Sampler
+
+EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
+DIGITS = {"float32": 23, "float64": 31}
+WIDTH = 3.0
+BLACKMAN_HARRIS = np.array([0.35875, 0.48829, 0.14128, 0.01168])
+
+
+@lru_cache
+def samplers() -> list[Sampler]:
+    """One for each number type and lane count that the device accepts."""
+    device = choose()
+    precisions: list[Precision] = ["float32", "float64"] if has_float64(device.info) else ["float32"]
+    found = [
+        Sampler(device, precision, lanes)
+        for precision in precisions
+        for lanes in accepted_lanes(device, precision)
+    ]
+    assert found
+    return found
+
+
+@lru_cache
+def points_sampler(defines: str) -> Sampler:
+    device = choose()
+    return Sampler(device, "float32", accepted_lanes(device, "float32")[-1], defines)
+
+
+def grid_of_pixels(side: int) -> tuple[Array, Array]:
+    y, x = np.divmod(np.arange(side * side), side)
+    return x, y
+
+
+# The sequence.
+
+
+def hashed(a: Array) -> Array:
+    for shift, factor in ((16, 0x85EBCA6B), (13, 0xC2B2AE35), (16, 1)):
+        a = (a ^ (a >> shift)) * factor % 2**32
+    return a
+
+
+def mirrored(a: Array) -> Array:
+    return np.array([int(f"{int(one):032b}"[::-1], 2) for one in a], np.uint64)
+
+
+def scrambled(a: Array, seed: Array) -> Array:
+    """Digits of a, highest first, each flipped by a function of those before it."""
+    a = mirrored(a)
+    a = ((a ^ (a * 0x3D20ADEA)) + seed) % 2**32 * (seed >> 16 | 1) % 2**32
+    a = (a ^ (a * 0x05526C56)) % 2**32
+    return mirrored((a ^ (a * 0x53A22864)) % 2**32)
+
+
+def sobol(index: Array) -> Array:
+    """Sobol's second dimension: digit i is the sum of the index's bits j, each times binomial(j, i)."""
+    result = np.zeros_like(index)
+    for i in range(32):
+        for j in range(i, 32):
+            if math.comb(j, i) % 2:
+                result ^= (index >> j & 1) << (31 - i)
+    return result
+
+
+def truth(x: Array, y: Array, index: Array, seed: int, purpose: int) -> tuple[Array, Array, Array]:
+    """The two numbers of 32 digits, and the pixel's seed."""
+    x, y, index = (a.astype(np.uint64) for a in (x, y, index))
+    golden = 0x9E3779B9
+    key = hashed((np.uint64(seed) + hashed(np.array([(purpose + golden) % 2**32], np.uint64))) % 2**32)
+    other = hashed(2**32 - 1 - key)
+    pixel = hashed((hashed((x + key) % 2**32) + hashed((y + other) % 2**32)) % 2**32)
+    place = scrambled(index, hashed(pixel))
+    return (
+        scrambled(mirrored(place), hashed((pixel + golden) % 2**32)),
+        scrambled(sobol(place), hashed((pixel + 2 * golden) % 2**32)),
+        pixel,
+    )
+
+
+@pytest.mark.parametrize(("seed", "purpose"), [(0, 0), (1, 5), (2**32 - 1, 70)])
+def test_sequence_is_the_scrambled_sobol_sequence_bit_for_bit(seed: int, purpose: int) -> None:
+    random = np.random.default_rng(7)
+    x, y = random.integers(0, 16384, (2, 256))
+    index = np.concatenate([np.arange(64), random.integers(0, 2**32, 190), [2**31, 2**32 - 1]])
+    first, second, pixel = truth(x, y, index, seed, purpose)
+    for sampler in samplers():
+        digits = DIGITS[sampler.precision]
+        wanted = (np.stack([first, second]) >> (32 - digits)).astype(np.float64) + 0.5
+        got, _, seeds = sampler.squares(x, y, index, seed, purpose)
+        np.testing.assert_array_equal(seeds, pixel)
+        np.testing.assert_array_equal(got, wanted * 2.0**-digits)
+
+
+def test_no_number_is_0_or_1() -> None:
+    lowest = np.array([0, 1, 511, 512, 2**31 - 1, 2**24, 12345, 0xAAAAAAAA])
+    index = np.concatenate([lowest, 2**32 - 1 - lowest])
+    for sampler in samplers():
+        _, unit, _ = sampler.squares(index, index, index)
+        assert unit.min() == 0.5 ** (DIGITS[sampler.precision] + 1)
+        assert unit.max() == 1 - unit.min()
+        np.testing.assert_array_equal(unit[:8] + unit[8:], 1.0)
+        np.testing.assert_allclose(unit, index / 2.0**32, atol=0.51 * 2.0 ** -DIGITS[sampler.precision])
+
+
+def test_every_elementary_interval_holds_one_point() -> None:
+    index = np.arange(3 * 1024)
+    for pixel in range(8):
+        points, _, _ = samplers()[0].squares(np.full(1, pixel), np.full(1, 3 * pixel), index, purpose=pixel)
+        for m in range(1, 11):
+            for begin in (0, 2**m, 2 * 2**m):
+                block = points[:, begin : begin + 2**m]
+                for i in range(m + 1):
+                    column, row = np.floor(block * [[2.0**i], [2.0 ** (m - i)]])
+                    assert len(set((column * 2 ** (m - i) + row).tolist())) == 2**m
+
+
+def test_digits_are_flipped_independently() -> None:
+    # Over many seeds, any two points of the sequence fall on each pair of cells that a net allows equally often.
+    x, y = grid_of_pixels(128)
+    first, second = (samplers()[0].squares(x, y, np.array([index]))[0] for index in (0, 1))
+    for a, b in zip(first, second, strict=True):
+        assert ((a < 0.5) != (b < 0.5)).all()
+        cells = np.histogram2d(a, 2 * (b % 0.5), bins=[16, 8], range=[(0, 1)] * 2)[0]
+        assert stats.chisquare(cells.ravel()).pvalue > 1e-3
+    cells = np.histogram2d(first[0], first[1], bins=16)[0]
+    assert stats.chisquare(cells.ravel()).pvalue > 1e-3
+
+
+def star_discrepancy(points: Array) -> float:
+    """Exact, of points (2, n): the extreme boxes have their corners at coordinates of points, open or closed."""
+    u, v = (np.append(np.sort(axis), 1.0) for axis in points)
+    inside_closed = (points[0][:, None] <= u)[:, :, None] & (points[1][:, None] <= v)[:, None]
+    inside_open = (points[0][:, None] < u)[:, :, None] & (points[1][:, None] < v)[:, None]
+    area = u[:, None] * v
+    return float(max((inside_closed.mean(0) - area).max(), (area - inside_open.mean(0)).max()))
+
+
+def test_any_beginning_of_the_sequence_is_evenly_spread() -> None:
+    random = np.random.default_rng(5)
+    for count, part in ((12, 0.8), (64, 0.45), (100, 0.45), (128, 0.35)):
+        by_chance = np.mean([star_discrepancy(random.random((2, count))) for _ in range(8)])
+        worst = 0.0
+        for pixel in range(8):
+            # The count may be no multiple of the lanes.
+            points, _, _ = samplers()[0].squares(np.full(1, pixel), np.full(1, 9), np.arange(128))
+            worst = max(worst, star_discrepancy(points[:, :count]))
+        assert worst < part * by_chance
+
+
+def test_pixels_purposes_and_seeds_know_nothing_of_each_other() -> None:
+    x, y = grid_of_pixels(64)
+    sampler, n = samplers()[0], 64 * 64
+    index = np.array([0])
+    here = sampler.squares(x, y, index)[0]
+    others = {
+        "right": sampler.squares(x + 1, y, index)[0],
+        "below": sampler.squares(x, y + 1, index)[0],
+        "diagonal": sampler.squares(y, x, index)[0][:, x != y],
+        "purpose": sampler.squares(x, y, index, purpose=1)[0],
+        "light": sampler.squares(x, y, index, purpose=2)[0],
+        "seed": sampler.squares(x, y, index, seed=1)[0],
+        "far seed": sampler.squares(x, y, index, seed=0x9E3779B9)[0],
+    }
+    for name, there in others.items():
+        mine = here[:, x != y] if name == "diagonal" else here
+        correlation = np.corrcoef(np.concatenate([mine, there]))[:2, 2:]
+        assert np.abs(correlation).max() < 4.5 / math.sqrt(n), name
+        assert (mine == there).mean() < 0.01, name
+    assert abs(np.corrcoef(here)[0, 1]) < 4.5 / math.sqrt(n)
+
+
+def test_pixels_have_seeds_of_their_own() -> None:
+    # Of 2^18 random seeds some 8 pairs agree: more than 30 has a chance below 1e-8.
+    x, y = grid_of_pixels(512)
+    seeds = samplers()[0].squares(x, y, np.array([0]))[2]
+    assert len(seeds) - len(np.unique(seeds)) < 30
+    # No row of pixels is another one, shifted.
+    rows = [set(row.tolist()) for row in seeds.reshape(512, 512)]
+    assert max(len(rows[0] & row) for row in rows[1:]) < 4
+
+
+# Filters.
+
+
+def blackman_harris_density(t: Array) -> Array:
+    turns = 2 * np.pi * np.multiply.outer(np.arange(4), t)
+    return np.asarray(BLACKMAN_HARRIS @ np.cos(turns) / BLACKMAN_HARRIS[0])
+
+
+def blackman_harris_area(t: Array) -> Array:
+    """The integral of the density from -1/2 to t."""
+    k = np.arange(1, 4)
+    sines = np.sin(2 * np.pi * np.multiply.outer(k, t))
+    return np.asarray(0.5 + t + (BLACKMAN_HARRIS[1:] / (2 * np.pi * k)) @ sines / BLACKMAN_HARRIS[0])
+
+
+AREAS = {
+    "box": lambda t: t + 0.5,
+    "tent": lambda t: np.where(t < 0, 2 * (t + 0.5) ** 2, 1 - 2 * (0.5 - t) ** 2),
+    "blackman_harris": blackman_harris_area,
+}
+
+
+def place_of_area(name: str, u: Array) -> Array:
+    """By bisection."""
+    low, high = np.full_like(u, -0.5), np.full_like(u, 0.5)
+    for _ in range(60):
+        middle = (low + high) / 2
+        beyond = AREAS[name](middle) > u
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    return (low + high) / 2
+
+
+X_AXIS = np.array([[1.0], [0.0], [0.0]])
+
+
+@pytest.mark.parametrize("name", list(AREAS))
+def test_filter_places_pass_the_wanted_area(name: str) -> None:
+    near_the_edge = 2.0 ** -np.arange(2, 25)
+    u = np.concatenate([np.arange(1, 1000) / 1000, near_the_edge, 1 - near_the_edge, [0.5 + 2**-24]])
+    u = np.resize(u.astype(np.float32), 1056).astype(np.float64)
+    for sampler in samplers():
+        places = sampler.shapes(u, 1 - u, X_AXIS, np.zeros(1), WIDTH)[name]
+        across, below = places / WIDTH
+        assert np.abs(across).max() <= 0.5
+        bound = 1e-6 if sampler.precision == "float32" else 1e-11
+        assert np.abs(AREAS[name](across) - u).max() < bound
+        if sampler.precision == "float64":
+            # Area tells little where the filter hardly has any: there the place itself must be right.
+            assert np.abs(across - place_of_area(name, u)).max() < 1e-11
+        assert np.abs(across + below).max() < 1e-3
+        order = np.argsort(u, kind="stable")
+        assert np.diff(across[order]).min() > -1e-6
+
+
+def test_filter_places_of_0_and_1_are_the_edges() -> None:
+    u = np.resize([0.0, 1.0], 16)
+    for sampler in samplers():
+        found = sampler.shapes(u, u, X_AXIS, np.zeros(1), WIDTH)
+        for name in AREAS:
+            np.testing.assert_allclose(found[name], [(u - 0.5) * WIDTH] * 2, atol=2e-3 * WIDTH)
+
+
+@pytest.mark.parametrize("name", list(AREAS))
+def test_filter_offsets_have_the_filters_distribution(name: str) -> None:
+    t = (np.arange(20000) + 0.5) / 20000 - 0.5
+    density = {
+        "box": np.ones_like(t),
+        "tent": 2 - 4 * np.abs(t),
+        "blackman_harris": blackman_harris_density(t),
+    }
+    variance = WIDTH**2 * np.mean(density[name] * t**2)
+    fourth = WIDTH**4 * np.mean(density[name] * t**4)
+    for sampler in samplers():
+        (u, v), _, _ = sampler.squares(np.array([3]), np.array([4]), np.arange(4096))
+        for offsets in sampler.shapes(u, v, X_AXIS, np.zeros(1), WIDTH)[name]:
+            # One point lies in each 4096th of the area.
+            expected = AREAS[name](np.sort(offsets) / WIDTH)
+            assert np.abs(expected - (np.arange(4096) + 0.5) / 4096).max() < 0.51 / 4096
+            assert abs(offsets.mean()) < 1e-3
+            assert abs(offsets.var() / variance - 1) < 2e-3
+            assert abs((offsets**4).mean() / fourth - 1) < 5e-3
+
+
+# The points of a pixel.
+
+
+@pytest.mark.parametrize("side", [1, 3, 8])
+def test_grid_is_exact(side: int) -> None:
+    sampler = points_sampler(
+        f"#define POINT_PATTERN 0\n#define POINTS {side**2}\n#define POINT_SIDE {side}\n"
+    )
+    x, y = grid_of_pixels(4)
+    got = sampler.points(x, y, side * side)
+    steps = ((2 * np.arange(side) + 1 - side) / np.float32(2 * side)).astype(np.float32)
+    below, across = np.meshgrid(steps, steps, indexing="ij")
+    for pixel in range(16):
+        np.testing.assert_array_equal(got[:, 0, pixel], across.ravel())
+        np.testing.assert_array_equal(got[:, 1, pixel], below.ravel())
+    if side == 3:
+        np.testing.assert_array_equal(steps, np.array([-1, 0, 1], np.float32) / np.float32(3))
+
+
+def stochastic(count: int) -> Sampler:
+    return points_sampler(f"#define POINT_PATTERN 1\n#define POINTS {count}\n")
+
+
+def nearest(points: Array) -> Array:
+    """The smallest distance between two points (count, 2, n) of each pixel, pixels."""
+    squares = ((points[:, None] - points[None]) ** 2).sum(2)
+    squares[np.arange(len(points)), np.arange(len(points))] = np.inf
+    return np.asarray(np.sqrt(squares.min((0, 1))))
+
+
+def jittered(side: int, pixels: int) -> Array:
+    below, across = np.divmod(np.arange(side * side), side)
+    corners = np.stack([across, below], 1)[:, :, None]
+    return (corners + np.random.default_rng(3).random((side * side, 2, pixels))) / side - 0.5
+
+
+@pytest.mark.parametrize("side", [2, 3, 8])
+def test_stochastic_points_are_spread_better_than_jittered_ones(side: int) -> None:
+    x, y = grid_of_pixels(32)
+    count = side * side
+    points, jitter = stochastic(count).points(x, y, count), jittered(side, 1024)
+    # A hexagonal lattice has 1.07.
+    assert nearest(points).min() * side > 0.65
+    assert nearest(points).mean() > 1.25 * nearest(jitter).mean()
+    ours = [star_discrepancy(points[..., pixel].T + 0.5) for pixel in range(40)]
+    theirs = [star_discrepancy(jitter[..., pixel].T + 0.5) for pixel in range(40)]
+    assert np.mean(ours) < 0.95 * np.mean(theirs)
+
+
+@pytest.mark.parametrize("count", [4, 7, 64])
+def test_stochastic_points_are_everywhere_alike_and_unlike_in_neighbours(count: int) -> None:
+    x, y = grid_of_pixels(64)
+    sampler = stochastic(count)
+    points = sampler.points(x, y, count)
+    assert np.abs(points).max() < 0.5
+    # Over many pixels every part of a pixel gets its share: no picture is brighter for where its points lie.
+    cells = np.histogram2d(points[:, 0].ravel(), points[:, 1].ravel(), bins=16, range=[(-0.5, 0.5)] * 2)[0]
+    assert stats.chisquare(cells.ravel()).pvalue > 1e-3
+    for there in (sampler.points(x + 1, y, count), sampler.points(x, y, count, seed=1)):
+        for a, b in ((0, 0), (1, 1), (0, 1), (1, 0)):
+            assert abs(np.corrcoef(points[0, a], there[0, b])[0, 1]) < 4.5 / 64
+        # No pattern comes back: the means of a pixel's points, and so its errors, are unrelated.
+        mine, others = ((p[:, 0] * p[:, 1]).mean(0) for p in (points, there))
+        assert abs(np.corrcoef(mine, others)[0, 1]) < 4.5 / 64
+
+
+def test_stochastic_points_are_laid_out_in_four_ways() -> None:
+    x, y = grid_of_pixels(64)
+    strips = (stochastic(7).points(x, y, 7) + 0.5) * 7
+    order = np.arange(7)[:, None, None]
+    upward, downward = (np.floor(strips) == order).all(0), (np.floor(strips) == 6 - order).all(0)
+    ways = np.concatenate([upward, downward])
+    np.testing.assert_array_equal(ways.sum(0), 1)
+    assert stats.chisquare(ways.sum(1)).pvalue > 1e-3
+    # Where in its strip a point lies has nothing to do with the next one's place.
+    within = strips[:, 0, upward[0]] % 1
+    correlation = np.corrcoef(within) - np.eye(7)
+    assert np.abs(correlation).max() < 4.5 / math.sqrt(within.shape[1])
+
+
+def test_points_do_not_depend_on_the_packet() -> None:
+    device, defines = choose(), "#define POINT_PATTERN 1\n#define POINTS 9\n"
+    x, y = grid_of_pixels(8)
+    wide = stochastic(9).points(x, y, 9)
+    narrow = Sampler(device, "float32", accepted_lanes(device, "float32")[0], defines).points(x, y, 9)
+    np.testing.assert_array_equal(wide, narrow)
+
+
+# Directions.
+
+
+def unit_axes() -> Array:
+    """Awkward axes first: the poles, either zero, next to the poles; then random ones. Shape (3, 64)."""
+    tiny = np.array([1e-4, 1e-7, 1e-20, 0.0])
+    poles = [(t, -t, sign) for t in tiny for sign in (1.0, -1.0)]
+    equator = [(1.0, 0.0, 0.0), (0.0, -1.0, -0.0), (0.6, 0.8, -1e-9), (-0.6, 0.8, -0.0)]
+    random = np.random.default_rng(2).normal(size=(64 - len(poles) - len(equator), 3))
+    axes = np.concatenate([poles, equator, random])
+    return np.asarray(axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
+
+
+def test_frames_are_orthonormal_and_right_handed() -> None:
+    for sampler in samplers():
+        axis = unit_axes().astype(sampler.precision)
+        found = sampler.shapes(np.array([0.3]), np.array([0.7]), axis, np.zeros(1), 1.0)
+        frame = np.stack([found["side"], found["up"], axis.astype(np.float64)])
+        products = np.einsum("ian,jan->nij", frame, frame)
+        assert np.abs(products - np.eye(3)).max() < 6 * EPSILON[sampler.precision]
+        assert np.abs(np.cross(frame[0], frame[1], axis=0) - frame[2]).max() < 6 * EPSILON[sampler.precision]
+
+
+def test_disk_is_the_concentric_map() -> None:
+    (u, v), _, _ = samplers()[0].squares(np.array([1]), np.array([2]), np.arange(4096))
+    u[:4], v[:4] = [0.5, 0.5, 0.25, 0.75], [0.5, 0.75, 0.25, 0.25]
+    a, b = 2 * u - 1, 2 * v - 1
+    # The square's outline at max(|a|, |b|) becomes a circle, each of its sides a quarter of it.
+    radius = np.maximum(np.abs(a), np.abs(b))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        angle = np.where(np.abs(a) >= np.abs(b), b / a, 2 - a / b) * np.pi / 4
+    signed = np.where(np.abs(a) >= np.abs(b), a, b)
+    wanted = np.where(radius > 0, signed * np.stack([np.cos(angle), np.sin(angle)]), 0.0)
+    for sampler in samplers():
+        got = sampler.shapes(u, v, X_AXIS, np.zeros(1), 1.0)["disk"]
+        assert np.abs(got - wanted).max() < 2 * EPSILON[sampler.precision]
+    rings, sectors = got[0] ** 2 + got[1] ** 2, np.arctan2(got[1], got[0])
+    cells = np.histogram2d(rings, sectors, bins=[8, 16], range=[(0, 1), (-np.pi, np.pi)])[0]
+    assert np.abs(cells - 32).max() <= 8  # a random set would differ by some 17
+
+
+@pytest.mark.parametrize("degrees", [0.01, 0.53, 30.0, 170.0, 360.0])
+def test_cones_are_filled_evenly(degrees: float) -> None:
+    """`degrees` is the whole opening angle; the spread is made without cancellation, as on the host."""
+    half = math.radians(degrees) / 2
+    spread = 2 * math.sin(half / 2) ** 2
+    for sampler in samplers():
+        (u, v), _, _ = sampler.squares(np.array([5]), np.array([6]), np.arange(4096))
+        axis = np.resize(unit_axes(), (3, 4096)) if degrees > 1 else np.repeat(unit_axes()[:, [40]], 4096, 1)
+        axis = axis.astype(sampler.precision).astype(np.float64)
+        got = sampler.shapes(u, v, axis, np.full(1, spread), 1.0)
+        direction, (x, y) = got["cone"], got["disk"]
+        epsilon = EPSILON[sampler.precision]
+        assert np.abs(np.linalg.norm(direction, axis=0) - 1).max() < 4 * epsilon
+        # Half the chord from the axis is sin(angle / 2), whose square is the height below the top, halved.
+        height = ((direction - axis) ** 2).sum(0) / 2
+        rounding = 2 * epsilon / (2 * math.sin(half / 2))
+        assert np.abs(height / spread - (x**2 + y**2)).max() < 4 * rounding
+        assert (height <= spread * (1 + 4 * rounding)).all()
+        # Archimedes: uniform on the sphere is uniform in height.
+        assert stats.kstest(height / spread, "uniform").statistic < 0.01
+        around = np.arctan2((got["up"] * direction).sum(0), (got["side"] * direction).sum(0))
+        assert np.abs(np.exp(1j * around) - np.exp(1j * np.arctan2(y, x))).max() < 0.02
+
+
+def test_hemisphere_is_cosine_weighted() -> None:
+    for sampler in samplers():
+        (u, v), _, _ = sampler.squares(np.array([8]), np.array([1]), np.arange(4096))
+        axis = unit_axes()
+        for which in (1, 5, 30):
+            normal = axis[:, [which]].astype(sampler.precision).astype(np.float64)
+            direction = sampler.shapes(u, v, normal, np.zeros(1), 1.0)["hemisphere"]
+            assert np.abs(np.linalg.norm(direction, axis=0) - 1).max() < 6 * EPSILON[sampler.precision]
+            cosine = (direction * normal).sum(0)
+            assert cosine.min() > 0
+            # Density cos/pi per steradian: the square of the cosine is uniform, the mean direction 2/3 of the normal.
+            assert stats.kstest(cosine**2, "uniform").statistic < 0.01
+            np.testing.assert_allclose(direction.mean(1), 2 / 3 * normal[:, 0], atol=2e-3)
