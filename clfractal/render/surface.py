@@ -18,6 +18,7 @@ from clfractal.device.source import FlatText, flatten
 from clfractal.files.channels import CHANNELS
 from clfractal.formulas.opencl import write_formula
 from clfractal.render import layout
+from clfractal.render.environment import pack_environment
 from clfractal.render.plan import Plan
 from clfractal.render.tiles import TILE
 from clfractal.render.view import camera_view
@@ -207,16 +208,18 @@ class SurfaceWorker:
         width, height = scene.image.width, scene.image.height
         view = camera_view(scene.camera, width, height)
         formula = write_formula(scene.chain)
+        surroundings = scene.surroundings
+        packed = pack_environment(surroundings.pixels) if surroundings is not None else None
         slots = [plan.channels.index(name) if name in plan.channels else -1 for name in CHANNELS]
         return [
             layout.view_record(view, width, height, plan.region, plan.precision),
             layout.march_record(scene, plan.samples, plan.precision),
             layout.orbit_record(scene.chain, scene.formula.iterations, plan.precision),
             np.array(formula.constants, plan.precision),
-            layout.material_record(scene, plan.precision),
+            layout.material_record(scene, plan.precision, packed),
             layout.light_records(scene, plan.precision),
             self._palette(),
-            np.zeros(4, np.float32),
+            packed.data if packed is not None else np.zeros(4, np.float32),
             np.array(slots, np.int32),
         ]
 

@@ -35,7 +35,7 @@ def fill(film: Film) -> np.ndarray:
 
 
 def test_the_table_of_channels() -> None:
-    assert " ".join(ALL) == "R G B A Z N.X N.Y N.Z P.X P.Y P.Z iterations steps"
+    assert " ".join(ALL) == "R G B A Z N.X N.Y N.Z P.X P.Y P.Z iterations steps samples"
     assert DEFAULT_CHANNELS == ("R", "G", "B", "A", "Z")
     assert [name for name in ALL if CHANNELS[name].fill != 0] == ["Z"]
     assert CHANNELS["Z"].fill == np.inf
