@@ -5,10 +5,13 @@
 // The build defines COLORING (COLORING_SOLID, _NORMAL, _ITERATIONS, _RESIDUAL, _THICKNESS, _LAYER_DISTANCE, _TRAP), ALONG
 // (ALONG_VIEW, _NORMAL, _REFLECTION) and TRAP (TRAP_POINT, _AXIS, _PLANE, _SPHERE).
 
-#define WAY_GROWTH R(0.015625)   // part of a full step that the first one takes; they double until full
+#define WAY_GROWTH R(0.5)        // steps that grow: this part of the way so far
+#define WAY_START R(0.015625)    // the first of them on the way to a layer, in full steps
 #define WAY_TOLERANCE R(1e-4)    // part of a full step to which a crossing is narrowed down
-#define ENTRANCE_REACH R(4.0)    // footprints: how far behind a point of the surface the set may begin ...
-#define ENTRANCE_START R(0.0625) // ... and the first place to look
+// In footprints: how far behind a point of the surface the set may begin, and the first place to look. A distance of one
+// footprint, which is a hit, is a lower bound; rough fractals have their solid at three (median) to ten.
+#define ENTRANCE_REACH R(16.0)
+#define ENTRANCE_START R(0.0625)
 
 // A crossing of the solid's surface on a way, as distances from where it starts.
 typedef struct {
@@ -18,7 +21,7 @@ typedef struct {
 } gate;
 
 // Follows a way until it is inside (`inward` 1) or outside (0) the solid of `limit` applications: from the distance `begin`
-// in steps of `shortest`, doubled until they are `longest`, then by bisection. What is thinner than a step may be missed.
+// in steps that grow from `shortest` to `longest`, then by bisection. What is thinner than a step may be missed.
 INLINE gate way_until(int inward, vec from, vec direction, real begin, real shortest, real longest, real farthest, int limit,
                       mask active, __constant const struct Material *material, __constant const struct Orbit *orbit,
                       __constant const scalar *k) {
@@ -36,14 +39,14 @@ INLINE gate way_until(int inward, vec from, vec direction, real begin, real shor
         met.found |= there;
         const real tolerance = fmax(coarse, R(2.0) * (real)(REAL_EPSILON) * (size + fabs(t)));
         active &= (met.found & less(tolerance, met.beyond - met.before)) | (~met.found & less(met.before, farthest));
-        const real step = clamp(met.before - begin, shortest, longest);
+        const real step = clamp(WAY_GROWTH * (met.before - begin), shortest, longest);
         t = pick(met.found, R(0.5) * (met.before + met.beyond), fmin(met.before + step, farthest));
     }
     return met;
 }
 
 // How long the way from a point of the surface through the set is, from where it enters the set to where it first leaves it:
-// 0 where the set does not begin within a few footprints or a step, at most `coloring_limit`. `direction` has length 1.
+// 0 where the set does not begin within ENTRANCE_REACH or a step, at most `coloring_limit`. `direction` has length 1.
 INLINE real set_thickness(vec point, vec direction, real cone, mask active, __constant const struct Material *material,
                           __constant const struct Orbit *orbit, __constant const scalar *k) {
     const real step = (real)(material->coloring_step), limit = (real)(material->coloring_limit);
@@ -59,7 +62,8 @@ INLINE real set_thickness(vec point, vec direction, real cone, mask active, __co
             active = met.found;
             entrance = middle;
             begin = pick(active, met.beyond, R(0.0));
-            shortest = WAY_GROWTH * step;
+            // At full steps at once: growing ones would find every pore behind the surface.
+            shortest = step;
             longest = step;
             farthest = begin + limit;
         } else {
@@ -76,7 +80,7 @@ INLINE real layer_distance(vec point, vec outward, mask active, __constant const
                            __constant const struct Orbit *orbit, __constant const scalar *k) {
     const real step = (real)(material->coloring_step), limit = (real)(material->coloring_limit);
     const int inward = material->layer > orbit->iterations;
-    const gate met = way_until(inward, point, vec_scale(outward, inward ? R(-1.0) : R(1.0)), R(0.0), WAY_GROWTH * step, step,
+    const gate met = way_until(inward, point, vec_scale(outward, inward ? R(-1.0) : R(1.0)), R(0.0), WAY_START * step, step,
                                limit, material->layer, active, material, orbit, k);
     return pick(met.found, fmin(R(0.5) * (met.before + met.beyond), limit), limit);
 }

@@ -200,6 +200,9 @@ def test_thickness_is_bounded_and_needs_an_entrance() -> None:
     # Away from the ball, and from further outside than a step.
     assert not quantity(ball(by="thickness"), POINTS, -NORMALS, VIEWS).any()
     assert not quantity(ball(by="thickness"), POINTS + 0.05 * NORMALS, NORMALS, VIEWS).any()
+    # Rough sets begin several footprints behind what counts as their surface.
+    found = quantity(ball(by="thickness", step=0.005), POINTS + 0.015 * NORMALS, NORMALS, VIEWS)
+    np.testing.assert_allclose(found, 2 * BALL_RADIUS, rtol=0, atol=TOLERANCE["float32"])
 
 
 def test_a_coarse_step_is_enough_for_a_ball_and_a_fine_one_for_a_thin_wall() -> None:
