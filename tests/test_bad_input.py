@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from clfractal.device import select
+from clfractal.device import program, select
 from clfractal.device.source import FlatText
 from clfractal.render import surface
 from tests.files.limits import file_size_limit
@@ -129,6 +129,13 @@ def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts:
             "7:13: lights.0.position: must be outside the object, where its light reaches something",
         ),
         ("environment:\n  intensity: 1", "6:3: environment: needs one of name or file"),
+        ("environment:\n  name: nowhere", "6:9: environment.name: unknown environment 'nowhere'; "),
+        ("environment:\n  file: none.exr", "6:9: environment.file: none.exr "),
+        (
+            "environment:\n  file: ../none.exr",
+            "6:9: environment.file: must be a path inside the scene's folder",
+        ),
+        ("environment:\n  file: old.exr", "6:9: environment.file: old.exr "),
     ],
 )
 def test_a_scene_that_cannot_work(here: Path, shell: InProcess, lines: str, message: str) -> None:
@@ -310,6 +317,8 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
         return replace(flat, text=flat.text.replace("kernel void surface", "kernel vod surface"))
 
     monkeypatch.setattr(surface, "program_text", broken)
+    # However slow the machine is: a line about a long compilation is not what is tested.
+    monkeypatch.setattr(program, "_REMARK_SECONDS", 600.0)
     ended = shell("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "surface.cl:", "vod")
     told = shell("render", "scene.yaml", "-o", "old.png", "--verbose")

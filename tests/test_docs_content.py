@@ -26,7 +26,7 @@ from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser
-from clfractal.scene import lighting, load, parts
+from clfractal.scene import environment, lighting, load, palettes, parts
 from tests.shell import SCENE, InProcess
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -171,6 +171,13 @@ def test_limits_of_scene_files() -> None:
         "levels of nesting": document.MAX_DEPTH,
     }
     assert {row[0]: int(row[1].replace(",", "")) for row in table("scenes.md", "Limits")} == limits
+
+
+def test_maps_and_palettes_of_the_program() -> None:
+    assert [code(row[0]) for row in table("light.md", "An environment")] == list(environment.names())
+    for row, periodic in zip(table("coloring.md", "Palettes"), (False, True), strict=True):
+        own = [name for name, palette in palettes.PALETTES.items() if palette.periodic is periodic]
+        assert re.findall(r"`(\w+)`", row[1]) == own
 
 
 # --- formulas ---

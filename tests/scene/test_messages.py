@@ -186,6 +186,10 @@ CASES = [
         "environment.file: cannot stand beside name: give one of name or file",
     ),
     ("environment: §sky", "environment: must be a mapping, got 'sky'"),
+    (
+        "environment: {name: §studoi}",
+        "environment.name: unknown environment 'studoi'; did you mean 'studio'?",
+    ),
     ("environment: {name: §''}", "environment.name: must not be empty, got ''"),
     ("environment: {name: a, rotation: §400}", "environment.rotation: must be at most 360, got 400"),
     ("environment: {name: a, rays: §-1}", "environment.rays: must be at least 0, got -1"),

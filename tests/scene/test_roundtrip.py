@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from clfractal.errors import SceneError
 from clfractal.files.channels import CHANNELS
 from clfractal.formulas import catalog
+from clfractal.scene import environment
 from clfractal.scene.load import dump_scene, load_scene, schema
 from clfractal.scene.model import Scene
 
@@ -139,7 +140,7 @@ nothing: st.SearchStrategy[dict[str, Any]] = st.just({})
 renderers = together(usual_renderer, nothing | search, nothing | normals, nothing | adaptive)
 environments = st.builds(
     lambda source, rest: {**source, **rest},
-    st.sampled_from([{"name": "studio"}, {"file": "sky.exr"}]),
+    st.sampled_from(environment.names()).map(lambda name: {"name": name}),
     optional(
         intensity=amount, rotation=st.floats(-360, 360), background=st.booleans(), rays=st.integers(0, 1024)
     ),
@@ -158,7 +159,7 @@ sections = optional(
     ),
     coloring=optional(
         by=st.sampled_from(["solid", "normal", "iterations", "thickness", "layer_distance", "trap"]),
-        palette=st.sampled_from(["viridis", "magma"]) | stops,
+        palette=st.sampled_from(["viridis", "magma", "glacier", "opal_r"]) | stops,
         scale=coordinate,
         offset=coordinate,
         repeat=st.booleans(),
