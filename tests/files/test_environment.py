@@ -235,7 +235,7 @@ def whole_files() -> tuple[bytes, ...]:
     st.floats(0, 1),
     st.booleans(),
 )
-@settings(max_examples=300)
+@settings(max_examples=150)
 def test_damage_is_told_in_one_line(
     which: int, changes: list[tuple[float, bytes]], kept: float, cut: bool
 ) -> None:

@@ -1,0 +1,283 @@
+"""`kernels/environment.h`: what light comes from where, and directions chosen by brightness.
+
+The references are written in NumPy from the definitions: where a direction lies in the picture, what a linear
+blend is, and that the cells of the tables have equal density per steradian.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy import stats
+
+from clfractal.device.select import choose, has_float64
+from clfractal.device.structs import Precision
+from clfractal.render.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment
+from clfractal.scene.lighting import Environment
+from tests.render.environment_kernel import ask
+
+Floats = npt.NDArray[np.floating[Any]]
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+VARIANTS: list[tuple[Precision, int]] = [("float32", 1), ("float32", 16), ("float32", 4)]
+if has_float64(choose().info):
+    VARIANTS += [("float64", 8)]
+
+every_variant = pytest.mark.parametrize(("precision", "lanes"), VARIANTS)
+
+
+def a_map(height: int = 16, seed: int = 3) -> npt.NDArray[np.float32]:
+    """Random light, darker and brighter, with one very bright pixel at the seam."""
+    pixels = np.random.default_rng(seed).random((height, 2 * height, 3)).astype(np.float32) ** 6
+    pixels[height // 5, -1] = (60, 40, 20)
+    return pixels
+
+
+def spots(height: int = 16) -> npt.NDArray[np.float32]:
+    """Black but for three pixels: at a pole, at the seam, and among black ones."""
+    pixels = np.zeros((height, 2 * height, 3), np.float32)
+    pixels[0, 3] = pixels[height // 2, 0] = pixels[height // 4, height] = (1, 2, 3)
+    return pixels
+
+
+def random_directions(count: int, seed: int) -> Floats:
+    """Uniform on the sphere, with the poles, the seam, the axes and their neighbourhood among them."""
+    found = np.random.default_rng(seed).normal(size=(count, 3))
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    tiny = np.array([[1e-7, -1, 0], [-1e-7, -1, 0], [0, -1e-9, 1], [1e-12, 0, -1], [0.0, -0.0, -1]])
+    found[:11] = np.concatenate([axes, tiny])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+
+def place(directions: Floats, rotation: float = 0.0) -> tuple[Floats, Floats]:
+    """Parts of the picture's width and height: +y in the middle, +x right of it, +z at the top."""
+    turn = math.radians(rotation)
+    x = math.cos(turn) * directions[:, 0] + math.sin(turn) * directions[:, 1]
+    y = math.cos(turn) * directions[:, 1] - math.sin(turn) * directions[:, 0]
+    z = directions[:, 2]
+    return np.arctan2(x, y) / (2 * np.pi) + 0.5, 0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi
+
+
+def blended(pixels: Floats, across: Floats, below: Floats) -> Floats:
+    """Linear between the pixels' middles; around the sides, but not over the poles."""
+    height, width, _ = pixels.shape
+    x, y = across * width - 0.5, np.clip(below * height - 0.5, 0, height - 1)
+    left, top = np.floor(x).astype(int), np.minimum(y.astype(int), height - 1)
+    s, t = (x - left)[:, None], (y - top)[:, None]
+    down = np.minimum(top + 1, height - 1)
+    upper = pixels[top, left % width] * (1 - s) + pixels[top, (left + 1) % width] * s
+    lower = pixels[down, left % width] * (1 - s) + pixels[down, (left + 1) % width] * s
+    return np.asarray(upper * (1 - t) + lower * t)
+
+
+def cells(packed: PackedEnvironment) -> tuple[Floats, Floats]:
+    """The density of each cell, shape (rows, columns), and the cells' areas in steradians, shape (rows, 1)."""
+    rows, columns = packed.rows, packed.columns
+    start = 2 * (rows + 1) + rows * (columns + 1)
+    density = packed.data[start : start + rows * columns].reshape(rows, columns).astype(float)
+    borders = np.cos(np.pi * np.arange(rows + 1) / rows)
+    return density, ((borders[:-1] - borders[1:]) * 2 * np.pi / columns)[:, None]
+
+
+def toward(across: Floats, below: Floats) -> Floats:
+    """Directions to places of the picture."""
+    longitude, latitude = (np.asarray(across) - 0.5) * 2 * np.pi, (0.5 - np.asarray(below)) * np.pi
+    level = np.cos(latitude)
+    return np.stack([level * np.sin(longitude), level * np.cos(longitude), np.sin(latitude)], axis=-1)
+
+
+def test_which_way_is_where() -> None:
+    """A map that is red ahead (+y), green to the right (+x), blue above, and grey behind."""
+    pixels = np.zeros((64, 128, 3), np.float32)
+    pixels[20:44, 60:68] = (1, 0, 0)
+    pixels[20:44, 92:100] = (0, 1, 0)
+    pixels[:8] = (0, 0, 1)
+    pixels[20:44, :4] = pixels[20:44, -4:] = 0.5
+    directions = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1], [0, -1, 0], [-1, 0, 0], [0, 0, -1]], float)
+    found = ask(pack_environment(pixels), directions).color
+    expected = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0.5], [0, 0, 0], [0, 0, 0]]
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_the_map_turns_counterclockwise_seen_from_above() -> None:
+    """By 90 degrees, what was ahead (+y) is on the left (-x)."""
+    pixels = np.zeros((32, 64, 3), np.float32)
+    pixels[12:20, 30:34] = 1
+    settings = Environment(name="any", rotation=90.0, intensity=2.0)
+    found = ask(
+        pack_environment(pixels), np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0]], float), settings=settings
+    )
+    np.testing.assert_allclose(found.color[:, 0], [2, 0, 0], atol=1e-5)
+
+
+@every_variant
+def test_light_is_blended_between_pixels(precision: Precision, lanes: int) -> None:
+    pixels, directions = a_map(), random_directions(5000, 1)
+    settings = Environment(name="any", rotation=-37.5, intensity=1.7)
+    found = ask(pack_environment(pixels), directions, settings=settings, precision=precision, lanes=lanes)
+    expected = 1.7 * blended(pixels.astype(float), *place(directions, -37.5))
+    # At a pole every longitude is right.
+    usual = np.hypot(directions[:, 0], directions[:, 1]) > 1e-6
+    np.testing.assert_allclose(
+        found.color[usual], expected[usual], atol=2e-3 if precision == "float32" else 1e-5
+    )
+    assert np.isfinite(found.color).all()
+
+
+def test_pixels_are_met_at_their_middles() -> None:
+    pixels = a_map()
+    across, below = np.meshgrid((np.arange(32) + 0.5) / 32, (np.arange(16) + 0.5) / 16)
+    found = ask(pack_environment(pixels), toward(across, below).reshape(-1, 3))
+    np.testing.assert_allclose(found.color, pixels.reshape(-1, 3), atol=5e-4)
+
+
+def test_there_is_no_seam() -> None:
+    below = np.linspace(0.02, 0.98, 200)
+    sides = [ask(pack_environment(a_map()), toward(np.full(200, x), below)).color for x in (1e-6, 1 - 1e-6)]
+    np.testing.assert_allclose(sides[0], sides[1], atol=5e-3)
+
+
+@pytest.mark.parametrize(
+    "directions", [[[0.0, 0.0, 0.0]], [[math.nan, 0.0, 1.0]], [[math.nan] * 3], [[math.inf] * 3]]
+)
+def test_no_direction_reads_past_the_map(directions: list[list[float]]) -> None:
+    found = ask(pack_environment(np.ones((2, 4, 3), np.float32)), np.array(directions))
+    np.testing.assert_allclose(found.color, 1)
+    np.testing.assert_allclose(found.density, 1 / (4 * np.pi), rtol=1e-5)
+
+
+@pytest.mark.parametrize("pixels", [a_map(), spots(), a_map(1), a_map(5), np.ones((8, 16, 3), np.float32)])
+def test_the_density_is_one_over_the_sphere(pixels: npt.NDArray[np.float32]) -> None:
+    """By midpoints of parts of cells, which are exact for steps."""
+    packed = pack_environment(pixels)
+    rows, columns = 3 * packed.rows, 3 * packed.columns
+    across, below = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+    found = ask(packed, toward(across, below).reshape(-1, 3)).density.reshape(rows, columns).astype(float)
+    borders = np.cos(np.pi * np.arange(rows + 1) / rows)
+    area = (borders[:-1] - borders[1:])[:, None] * 2 * np.pi / columns
+    assert (found * area).sum() == pytest.approx(1, abs=2e-6)
+
+
+@every_variant
+def test_samples_follow_the_density(precision: Precision, lanes: int) -> None:
+    """Chi-square over quarters of cells: the choice of a cell, and the even spread within it."""
+    packed = pack_environment(a_map(8))
+    numbers = np.random.default_rng(11).random((400_000, 2))
+    found = ask(packed, None, numbers, precision=precision, lanes=lanes)
+    np.testing.assert_allclose(np.linalg.norm(found.sample, axis=1), 1, atol=1e-6)
+    across, below = place(found.sample.astype(float))
+    density, area = cells(packed)
+    borders = np.cos(np.pi * np.arange(packed.rows + 1) / packed.rows)
+    row = np.minimum((below * packed.rows).astype(int), packed.rows - 1)
+    upper = found.sample[:, 2] > (borders[row] + borders[row + 1]) / 2
+    column = np.minimum((across * 2 * packed.columns).astype(int), 2 * packed.columns - 1)
+    counts = np.bincount(
+        (2 * row + upper) * 2 * packed.columns + column, minlength=4 * packed.rows * packed.columns
+    )
+    expected = np.repeat(np.repeat(density * area / 4, 2, axis=0), 2, axis=1).reshape(-1) * len(numbers)
+    enough = expected > 8
+    assert expected[enough].sum() > 0.99 * len(numbers)
+    chi = ((counts[enough] - expected[enough]) ** 2 / expected[enough]).sum()
+    assert stats.chi2.sf(chi, enough.sum() - 1) > 1e-4
+    assert stats.chi2.sf(chi, enough.sum() - 1) < 1 - 1e-4
+
+
+@every_variant
+def test_a_sample_knows_its_density(precision: Precision, lanes: int) -> None:
+    packed = pack_environment(a_map())
+    settings = Environment(name="any", rotation=200.0)
+    numbers = np.random.default_rng(2).random((20_000, 2))
+    numbers[:4] = [[0, 0], [1 - 1e-9, 1 - 1e-9], [0, 1 - 1e-9], [1 - 1e-9, 0]]
+    options: dict[str, Any] = {"settings": settings, "precision": precision, "lanes": lanes}
+    found = ask(packed, None, numbers, **options)
+    assert (found.sample_density > 0).all()
+    assert np.isfinite(found.sample).all()
+    again = ask(packed, found.sample, None, **options)
+    # Rounding may carry one at a border into the next cell.
+    assert (again.density == found.sample_density).mean() > 0.999
+
+
+@pytest.mark.parametrize("rotation", [0.0, 77.0])
+def test_light_is_found_by_samples(rotation: float) -> None:
+    """The mean of light over density is the integral, and importance makes it less noisy than chance."""
+    pixels = a_map()
+    packed, settings = pack_environment(pixels), Environment(name="any", rotation=rotation)
+    count = 100_000
+    chosen = ask(packed, None, np.random.default_rng(5).random((count, 2)), settings=settings)
+    light = ask(packed, chosen.sample, settings=settings).color @ LUMINANCE
+    weights = light / chosen.sample_density
+    directions = random_directions(count, 6)
+    uniform = ask(packed, directions, settings=settings).color @ LUMINANCE * 4 * np.pi
+    across, below = np.meshgrid((np.arange(640) + 0.5) / 640, (np.arange(320) + 0.5) / 320)
+    area = np.cos((0.5 - below) * np.pi).reshape(-1) * (np.pi / 320) * (2 * np.pi / 640)
+    exact = (blended(pixels.astype(float), across.reshape(-1), below.reshape(-1)) @ LUMINANCE * area).sum()
+    assert abs(weights.mean() - exact) < 4.5 * weights.std() / math.sqrt(count) + 1e-3 * exact
+    assert weights.std() < 0.4 * uniform.std()
+
+
+@pytest.mark.parametrize("pixels", [spots(), a_map(), spots(700)], ids=["spots", "random", "reduced"])
+def test_where_light_is_there_is_density(pixels: npt.NDArray[np.float32]) -> None:
+    """Else its weight would be infinite; and no weight is much above the whole light."""
+    packed = pack_environment(pixels)
+    rows, columns = np.nonzero(pixels.sum(axis=-1))
+    source = np.random.default_rng(8)
+    height, width, _ = pixels.shape
+    # Around the pixels that shine, out to where their light ends.
+    picked = source.integers(0, len(rows), 50_000)
+    across = (columns[picked] + 0.5 + source.uniform(-1.1, 1.1, len(picked))) / width % 1
+    below = np.clip((rows[picked] + 0.5 + source.uniform(-1.1, 1.1, len(picked))) / height, 1e-6, 1 - 1e-6)
+    found = ask(packed, toward(across, below))
+    light = found.color @ LUMINANCE
+    assert (light > 0).mean() > 0.5
+    seen = light > 1e-5 * light.max()
+    assert (found.density[seen] > 0).all()
+    density, area = cells(packed)
+    whole = (density * area).sum()
+    assert whole == pytest.approx(1, abs=1e-5)
+    total = (pixels @ LUMINANCE * np.sin(np.pi * (np.arange(height) + 0.5) / height)[:, None]).sum()
+    total *= 2 * np.pi**2 / (height * width)
+    assert (light[seen] / found.density[seen]).max() < 40 * total
+
+
+def test_an_environment_of_no_light_is_chosen_evenly() -> None:
+    found = ask(
+        pack_environment(np.zeros((4, 8, 3), np.float32)),
+        random_directions(100, 3),
+        np.random.default_rng(1).random((100, 2)),
+    )
+    np.testing.assert_allclose(found.density, 1 / (4 * np.pi), rtol=1e-6)
+    np.testing.assert_allclose(found.sample_density, 1 / (4 * np.pi), rtol=1e-6)
+    assert not found.color.any()
+
+
+def test_large_maps_have_small_tables() -> None:
+    pixels = np.full((COLUMNS // 2 + 10, COLUMNS + 20, 3), 0.5, np.float32)
+    packed = pack_environment(pixels)
+    assert (packed.columns, packed.rows) == (COLUMNS, ROWS)
+    assert packed.data.size - pixels.size < 3 * COLUMNS * ROWS
+    density, _ = cells(packed)
+    np.testing.assert_allclose(density, 1 / (4 * np.pi), rtol=1e-5)
+
+
+def test_means_and_maxima_of_cells() -> None:
+    """Cells that do not fit the pixels, compared with a fine sum over the blended light."""
+    from clfractal.render import environment
+
+    pixels = a_map(9)
+    mean_bounds = (0.999, 1.02)
+    rows, columns, finer = 7, 11, 60
+    across = (np.arange(columns * finer) + 0.5) / (columns * finer)
+    below = (np.arange(rows * finer) + 0.5) / (rows * finer)
+    grid = np.meshgrid(across, below)
+    light = blended(pixels.astype(float), grid[0].reshape(-1), grid[1].reshape(-1)) @ LUMINANCE
+    fine = light.reshape(rows, finer, columns, finer)
+    expected = np.sqrt(fine.mean(axis=(1, 3)) * fine.max(axis=(1, 3)))
+    found = environment._brightness(pixels, columns, rows)
+    ratio = found / expected
+    assert ratio.min() > mean_bounds[0]
+    assert np.median(ratio) < mean_bounds[1]
+    assert ratio.max() < 1.6
