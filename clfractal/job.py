@@ -40,6 +40,8 @@ class Job:
         """The scene as plain data, with what was decided in the place of what was wished."""
         plain = self.scene.resolved()
         plain["renderer"] |= {"samples": self.plan.samples, "precision": self.plan.precision}
+        if plain["renderer"]["min_samples"] is not None:
+            plain["renderer"]["min_samples"] = min(plain["renderer"]["min_samples"], self.plan.samples)
         if (plain["renderer"]["min_samples"] or 0) > self.plan.samples:
             plain["renderer"]["min_samples"] = None  # the same, and a scene that loads
         plain["output"]["channels"] = list(self.plan.channels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -12,6 +13,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.files.channels import check_channels
 from clfractal.render.tiles import Region
 from clfractal.render.view import View, camera_view
+from clfractal.scene.checks import used_bounds
 from clfractal.scene.model import Scene
 
 PrecisionChoice = Literal["auto", "float32", "float64"]
@@ -19,6 +21,9 @@ PrecisionChoice = Literal["auto", "float32", "float64"]
 # float32 is given up where a pixel is less than this many of its steps wide: distances are differences of coordinates,
 # and hits, normals and shadow starts work at fractions of a pixel.
 FLOAT32_STEPS_PER_PIXEL = 64.0
+# Normals that are made from the places of a pixel's points want these this much finer: a place that is off by a 512th of
+# the way to the next turns the normal by a tenth of a degree.
+PLACES_PER_POINT = 8.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,10 +47,8 @@ class Plan:
 
 def finest_steps(scene: Scene, view: View) -> float:
     """Width of the narrowest pixel footprint that the picture may show, in float32 steps of the coordinates there."""
-    chain = scene.chain
-    bounds = scene.renderer.bounds
-    center = np.array(bounds.center if bounds else chain.center)
-    radius = bounds.radius if bounds else chain.radius
+    found, radius = used_bounds(scene)
+    center = np.array(found)
     footprint = view.pixel_size(scene.image.height)
     if view.eye is not None:
         plane = float((view.center - view.eye) @ view.axis)
@@ -53,7 +56,12 @@ def finest_steps(scene: Scene, view: View) -> float:
         nearest = float(np.linalg.norm(center - view.eye)) - radius
         footprint *= min(nearest, plane) / plane if nearest > 0 else 1.0
     magnitude = max(float(np.abs(view.center).max()), float(np.abs(view.origin).max()), 1e-30)
-    return scene.renderer.detail * footprint / (magnitude * float(np.finfo(np.float32).eps))
+    renderer = scene.renderer
+    # The points of a pixel lie closer, and normals that are made from their places need them exact.
+    footprint /= math.sqrt(renderer.used_points.count)
+    if renderer.normal != "gradient" or scene.coloring.by == "residual":
+        footprint /= PLACES_PER_POINT
+    return renderer.detail * footprint / (magnitude * float(np.finfo(np.float32).eps))
 
 
 def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool) -> tuple[Precision, str]:
