@@ -1,0 +1,138 @@
+"""Makes the small pictures of docs/*.md that show what a setting does, from the table docs/pictures.yaml.
+
+    python docs/make_pictures.py                every picture (minutes)
+    python docs/make_pictures.py light_rays     one of them
+
+A picture is a row of panels (or several rows of them). Each panel is one scene of the table with some values replaced,
+rendered at the panel's size; between panels the picture is transparent. Nothing is random: the same program on the
+same device makes the same files.
+
+Keys of the table:
+
+    scenes      name: a whole scene
+    pictures    name: a picture, which becomes docs/pictures/NAME.png
+      page      the page of docs/ that shows it
+      scene     a name of `scenes`
+      set       dotted key: value, replaced in every panel
+      panels    one mapping of dotted keys to values for each panel
+      columns   panels in a row; all of them if not given
+      size      width and height of a panel, pixels
+      zoom      each pixel of a panel is shown as a square of so many; 1 if not given
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+from PIL import Image
+
+from clfractal.api import load_scene, render
+from clfractal.render.outputs import png_bytes
+from clfractal.scene.model import Scene
+
+DOCS = Path(__file__).resolve().parent
+TABLE = DOCS / "pictures.yaml"
+PICTURES = DOCS / "pictures"
+GAP = 6  # pixels between panels
+LARGEST_FILE = 300_000  # bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """One row of the table: its scenes, from left to right and from top to bottom, all of one size."""
+
+    name: str
+    page: str
+    panels: tuple[Scene, ...]
+    columns: int
+    zoom: int
+
+    @property
+    def panel_size(self) -> tuple[int, int]:
+        """Width and height of a panel, pixels of the picture."""
+        image = self.panels[0].image
+        return image.width * self.zoom, image.height * self.zoom
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture, pixels."""
+        width, height = self.panel_size
+        rows = -(-len(self.panels) // self.columns)
+        return self.columns * (width + GAP) - GAP, rows * (height + GAP) - GAP
+
+    @property
+    def path(self) -> Path:
+        """Where the picture lies."""
+        return PICTURES / f"{self.name}.png"
+
+
+def table() -> tuple[Picture, ...]:
+    """Every picture of the table, its scenes loaded and checked."""
+    data = yaml.safe_load(TABLE.read_text("utf-8"))
+    return tuple(_picture(name, row, data["scenes"]) for name, row in data["pictures"].items())
+
+
+def _picture(name: str, row: Mapping[str, Any], scenes: Mapping[str, Any]) -> Picture:
+    unknown = set(row) - {"page", "scene", "set", "panels", "columns", "size", "zoom"}
+    if unknown:
+        raise ValueError(f"{TABLE.name}: {name}: unknown keys {sorted(unknown)}")
+    zoom = row.get("zoom", 1)
+    width, height = row["size"]
+    if width % zoom or height % zoom:
+        raise ValueError(f"{TABLE.name}: {name}: size {width} x {height} is no multiple of zoom {zoom}")
+    for_all = {**row.get("set", {}), "image.width": width // zoom, "image.height": height // zoom}
+    panels = tuple(_scene(scenes[row["scene"]], {**for_all, **panel}) for panel in row["panels"])
+    return Picture(name, row["page"], panels, row.get("columns", len(panels)), zoom)
+
+
+def _scene(base: Mapping[str, Any], values: Mapping[str, Any]) -> Scene:
+    # JSON is YAML, and has no line breaks or bare words that the shell form of a value could trip over.
+    return load_scene(base, overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()])
+
+
+def make_picture(picture: Picture) -> None:
+    """Renders the panels of a picture and writes it.
+
+    Raises:
+        ValueError: the file is larger than LARGEST_FILE; it stays, to be looked at.
+    """
+    width, height = picture.panel_size
+    whole = Image.new("RGBA", picture.size)
+    seconds = 0.0
+    for index, scene in enumerate(picture.panels):
+        film = render(scene, channels=["R", "G", "B", "A"])
+        seconds += film.header["seconds"]
+        with Image.open(io.BytesIO(png_bytes(film))) as panel:
+            shown = panel.convert("RGBA").resize((width, height), Image.Resampling.NEAREST)
+        row, column = divmod(index, picture.columns)
+        whole.paste(shown, (column * (width + GAP), row * (height + GAP)))
+    whole.save(picture.path, optimize=True)
+    size = picture.path.stat().st_size
+    print(f"{picture.path.name}: {size // 1000} kB, {seconds:.1f} s", flush=True)
+    if size > LARGEST_FILE:
+        raise ValueError(
+            f"{picture.path.name} is larger than {LARGEST_FILE // 1000} kB: make its panels smaller"
+        )
+
+
+def main(names: Sequence[str]) -> None:
+    """Makes the named pictures, or all."""
+    PICTURES.mkdir(exist_ok=True)
+    pictures = table()
+    unknown = set(names) - {picture.name for picture in pictures}
+    if unknown:
+        raise SystemExit(f"{TABLE.name} has no {', '.join(sorted(unknown))}")
+    for picture in pictures:
+        if picture.name in names or not names:
+            make_picture(picture)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
