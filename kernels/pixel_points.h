@@ -66,13 +66,13 @@ INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, re
     point_offset(point_of_turn(turn), p->seed, &p->across, &p->below);
     ray r = camera_ray(x + p->across, y + p->below, lens_x, lens_y, w.view);
 #if SEARCH == SEARCH_STEPS
-    r.near = p->touch_t;
+    r.known = p->touch_t;
 #else
     r.near = fmax(p->touch_t - p->touch_cone, R(0.0));
+    r.known = p->known;
 #endif
     r.footprint *= (real)(w.settings->point_share);
     r.spread *= (real)(w.settings->point_share);
-    r.known = p->known;
     return r;
 }
 
