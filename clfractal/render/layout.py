@@ -223,6 +223,7 @@ def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
     width = renderer.filter_width
     largest = float(np.finfo(np.float32).max) / 16
+    limit = renderer.firefly_limit if renderer.firefly_limit is not None else largest
     values = {
         "bounds_center": center,
         "bounds_radius": radius,
@@ -250,7 +251,7 @@ def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
         "ambient_far": distance if not rays.lit else largest,
         "occlusion_distance": distance,
         "occlusion_share": 1 / rays.cosine if occlusion is not None else 0.0,
-        "firefly_limit": renderer.firefly_limit if renderer.firefly_limit is not None else largest,
+        "firefly_limit": min(limit * 2.0**-scene.output.exposure, largest),
     }
     return MARCH.value(precision, values)
 
@@ -315,7 +316,7 @@ def material_record(
         "reflection": material.reflection,
         "fog_color": fog.color if fog else (0.0, 0.0, 0.0),
         "fog_density": fog.density if fog else 0.0,
-        "fog_background": int(fog is not None and fog.background),
+        "fog_background": int(fog is not None and fog.background and fog.density > 0),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),
         **material_fields(scene.environment, environment),

@@ -101,7 +101,7 @@ class SurfaceRenderer(Section):
     )
     firefly_limit: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
         10.0,
-        description="most light that one sample's mirror or environment rays may bring; no limit if null",
+        description="most light that one sample's mirror or environment rays may bring, after exposure; no limit if null",
     )
     seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of samples, points and rays")
     precision: Literal["auto", "float32", "float64"] = Field(
