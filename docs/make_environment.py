@@ -4,7 +4,7 @@
     python docs/make_environment.py dusk     one
 
 Each is a function of direction (z up, y ahead, x to the right), evaluated on a finer grid and averaged. Light is
-linear Rec. 709; white paper shines with 0.3 (dusk) to 1 under a map. The brightest spots are kept large and mild, so
+linear Rec. 709; white paper shines with 0.2 (dusk) to 1 under a map. The brightest spots are kept large and mild, so
 that few rays find them.
 """
 
@@ -151,7 +151,7 @@ def sunlight(view: Array, *, disc: bool) -> Array:
     glow = 5.5 * np.exp(-angle / 3.2) + 1.1 * np.exp(-angle / 12)
     light = glow[..., None] * rgb(1.0, 0.55, 0.20)
     if disc:
-        light = light + 60 * smooth(2.5, 1.9, angle)[..., None] * rgb(1.0, 0.70, 0.36)
+        light = light + 100 * smooth(2.5, 1.9, angle)[..., None] * rgb(1.0, 0.70, 0.36)
     return light
 
 
@@ -218,7 +218,7 @@ def dusk(view: Array) -> Array:
     # Schlick's approximation of the reflectance of water, raised for a lake that is more than a black hole.
     share = 0.16 + 0.84 * (1 - depth) ** 5
     water = mixed(np.broadcast_to(rgb(0.016, 0.034, 0.062), view.shape), mirrored, share)
-    return 2.0 * mixed(land, water, smooth(0.003, -0.003, view[..., 2]))
+    return 1.2 * mixed(land, water, smooth(0.003, -0.003, view[..., 2]))
 
 
 def overcast(view: Array) -> Array:

@@ -63,6 +63,11 @@ __kernel void environment(__global const scalar *in, __global scalar *out, __glo
 _DEFINES = {"LIGHT_DIRECTIONAL": 0, "PALETTE_SIZE": 256, "COLORING_NORMAL": 1, "COLORING_ITERATIONS": 2}
 
 
+def settings_of(**values: Any) -> Environment:
+    """A scene's environment with these values; which map it names does not matter here."""
+    return Environment.model_validate({"name": "studio", **values})
+
+
 @cache
 def _program(device: Device, precision: Precision, lanes: int) -> Any:
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "COLORING": 0, **_DEFINES}
@@ -98,7 +103,7 @@ def ask(
         if columns is not None:
             planes[place, :given] = columns.T
     material = np.zeros((), layout.MATERIAL.dtype(precision))
-    for name, value in material_fields(settings or Environment(name="any"), packed).items():
+    for name, value in material_fields(settings or settings_of(), packed).items():
         material[name] = value
     device = choose()
     result = np.full((8, count), np.nan, precision)

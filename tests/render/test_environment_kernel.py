@@ -17,8 +17,7 @@ from scipy import stats
 from clfractal.device.select import choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.render.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment
-from clfractal.scene.lighting import Environment
-from tests.render.environment_kernel import ask
+from tests.render.environment_kernel import ask, settings_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -100,14 +99,14 @@ def test_which_way_is_where() -> None:
     directions = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1], [0, -1, 0], [-1, 0, 0], [0, 0, -1]], float)
     found = ask(pack_environment(pixels), directions).color
     expected = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0.5], [0, 0, 0], [0, 0, 0]]
-    np.testing.assert_allclose(found, expected, atol=1e-5)
+    np.testing.assert_allclose(found, np.array(expected), atol=1e-5)
 
 
 def test_the_map_turns_counterclockwise_seen_from_above() -> None:
     """By 90 degrees, what was ahead (+y) is on the left (-x)."""
     pixels = np.zeros((32, 64, 3), np.float32)
     pixels[12:20, 30:34] = 1
-    settings = Environment(name="any", rotation=90.0, intensity=2.0)
+    settings = settings_of(rotation=90.0, intensity=2.0)
     found = ask(
         pack_environment(pixels), np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0]], float), settings=settings
     )
@@ -117,7 +116,7 @@ def test_the_map_turns_counterclockwise_seen_from_above() -> None:
 @every_variant
 def test_light_is_blended_between_pixels(precision: Precision, lanes: int) -> None:
     pixels, directions = a_map(), random_directions(5000, 1)
-    settings = Environment(name="any", rotation=-37.5, intensity=1.7)
+    settings = settings_of(rotation=-37.5, intensity=1.7)
     found = ask(pack_environment(pixels), directions, settings=settings, precision=precision, lanes=lanes)
     expected = 1.7 * blended(pixels.astype(float), *place(directions, -37.5))
     # At a pole every longitude is right.
@@ -189,9 +188,10 @@ def test_samples_follow_the_density(precision: Precision, lanes: int) -> None:
 @every_variant
 def test_a_sample_knows_its_density(precision: Precision, lanes: int) -> None:
     packed = pack_environment(a_map())
-    settings = Environment(name="any", rotation=200.0)
+    settings = settings_of(rotation=200.0)
     numbers = np.random.default_rng(2).random((20_000, 2))
-    numbers[:4] = [[0, 0], [1 - 1e-9, 1 - 1e-9], [0, 1 - 1e-9], [1 - 1e-9, 0]]
+    last = 1 - 1e-9
+    numbers[:4] = np.array([[0, 0], [last, last], [0, last], [last, 0]])
     options: dict[str, Any] = {"settings": settings, "precision": precision, "lanes": lanes}
     found = ask(packed, None, numbers, **options)
     assert (found.sample_density > 0).all()
@@ -205,7 +205,7 @@ def test_a_sample_knows_its_density(precision: Precision, lanes: int) -> None:
 def test_light_is_found_by_samples(rotation: float) -> None:
     """The mean of light over density is the integral, and importance makes it less noisy than chance."""
     pixels = a_map()
-    packed, settings = pack_environment(pixels), Environment(name="any", rotation=rotation)
+    packed, settings = pack_environment(pixels), settings_of(rotation=rotation)
     count = 100_000
     chosen = ask(packed, None, np.random.default_rng(5).random((count, 2)), settings=settings)
     light = ask(packed, chosen.sample, settings=settings).color @ LUMINANCE
