@@ -43,6 +43,7 @@ def test_what_travels_in_the_wheel(wheel: Path) -> None:
         (ROOT / "kernels", "*.*", "clfractal/kernels"),
         (ROOT / "scenes", "*.yaml", "clfractal/scenes"),
         (ROOT / "clfractal" / "formulas" / "library", "*.yaml", "clfractal/formulas/library"),
+        (ROOT / "clfractal" / "environments", "*.exr", "clfractal/environments"),
         (ROOT / "clfractal", "*.py", "clfractal"),
     ):
         files = {f"{inside}/{path.relative_to(place)}" for path in place.rglob(pattern) if path.is_file()}
