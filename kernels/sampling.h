@@ -213,35 +213,3 @@ INLINE vec hemisphere_direction(vec normal, real u, real v) {
     unit_disk(u, v, &x, &y);
     return in_frame(normal, x, y, sqrt(fmax(R(1.0) - x * x - y * y, R(0.0))));
 }
-
-// A Hammersley set (Niederreiter 1992, ch. 3), turned by a random amount from pixel to pixel (Cranley and Patterson 1976).
-INLINE uint hash(uint a) {
-    a ^= a >> 16;
-    a *= 0x85ebca6bu;
-    a ^= a >> 13;
-    a *= 0xc2b2ae35u;
-    return a ^ (a >> 16);
-}
-
-INLINE uint reverse_bits(uint a) {
-    a = (a << 16) | (a >> 16);
-    a = ((a & 0x00ff00ffu) << 8) | ((a >> 8) & 0x00ff00ffu);
-    a = ((a & 0x0f0f0f0fu) << 4) | ((a >> 4) & 0x0f0f0f0fu);
-    a = ((a & 0x33333333u) << 2) | ((a >> 2) & 0x33333333u);
-    return ((a & 0x55555555u) << 1) | ((a >> 1) & 0x55555555u);
-}
-
-// Offset of a sample from the pixel's top left corner, in pixels, both in [0, 1). One sample lies at the centre.
-INLINE void sample_offset(int x, int y, int sample, int samples, uint seed, scalar *across, scalar *below) {
-    if (samples == 1) {
-        *across = S(0.5);
-        *below = S(0.5);
-        return;
-    }
-    const uint turn = hash((uint)x + hash((uint)y + hash(seed)));
-    const float unit = 1.0f / 16777216.0f;
-    const float u = ((float)sample + 0.5f) / (float)samples + (float)(turn >> 8) * unit;
-    const float v = (float)(reverse_bits((uint)sample) >> 8) * unit + (float)(hash(turn) >> 8) * unit;
-    *across = (scalar)(u - floor(u));
-    *below = (scalar)(v - floor(v));
-}

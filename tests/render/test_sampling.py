@@ -13,6 +13,7 @@ from clfractal.device.select import choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from tests.render.sampler import Array, Sampler
+from tests.render.sequence import truth
 
 EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 DIGITS = {"float32": 23, "float64": 31}
@@ -46,49 +47,6 @@ def grid_of_pixels(side: int) -> tuple[Array, Array]:
 
 
 # The sequence.
-
-
-def hashed(a: Array) -> Array:
-    for shift, factor in ((16, 0x85EBCA6B), (13, 0xC2B2AE35), (16, 1)):
-        a = (a ^ (a >> shift)) * factor % 2**32
-    return a
-
-
-def mirrored(a: Array) -> Array:
-    return np.array([int(f"{int(one):032b}"[::-1], 2) for one in a], np.uint64)
-
-
-def scrambled(a: Array, seed: Array) -> Array:
-    """Digits of a, highest first, each flipped by a function of those before it."""
-    a = mirrored(a)
-    a = ((a ^ (a * 0x3D20ADEA)) + seed) % 2**32 * (seed >> 16 | 1) % 2**32
-    a = (a ^ (a * 0x05526C56)) % 2**32
-    return mirrored((a ^ (a * 0x53A22864)) % 2**32)
-
-
-def sobol(index: Array) -> Array:
-    """Sobol's second dimension: digit i is the sum of the index's bits j, each times binomial(j, i)."""
-    result = np.zeros_like(index)
-    for i in range(32):
-        for j in range(i, 32):
-            if math.comb(j, i) % 2:
-                result ^= (index >> j & 1) << (31 - i)
-    return result
-
-
-def truth(x: Array, y: Array, index: Array, seed: int, purpose: int) -> tuple[Array, Array, Array]:
-    """The two numbers of 32 digits, and the pixel's seed."""
-    x, y, index = (a.astype(np.uint64) for a in (x, y, index))
-    golden = 0x9E3779B9
-    key = hashed((np.uint64(seed) + hashed(np.array([(purpose + golden) % 2**32], np.uint64))) % 2**32)
-    other = hashed(2**32 - 1 - key)
-    pixel = hashed((hashed((x + key) % 2**32) + hashed((y + other) % 2**32)) % 2**32)
-    place = scrambled(index, hashed(pixel))
-    return (
-        scrambled(mirrored(place), hashed((pixel + golden) % 2**32)),
-        scrambled(sobol(place), hashed((pixel + 2 * golden) % 2**32)),
-        pixel,
-    )
 
 
 @pytest.mark.parametrize(("seed", "purpose"), [(0, 0), (1, 5), (2**32 - 1, 70)])

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.scene.model import Scene
+from tests.render.sequence import unit_squares
 from tests.render.shots import (
     BALL_RADIUS,
     CHANNELS,
@@ -83,14 +84,20 @@ def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None
         ],
         axis=0,
     )
-    rim = (fine > 0) & (fine < 1)
+    pixel = 2.6 / 48
+    _, middle = to_sphere(*rays(scene)[:2], (0, 0, 0), BALL_RADIUS)
+    rim = np.abs(middle - BALL_RADIUS) < 0.75 * pixel  # half a pixel's diagonal, and the hit distance
     assert np.array_equal(coverage[~rim], fine[~rim])
     assert rim.sum() > 100
+    # Ray by ray: only those that pass the ball within two hit distances may hit or not.
+    _, passing = to_sphere(*sample_rays(scene, *sample_places(48, 48, samples, 0)), (0, 0, 0), BALL_RADIUS)
+    fewest, most = ((passing < BALL_RADIUS + reach).mean(axis=-1) for reach in (-1e-5, 0.02 * pixel + 1e-5))
+    assert (coverage >= fewest).all()
+    assert (coverage <= most).all()
     error = (coverage - fine)[rim]
     independent = np.sqrt((fine * (1 - fine))[rim].mean() / samples)
     assert np.sqrt((error**2).mean()) < 0.5 * independent
     # All of it; a ray that passes the ball within two hit distances may hit it too.
-    pixel = 2.6 / 48
     least, most = (np.pi * (BALL_RADIUS + 2 * detail * pixel) ** 2 for detail in (0, 0.01))
     assert 0.9995 * least < coverage.sum() * pixel**2 < 1.0005 * most
 
@@ -134,10 +141,8 @@ def test_samples_are_stratified() -> None:
     """The places that the device is compared with: one sample in each of N strips, in both directions."""
     for samples in (4, 16, 64):
         for place in sample_places(8, 8, samples, 3):
-            # The random turn moves all strips alike, so that they are as wide again.
-            ordered = np.sort(place, axis=-1)
-            gaps = np.diff(np.concatenate([ordered, ordered[..., :1] + 1], axis=-1), axis=-1)
-            np.testing.assert_allclose(gaps, 1 / samples, atol=1e-6)
+            strips = np.sort(np.floor(place * samples), axis=-1)
+            np.testing.assert_array_equal(strips, np.broadcast_to(np.arange(samples), strips.shape))
 
 
 def test_seed_and_region_of_samples(device: Device) -> None:
@@ -151,22 +156,12 @@ def test_seed_and_region_of_samples(device: Device) -> None:
 
 
 def sample_places(width: int, height: int, samples: int, seed: int) -> tuple[Floats, Floats]:
-    """Places of the samples in their pixels, from the left and from the top, shape (height, width, samples): a Hammersley
-    set turned by a hash of the pixel's place."""
-    x = np.arange(width, dtype=np.uint32)[None, :]
-    y = np.arange(height, dtype=np.uint32)[:, None]
-    turn = murmur_finish(x + murmur_finish(y + murmur_finish(np.array([seed], np.uint32))))
-    number = np.arange(samples)
-    reversed_bits = np.array([int(f"{n:032b}"[::-1], 2) / 2**32 for n in number])
-    across = (number + 0.5) / samples + (turn[..., None] >> 8) / 2**24
-    below = reversed_bits + (murmur_finish(turn)[..., None] >> 8) / 2**24
-    return across % 1, below % 1
+    """Places of the samples in their pixels, from the left and from the top, shape (height, width, samples): a box filter
+    of one pixel leaves the points of the unit square as they are."""
+    return unit_squares(width, height, samples, seed)
 
 
-def murmur_finish(a: npt.NDArray[np.uint32]) -> npt.NDArray[np.uint32]:
-    """The finaliser of MurmurHash3."""
-    a = a ^ (a >> np.uint32(16))
-    a = a * np.uint32(0x85EBCA6B)
-    a = a ^ (a >> np.uint32(13))
-    a = a * np.uint32(0xC2B2AE35)
-    return a ^ (a >> np.uint32(16))
+def sample_rays(scene: Scene, across: Floats, below: Floats) -> tuple[Floats, Floats]:
+    """Origins and directions of the rays at places of each pixel, shape (height, width, samples, 3)."""
+    shot = [rays(scene, across[..., n], below[..., n])[:2] for n in range(across.shape[-1])]
+    return np.stack([origin for origin, _ in shot], axis=2), np.stack([way for _, way in shot], axis=2)
