@@ -145,7 +145,12 @@ class SurfaceWorker:
         records = self._records()
         film_bytes = capacity * len(plan.channels) * TILE_PIXELS * 4
         statistic_bytes = capacity * self.packets * 16
-        device.check_memory(2 * (film_bytes + statistic_bytes), "rendering", largest=film_bytes)
+        constant_bytes = [record.nbytes for record in records]
+        device.check_memory(
+            2 * (film_bytes + statistic_bytes) + sum(constant_bytes),
+            "rendering",
+            largest=max(film_bytes, *constant_bytes),
+        )
         text = program_text(scene, plan)
         self.program = program.build(
             device,
@@ -250,7 +255,8 @@ class SurfaceWorker:
     def _warm(self, records: list[npt.NDArray[Any]]) -> Warm:
         """A first launch that renders nothing: with a view of zeros the region is empty."""
         sizes = [TILE_PIXELS * 4 * len(self.plan.channels), self.packets * 16, 8]
-        sizes += [max(record.nbytes, 16) for record in records]
+        # Of a large environment map a part is enough.
+        sizes += [min(max(record.nbytes, 16), 65_536) for record in records]
         arguments = [Argument("buffer", size) for size in sizes]
         arguments += [Argument("scalar", dtype="int32", value=0.0)] * 2
         return Warm("surface", (self.packets, 1), (self.group, 1), tuple(arguments))
