@@ -99,7 +99,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
 #endif
                 if (light->shadow == 0) active = active & ~active;
             }
-            active &= less(R(0.0), vec_dot(here.normal, in.toward));
+            active &= faces(&here, in.toward);
             // Leave the surface far enough for the ray not to meet the very bump it starts from.
             leg.origin = vec_along(here.point, here.cone * (real)(w.settings->shadow_lift), here.normal);
             leg.direction = in.toward;

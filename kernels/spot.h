@@ -79,6 +79,15 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
     *smooth = smooth_count(there, surface, w.orbit);
 }
 
+// Whether any normal of the spot looks that way. (Were it the mean alone, a rough spot's other normals would go without shadow.)
+INLINE mask faces(const spot *s, vec direction) {
+    mask any_normal = less(R(1.0), R(0.0));
+    for (int i = 0; i < NORMAL_COUNT; ++i) {
+        any_normal |= less(R(0.0), s->weights[i]) & less(R(0.0), vec_dot(s->normals[i], direction));
+    }
+    return any_normal;
+}
+
 // What one light ray adds, for every normal of the spot.
 INLINE color lit_by(const spot *s, incidence in, mask lit, real open, vec to_viewer, __constant const struct Light *light,
                     __constant const struct Material *material) {
