@@ -1,0 +1,24 @@
+"""Compiling the programs of several scenes at once: compilers run in child processes, one on every core."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.render.surface import SurfaceWorker
+from clfractal.scene.model import Scene
+from tests.render.shots import plan_of
+
+
+def compile_all(scenes: Iterable[Scene], device: Device, precision: Precision = "float32") -> None:
+    """Leaves the programs of the scenes in the cache, from where later renders take them."""
+
+    def compile_one(scene: Scene) -> None:
+        SurfaceWorker(scene, plan_of(scene, device, precision), device, capacity=1)
+
+    plan_of(next(iter(scenes := list(scenes))), device, precision)  # measures the lanes, once
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(compile_one, scenes))

@@ -1,0 +1,288 @@
+"""The two searches for the surface, `distance` and `steps`, against each other and against the boundary of the inside test.
+
+Few iterations make solids that are hardly anywhere thinner than a step. What is, `steps` may miss; so may it miss what a
+ray's cone touches but the ray does not meet. Each such pixel has to be explained with the inside test in NumPy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device, has_float64
+from clfractal.device.structs import Precision
+from clfractal.formulas.backends import NumpyBackend
+from clfractal.formulas.catalog import names
+from clfractal.formulas.evaluate import evaluate
+from clfractal.formulas.language import Chain
+from clfractal.formulas.reference import apply, constant_of, space_to_state
+from clfractal.render.film import Film
+from clfractal.scene.checks import used_bounds
+from clfractal.scene.model import Scene
+from tests.render.programs import compile_all
+from tests.render.shots import (
+    BALL,
+    BALL_RADIUS,
+    ORTHOGRAPHIC,
+    Floats,
+    normals_of,
+    points_of,
+    rays,
+    scene_of,
+    shoot,
+    stacked,
+    to_sphere,
+)
+
+Bools = npt.NDArray[np.bool_]
+
+SIDE = 32
+CHANNELS = ("A", "Z", "P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z", "iterations", "steps")
+# The hit distance in footprints. Distances are too small by a factor of some 2 to 4, and along a ray that grazes the surface
+# a small one is long: a twentieth of a footprint brings both searches within a footprint nearly everywhere.
+DETAIL = 0.05
+# High degrees and large scales make thin parts at few iterations already; few iterations of the Mandelbox fill its bounds.
+ITERATIONS = {
+    "mandelbulb": 3,
+    "mengerbulb": 3,
+    "sierpinski_tetrahedron": 3,
+    "vicsek_cross": 3,
+    "mandelbox": 8,
+}
+USUAL_ITERATIONS = 4
+EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
+
+
+def scene_for(name: str, search: str, step: float | None = None) -> Scene:
+    """A formula of the library from the side, in the middle of the picture."""
+    formula = {"name": name, "iterations": ITERATIONS.get(name, USUAL_ITERATIONS)}
+    bounds = used_bounds(scene_of(formula, ORTHOGRAPHIC))
+    center, radius = np.array(bounds[0]), bounds[1]
+    camera = {
+        "position": (center + radius * np.array([1.1, -2.1, 1.3])).tolist(),
+        "target": center.tolist(),
+        "fov": 40,
+    }
+    renderer: dict[str, Any] = {"search": search, "detail": DETAIL}
+    if step is not None:
+        renderer["step"] = step * radius
+    # Coloured as most scenes of the library are, whose programs have the same text.
+    return scene_of(
+        formula, camera, (SIDE, SIDE), lights=[], coloring={"by": "iterations"}, renderer=renderer
+    )
+
+
+@dataclass(frozen=True)
+class Found:
+    """What one search finds along the rays through the pixels' middles; arrays of shape (SIDE, SIDE)."""
+
+    scene: Scene
+    film: Film
+    origin: Floats
+    direction: Floats
+    footprint: Floats  # at the point found
+    hit: Bools
+    t: Floats
+    normals: Floats
+
+    @property
+    def step(self) -> float:
+        """Of the search by steps, scene units."""
+        radius = used_bounds(self.scene)[1]
+        return self.scene.renderer.step or radius / 100
+
+    def along(self, t: Floats, chosen: Bools) -> Floats:
+        """Points of the chosen rays at distances t, shape (n,) or (n, m)."""
+        distance = t[..., None]
+        origin, way = self.origin[chosen], self.direction[chosen]
+        if t.ndim == 2:
+            origin, way = origin[:, None], way[:, None]
+        result: Floats = origin + distance * way
+        return result
+
+
+def found_by(device: Device, scene: Scene, precision: Precision = "float32") -> Found:
+    film = shoot(scene, device, precision, channels=CHANNELS)
+    origin, direction, spread = rays(scene)
+    t = ((points_of(film) - origin) * direction).sum(-1)
+    return Found(scene, film, origin, direction, spread * t, film["A"] > 0, t, normals_of(film))
+
+
+@lru_cache
+def both(device: Device, name: str) -> tuple[Found, Found]:
+    """By distance and by steps."""
+    scenes = [scene_for(name, search) for search in ("distance", "steps")]
+    compile_all(scenes, device)
+    return found_by(device, scenes[0]), found_by(device, scenes[1])
+
+
+@pytest.mark.parametrize("name", names())
+def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
+    """Where steps hits, distance hits too. Depths agree to a footprint and a step, or else distance has stopped earlier: within
+    a footprint of the solid, of which that ray crosses no part that is longer than a step."""
+    near, far = both(device, name)
+    assert far.hit.sum() > 0.08 * far.hit.size
+    assert np.isfinite(stacked(near.film, CHANNELS[2:])).all()
+    assert np.isfinite(stacked(far.film, CHANNELS[2:])).all()
+    assert not (far.hit & ~near.hit).any()
+
+    shared = far.hit & near.hit
+    apart = far.t - near.t
+    slack = near.footprint + far.step
+    # Nothing that a step would see is passed by distances.
+    assert (apart[shared] > -slack[shared]).all()
+    assert (apart < slack)[shared].mean() > 0.85
+    # What distance alone sees: thin, or beside the ray.
+    early = near.hit & (~far.hit | (apart > slack))
+    assert early.sum() <= 0.18 * near.hit.sum()
+    assert unexplained(near, early) == 0
+    assert longest_crossing(near, far, early) <= 1.05 * far.step
+
+
+@pytest.mark.parametrize("name", names())
+def test_steps_end_at_the_boundary(device: Device, name: str) -> None:
+    """The point found is the last one outside: bisecting the inside test from there on ends where it began, but for the
+    rounding of a number of float32 (of the point, and of an orbit of a few applications)."""
+    _, far = both(device, name)
+    check_boundary(far, "float32")
+
+
+@pytest.mark.parametrize("name", ["hast", "menger_sponge"])
+def test_steps_in_float64(device: Device, name: str) -> None:
+    """As precise as float32 channels tell: half of their last digit."""
+    if not has_float64(device.info):
+        return
+    exact = found_by(device, scene_for(name, "steps"), "float64")
+    check_boundary(exact, "float64")
+    _, usual = both(device, name)
+    assert (exact.hit != usual.hit).mean() < 0.01
+
+
+@pytest.mark.parametrize("step", [0.04, 0.002])
+@pytest.mark.parametrize("name", ["hast", "mandelbox", "sierpinski_tetrahedron"])
+def test_other_steps(device: Device, name: str, step: float) -> None:
+    """A finer step misses less and never finds anything farther away than a coarse one; its cost is in the channel."""
+    near, usual = both(device, name)
+    other = found_by(device, scene_for(name, "steps", step))
+    fine, coarse = (other, usual) if step < 0.01 else (usual, other)
+    both_hit = fine.hit & coarse.hit
+    assert (coarse.hit & ~fine.hit).sum() <= 0.002 * SIDE**2  # between two steps of the fine one, by chance
+    assert (fine.t[both_hit] < coarse.t[both_hit] + fine.step + 1e-5).mean() > 0.995
+    check_boundary(other, "float32")
+    shared = other.hit & near.hit
+    assert (other.t[shared] > near.t[shared] - near.footprint[shared] - other.step).all()
+    # Every ray that crosses the bounds takes its chord's steps, until it hits.
+    _, radius = used_bounds(other.scene)
+    missed = ~other.hit & (other.film["steps"] > 0)
+    first, nearest = to_sphere(other.origin, other.direction, used_bounds(other.scene)[0], radius)
+    chord = 2 * np.sqrt(np.maximum(radius**2 - nearest**2, 0))
+    np.testing.assert_allclose(
+        other.film["steps"][missed], np.floor(chord / other.step)[missed] + 1, rtol=1e-3, atol=1.01
+    )
+    assert (other.film["steps"][other.hit] <= ((other.t - first) / other.step)[other.hit] + 45).all()
+
+
+def test_steps_of_a_ball(device: Device) -> None:
+    """The closed form: what a ray meets, to the precision of float32, unless it passes through less than a step of it."""
+    scene = scene_of(BALL, ORTHOGRAPHIC, (SIDE, SIDE), renderer={"search": "steps"})
+    ball = found_by(device, scene)
+    distance, nearest = to_sphere(ball.origin, ball.direction, (0, 0, 0), BALL_RADIUS)
+    chord = 2 * np.sqrt(np.maximum(BALL_RADIUS**2 - nearest**2, 0))
+    assert not (ball.hit & (nearest > BALL_RADIUS + 1e-6)).any()
+    assert ball.hit[chord > ball.step * 1.001].all()
+    cosine = np.sqrt(1 - (nearest / BALL_RADIUS).clip(0, 1) ** 2)
+    error = np.abs(ball.t - distance)[ball.hit] * cosine[ball.hit]
+    assert error.max() < 8 * EPSILON["float32"]
+    # From within, the eye itself is the surface.
+    inner = {"position": [0.2, 0.1, 0], "target": [0.2, 0.4, 0.1]}
+    within = shoot(scene_of(BALL, inner, (SIDE, SIDE), renderer={"search": "steps"}), device)
+    assert (within["A"] == 1).all()
+    assert np.abs(within["Z"]).max() < 1e-6
+
+
+def check_boundary(found: Found, precision: Precision) -> None:
+    """Bisects the inside test in float64 around each point that steps ended at."""
+    hit = found.hit
+    iterations, chain = found.scene.formula.iterations, found.scene.chain
+    t = found.t[hit]
+    # The boundary is a surface: an error across it is longer along a ray that grazes it.
+    cosine = np.abs((found.normals * found.direction).sum(-1))[hit].clip(0.02)
+    size = float(np.linalg.norm(found.scene.camera.position)) + used_bounds(found.scene)[1]
+    # Channels are float32, whatever the rays are.
+    rounding = (24 if precision == "float32" else 1) * EPSILON["float32"] * size / cosine
+    low, high = t - rounding, t + rounding
+    crosses = ~inside(chain, found.along(low, hit), iterations) & inside(
+        chain, found.along(high, hit), iterations
+    )
+    # Where a feature is thinner than that, or a fold makes orbits differ, rounding decides.
+    assert crosses.mean() > 0.97
+    for _ in range(20):
+        middle = (low + high) / 2
+        within = inside(chain, found.along(middle, hit), iterations)
+        low, high = np.where(within, low, middle), np.where(within, middle, high)
+    error = (np.abs(t - high) * cosine / (EPSILON["float32"] * size))[crosses]
+    assert np.median(error) < (2 if precision == "float32" else 0.5)
+
+
+def longest_crossing(near: Found, far: Found, early: Bools) -> float:
+    """The longest way through the solid, scene units, on the rays of the chosen pixels between where distance and steps end
+    (ten steps where steps finds nothing)."""
+    chain, iterations = near.scene.chain, near.scene.formula.iterations
+    places, longest = 20, 0.0
+    for start, end, pixel in zip(near.t[early], far.t[early], np.argwhere(early), strict=True):
+        way = (end - start if far.hit[tuple(pixel)] else 10 * far.step) - 1e-4
+        chosen = np.zeros_like(early)
+        chosen[tuple(pixel)] = True
+        t = start + np.arange(0, way, far.step / places)
+        within = inside(chain, far.along(t[None], chosen)[0], iterations)
+        runs = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], within, [0]]))))[::2]
+        longest = max([longest, *((runs - 1) * far.step / places)])
+    return longest
+
+
+def unexplained(near: Found, early: Bools) -> int:
+    """Pixels that distance hits before steps does although no solid point is found within a footprint of where."""
+    chain, iterations = near.scene.chain, near.scene.formula.iterations
+    random = np.random.default_rng(3)
+    left = early.copy()
+    for scale in (0.1, 0.3, 1.0):
+        if not left.any():
+            break
+        reach = scale * near.footprint[left]
+        ball = random.normal(size=(int(left.sum()), 1500, 3))
+        ball *= (random.random(ball.shape[:2]) ** (1 / 3) / np.linalg.norm(ball, axis=-1))[..., None]
+        points = points_of(near.film)[left][:, None] + reach[:, None, None] * ball
+        solid = inside(chain, points.reshape(-1, 3), iterations).reshape(ball.shape[:2]).any(axis=1)
+        left[left] = ~solid
+    return int(left.sum())
+
+
+def inside(chain: Chain, points: Floats, iterations: int) -> Bools:
+    """Which points belong to the solid of `iterations` applications, in float64."""
+    backend = NumpyBackend()
+    with np.errstate(all="ignore"):
+        columns = [np.ascontiguousarray(column) for column in points.T]
+        constant = [np.broadcast_to(p, columns[0].shape) for p in space_to_state(chain, columns, backend)]
+        state = [np.zeros_like(p) if chain.add == "point" else np.array(p) for p in constant]
+        alive = length(state) <= chain.distance_bailout
+        for n in range(iterations):
+            bound = chain.link_at(n).bound
+            new = apply(bound, state, constant_of(bound, constant), backend)
+            state = [np.where(alive, a, b) for a, b in zip(new, state, strict=True)]
+            alive &= length(state) <= chain.distance_bailout
+        bound = chain.links[-1].bound
+        if chain.degree > 1 or bound.formula.shape is None:
+            return np.asarray(alive & (length(state) <= chain.bailout))
+        names_known = {**bound.values, **dict(zip(bound.formula.variables, state, strict=True))}
+        for name, node in bound.formula.let:
+            names_known[name] = evaluate(node, names_known, backend)
+        return np.asarray(evaluate(bound.formula.shape, names_known, backend) <= 0)
+
+
+def length(state: list[Floats]) -> Floats:
+    return np.asarray(np.sqrt(sum(z * z for z in state)))
