@@ -43,8 +43,8 @@ Bools = npt.NDArray[np.bool_]
 
 SIDE = 32
 CHANNELS = ("A", "Z", "P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z", "iterations", "steps")
-# The hit distance in footprints. Distances are too small by a factor of some 2 to 4, and along a ray that grazes the surface
-# a small one is long: a twentieth of a footprint brings both searches within a footprint nearly everywhere.
+# The hit distance in footprints. Distances are too small by a factor of some 2 to 4, and along a ray that grazes the
+# surface a small one is long: a twentieth of a footprint brings both searches within a footprint nearly everywhere.
 DETAIL = 0.05
 # High degrees and large scales make thin parts at few iterations already; few iterations of the Mandelbox fill its bounds.
 ITERATIONS = {
@@ -123,8 +123,8 @@ def both(device: Device, name: str) -> tuple[Found, Found]:
 
 @pytest.mark.parametrize("name", names())
 def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
-    """Where steps hits, distance hits too. Depths agree to a footprint and a step, or else distance has stopped earlier: within
-    a footprint of the solid, of which that ray crosses no part that is longer than a step."""
+    """Where steps hits, distance hits too. Depths agree to a footprint and a step, or else distance has stopped earlier:
+    within a footprint of the solid, of which that ray crosses no part that is longer than a step."""
     near, far = both(device, name)
     assert far.hit.sum() > 0.08 * far.hit.size
     assert np.isfinite(stacked(near.film, CHANNELS[2:])).all()
