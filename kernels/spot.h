@@ -76,10 +76,10 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
     // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
     const mask flat = less(vec_dot(*normal, *normal), R(0.5)) | there.inside;
     *normal = vec_pick(flat, vec_scale(r.direction, R(-1.0)), *normal);
-    // What is seen does not face away. A hit on the far side of a sheet thinner than a pixel does: mirrored, it is that of the
-    // near side, and where a normal is a little past the rim it changes little.
-    const real away = fmax(vec_dot(*normal, r.direction), R(0.0));
-    *normal = vec_along(*normal, R(-2.0) * away, r.direction);
+    // What is seen does not face away, but for a pixel's width past a rim. A hit on the far side of a sheet thinner than a pixel
+    // does: mirrored, it stands for the near side.
+    const real away = vec_dot(*normal, r.direction);
+    *normal = vec_pick(less(R(0.1), away), vec_along(*normal, R(-2.0) * away, r.direction), *normal);
     *smooth = smooth_count(there, surface, w.orbit);
 }
 
