@@ -1,7 +1,8 @@
 """Small pictures that every implementation renders: `python -m tests.portability.pictures OUT.npz [tiny]`.
 
 They reach what a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of
-four numbers, the scalar derivative and the full Jacobian, shadows of both kinds of light, several samples.
+four numbers, the scalar derivative and the full Jacobian, shadows of both kinds of light, several samples; and
+what stills add: the points of a pixel, the search by steps, every kind of ray, a lens and fog.
 """
 
 from __future__ import annotations
@@ -37,7 +38,19 @@ _SCENES: dict[str, str] = {
     "mandelbox": "{name: mandelbox, iterations: 10}",
     "quaternion": "{name: quaternion_julia, iterations: 12}",
     "kaleidoscope": "{name: kaleidoscopic_ifs, iterations: 10}",
+    "still": "{name: hast, iterations: 8}",
+    "steps": "{name: mandelbulb, iterations: 5}",
 }
+_RENDERERS = {
+    "still": "{samples: 2, points: {}, normal: least_squares, ambient_occlusion: {rays: 2}, bounces: 1,"
+    " filter: tent}",
+    "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
+}
+_MORE = {
+    "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\nfog: {density: 0.05}\n",
+    "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n",
+}
+_LENSES = {"still": ", f_number: 0.5"}
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 _TINY = ("mandelbulb", "hast", "mandelbox")
@@ -74,8 +87,8 @@ def _scene_text(name: str, position: Sequence[float], target: Sequence[float], s
     width, height = size
     return (
         f"version: 1\nformula: {_SCENES[name]}\nimage: {{width: {width}, height: {height}}}\n"
-        f"camera: {{position: {list(position)}, target: {list(target)}, fov: 45}}\n"
-        "renderer: {type: surface, samples: 2}\n" + _LIGHTS
+        f"camera: {{position: {list(position)}, target: {list(target)}, fov: 45{_LENSES.get(name, '')}}}\n"
+        f"renderer: {_RENDERERS.get(name, '{samples: 2}')}\n{_LIGHTS}{_MORE.get(name, '')}"
     )
 
 
