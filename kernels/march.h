@@ -127,7 +127,12 @@ INLINE crossing march(ray r, mask active, int goal, __constant const struct Marc
         const mask done = narrow | (touched & bracketed);
 #endif
         proving |= touched & ~done;
-        probe = vec_pick(proving, vec_along(point, factor * fmax(radius, PROOF_LANDED * cone), downhill), probe);
+        real down = factor * fmax(radius, PROOF_LANDED * cone);
+#if POINTS > 1
+        // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
+        if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * PROOF_REACH * cone);
+#endif
+        probe = vec_pick(proving, vec_along(point, down, downhill), probe);
         probe_downhill = downhill;
         probe_radius = radius;
         probes = pick(proving, pick(touched, R(0.0), probes + R(1.0)), probes);
