@@ -28,7 +28,7 @@ class Ours:
         with tempfile.TemporaryDirectory(prefix="clfractal-bench-") as folder:
             report = Path(folder, "bench.json")
             command: list[str | Path] = [sys.executable, "-m", "clfractal", "bench", "--json", report]
-            run(command, environment=self._runtime.environment(), timeout_s=300, cwd=REPOSITORY)
+            run(command, environment=self._runtime.environment(), timeout_s=900, cwd=REPOSITORY)
             try:
                 rows = json.loads(report.read_text())["rows"]
                 return [

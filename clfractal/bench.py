@@ -23,9 +23,11 @@ from clfractal.job import Job, prepare
 from clfractal.render import engine
 from clfractal.render.film import Film
 from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
 from clfractal.shell import Shell
 
 REPETITIONS = 7
+STILL_REPETITIONS = 3
 SHELL_REPETITIONS = 5
 
 # Row 1: what fills most of a megapixel with the Mandelbulb, one directional light with a hard shadow.
@@ -45,12 +47,33 @@ camera: {position: [-0.8, 2.2, 3.0], target: [-0.5, 0, 0], up: [0, 1, 0], fov: 5
 renderer: {bounds: {center: [-0.3, 0, 0], radius: 2}}
 lights: [{direction: [-0.4, -0.5, -0.77], shadow: true}]
 """
-ROWS = {"mandelbulb8-shadow": MANDELBULB, "hast2-shadow": HAST}
+POINTS = "renderer.points={count: 9}"
+# A row: its scene, what it changes in it, and how often it is rendered.
+ROWS: dict[str, tuple[str, tuple[str, ...], int]] = {
+    "mandelbulb8-shadow": (MANDELBULB, (), REPETITIONS),
+    "hast2-shadow": (HAST, (), REPETITIONS),
+    # Row 3: nine points to a pixel that share its march and its shadow ray; its rival, nine whole samples.
+    "hast2-points9-shadow": (HAST, (POINTS,), STILL_REPETITIONS),
+    "hast2-samples9-shadow": (HAST, ("renderer.samples=9",), STILL_REPETITIONS),
+    # The other normals: row 3 has the gradients of its nine points.
+    "hast2-one-triangle": (HAST, (POINTS, "renderer.normal=one_triangle"), STILL_REPETITIONS),
+    "hast2-eight-shading": (HAST, (POINTS, "renderer.normal=eight_triangles_shading"), STILL_REPETITIONS),
+    "hast2-eight-normal": (HAST, (POINTS, "renderer.normal=eight_triangles_normal"), STILL_REPETITIONS),
+    "hast2-least-squares": (HAST, (POINTS, "renderer.normal=least_squares"), STILL_REPETITIONS),
+    # The other search, without and with points.
+    "hast2-steps": (HAST, ("renderer.search=steps",), STILL_REPETITIONS),
+    "hast2-steps-points9": (HAST, ("renderer.search=steps", POINTS), STILL_REPETITIONS),
+    "hast2-occlusion8": (HAST, ("renderer.ambient_occlusion={rays: 8}",), STILL_REPETITIONS),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One line of the table. Times in milliseconds, medians; `ms` is the device's own time where there is one."""
+    """One line of the table. Times in milliseconds, medians; `ms` is the device's own time where there is one.
+
+    Rays are those of the picture: one for each sample of a pixel. Its steps and iterations count everything that it
+    leads to: points, rays to the lights and into the hemisphere.
+    """
 
     name: str
     ms: float
@@ -72,7 +95,10 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell) -> None:
     chosen = choose(device)
     shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
     peak = fma_peak(chosen, "float32")
-    rows = [_render_row(name, text, chosen, peak) for name, text in ROWS.items()]
+    rows = []
+    for name, (text, changes, repetitions) in ROWS.items():
+        rows.append(_render_row(name, load_scene(text, overrides=changes), chosen, peak, repetitions))
+        shell.say(f"{name}: {rows[-1].ms:.0f} ms")
     rows.append(_shell_row(chosen))
     report = {
         "device": chosen.info.name,
@@ -91,7 +117,7 @@ def table(report: Mapping[str, Any]) -> list[str]:
     """The report as lines of text."""
     lines = [
         f"{report['device']}; {report['platform']}; FMA peak {report['peak_gflops_float32']:.0f} GFLOP/s",
-        f"{'row':20} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'of peak':>8} {'lanes':>5}",
+        f"{'row':22} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'of peak':>8} {'lanes':>5}",
     ]
     for row in report["rows"]:
         cells = [
@@ -101,7 +127,7 @@ def table(report: Mapping[str, Any]) -> list[str]:
             _cell(row["fma_share"], 7, 1, 100.0, "%"),
             _cell(row["lanes"], 5, 0),
         ]
-        lines.append(f"{row['name']:20} {row['ms']:8.1f} {row['wall_ms']:8.1f} " + " ".join(cells))
+        lines.append(f"{row['name']:22} {row['ms']:8.1f} {row['wall_ms']:8.1f} " + " ".join(cells))
     return lines
 
 
@@ -111,11 +137,11 @@ def _cell(value: float | None, width: int, digits: int, factor: float = 1.0, uni
     return f"{value * factor:{width}.{digits}f}{unit}"
 
 
-def _render_row(name: str, text: str, device: Device, peak: float) -> Row:
+def _render_row(name: str, scene: Scene, device: Device, peak: float, repetitions: int) -> Row:
     """One scene, rendered into memory again and again; the first time builds the program and does not count."""
-    job = prepare(load_scene(text), device, precision="float32")
+    job = prepare(scene, device, precision="float32")
     _once(job)
-    results = [_once(job) for _ in range(REPETITIONS)]
+    results = [_once(job) for _ in range(repetitions)]
     state = results[0][1]
     kernel_ms = statistics.median(state.kernel_ms for _, state in results)
     operations = state.iterations * operations_per_application(job.scene.chain)

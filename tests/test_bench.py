@@ -1,0 +1,98 @@
+"""The speed table: its rows are the scenes that it promises, and its figures are those of the render."""
+
+from __future__ import annotations
+
+import pytest
+
+from clfractal import bench
+from clfractal.device.select import choose
+from clfractal.formulas.opencl import operations_per_application
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+
+
+def scene_of(row: str, *changes: str) -> Scene:
+    text, own, _ = bench.ROWS[row]
+    return load_scene(text, overrides=(*own, *changes))
+
+
+def test_rows_are_one_scene_each_but_for_what_they_measure() -> None:
+    plain = scene_of("hast2-shadow")
+    rows = [name for name in bench.ROWS if name.startswith("hast2")]
+    for name in rows:
+        scene = scene_of(name)
+        assert (scene.image.width, scene.image.height) == (1000, 1000)
+        changed = scene.model_copy(update={"renderer": plain.renderer})
+        assert changed == plain, name
+    renderers = [scene_of(name).renderer for name in rows]
+    assert len({renderer.model_dump_json() for renderer in renderers}) == len(rows)
+
+
+def test_every_normal_and_search_and_the_rivals_of_points_have_a_row() -> None:
+    renderers = [scene_of(name).renderer for name in bench.ROWS]
+    with_points = {
+        (renderer.normal, renderer.search) for renderer in renderers if renderer.used_points.count == 9
+    }
+    normals = (
+        "gradient",
+        "one_triangle",
+        "eight_triangles_shading",
+        "eight_triangles_normal",
+        "least_squares",
+    )
+    assert with_points >= {(normal, "distance") for normal in normals}
+    single = [renderer for renderer in renderers if renderer.used_points.count == 1]
+    assert {renderer.search for renderer in single} == {"distance", "steps"}
+    assert any(renderer.samples == 9 for renderer in single)
+    assert any(renderer.ambient_occlusion and renderer.ambient_occlusion.rays == 8 for renderer in single)
+
+
+@pytest.mark.parametrize("row", ["hast2-shadow", "hast2-samples9-shadow"])
+def test_a_row_has_the_figures_of_its_renders(row: str) -> None:
+    """A twentieth of its size. The peak is a number of our own, so that its part is known."""
+    scene = scene_of(row, "image.width=50", "image.height=50")
+    measured = bench._render_row(row, scene, choose(None), peak=100.0, repetitions=2)
+    seconds = measured.ms / 1e3
+    assert measured.wall_ms >= measured.ms > 0
+    assert measured.rays_per_s is not None
+    assert measured.rays_per_s == pytest.approx(2500 * scene.renderer.samples / seconds)
+    assert measured.steps_per_ray is not None
+    assert 2 < measured.steps_per_ray < 100
+    assert measured.iterations_per_s is not None
+    assert measured.fma_share is not None
+    assert measured.iterations_per_s > measured.rays_per_s * measured.steps_per_ray
+    done = measured.iterations_per_s * operations_per_application(scene.chain)
+    assert measured.fma_share == pytest.approx(done / 100e9)
+
+
+def test_the_table_has_a_line_for_each_row() -> None:
+    rows = [
+        {
+            "name": "hast2-eight-shading",
+            "ms": 1234.56,
+            "wall_ms": 1300.0,
+            "rays_per_s": 0.81e6,
+            "iterations_per_s": 55.5e6,
+            "steps_per_ray": 31.96,
+            "fma_share": 0.123,
+            "lanes": 16,
+        },
+        {"name": "shell-to-png", "ms": 900.0, "wall_ms": 900.0}
+        | dict.fromkeys(("rays_per_s", "iterations_per_s", "steps_per_ray", "fma_share", "lanes")),
+    ]
+    report = {"device": "a device", "platform": "a platform", "peak_gflops_float32": 99.6, "rows": rows}
+    head, titles, first, second = bench.table(report)
+    assert "a device" in head
+    assert "FMA peak 100 GFLOP/s" in head
+    assert first.split() == [
+        "hast2-eight-shading",
+        "1234.6",
+        "1300.0",
+        "0.81",
+        "55.5",
+        "31.96",
+        "12.3%",
+        "16",
+    ]
+    assert second.split() == ["shell-to-png", "900.0", "900.0", "-", "-", "-", "-", "-"]
+    assert len(titles) == len(first) == len(second)
