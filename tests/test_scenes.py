@@ -43,6 +43,16 @@ THESIS_FIGURES = {
     "hast_above": "figure 14",
     "hast_normals": "figure 15",
     "hast_power8": "figure 16",
+    "figure12": "figure 12",
+    "figure13_one_triangle": "figure 13",
+    "figure13_eight_triangles_shading": "figure 13",
+    "figure13_eight_triangles_normal": "figure 13",
+    "figure13_least_squares": "figure 13",
+    "figure13_gradient": "figure 13",
+    "figure14_rotated": "figure 14",
+    "figure14_above": "figure 14",
+    "figure15": "figure 15",
+    "figure16": "figure 16",
 }
 
 each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
@@ -90,10 +100,13 @@ def test_it_begins_with_what_it_shows(path: Path) -> None:
 
 
 @each_scene
-def test_it_is_as_large_as_a_screen_and_smooth(path: Path) -> None:
+def test_it_is_as_large_as_a_screen_or_a_print_and_smooth(path: Path) -> None:
     scene = load_scene(path)
-    assert (scene.image.width, scene.image.height) == (1920, 1080)
-    assert 4 <= scene.renderer.samples <= 16
+    size = (scene.image.width, scene.image.height)
+    assert size in ((1920, 1080), (2048, 2048))
+    # Stills stop where a pixel is calm enough; a first look takes as many samples as it is told.
+    most = 256 if scene.renderer.noise is not None else 16
+    assert 4 <= scene.renderer.samples <= most
 
 
 @each_scene
