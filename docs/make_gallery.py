@@ -25,7 +25,8 @@ from clfractal.formulas import catalog
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
-REDUCTIONS = (3, 4, 6)  # 1920 x 1080 becomes 640 x 360, or less where that makes too large a file
+# 1920 x 1080 becomes 640 x 360, 2048 x 2048 becomes 512 x 512, or less where that makes too large a file.
+REDUCTIONS = (3, 4, 6, 8)
 LARGEST_FILE = 300_000  # bytes
 
 Floats = npt.NDArray[np.float32]
@@ -41,7 +42,7 @@ clfractal render scenes/mandelbulb.yaml -o other_side.png --set 'camera.position
 ```
 
 The words are those of the scene files; `python docs/make_gallery.py` makes the pictures and this page anew.
-Times are for 1920 x 1080 pixels with the scene's own samples on two processor cores, without the seconds that
+Times are for that many pixels with the scene's own samples on two processor cores, without the seconds that
 building its program takes when a formula is rendered for the first time.
 """
 
@@ -88,21 +89,35 @@ def page() -> str:
 def make_picture(path: Path) -> None:
     """Renders a scene and writes its reduced picture."""
     scene = load_scene(path)
-    film = render(scene, channels=["R", "G", "B"])
+    film = render(scene, channels=["R", "G", "B", "A"])
     linear = np.stack([film["R"], film["G"], film["B"]], axis=-1)
     # What is brighter than the screen can show is cut before it is averaged, as in the full picture.
     linear = np.clip(linear * np.float32(2.0**scene.output.exposure), 0, 1)
+    coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
     target = PICTURES / f"{path.stem}.png"
     for reduction in REDUCTIONS:
-        Image.fromarray(encode8(reduced(linear, reduction))).save(target, optimize=True)
+        if scene.image.width % reduction or scene.image.height % reduction:
+            continue
+        shown = picture(reduced(linear, reduction), reduced(coverage, reduction))
+        shown.save(target, optimize=True)
         size = target.stat().st_size
         if size <= LARGEST_FILE:
             break
     print(f"{target}: {size // 1000} kB, {film.header['seconds']:.1f} s", flush=True)
 
 
+def picture(linear: Floats, coverage: Floats) -> Image.Image:
+    """What a file holds of premultiplied light and its coverage; the latter only where it is not 1 everywhere."""
+    if (coverage == 1).all():
+        return Image.fromarray(encode8(linear))
+    straight = np.divide(linear, coverage, out=np.zeros_like(linear), where=coverage > 0)
+    colors = encode8(np.clip(straight, 0, 1))
+    opacity = np.rint(coverage * 255).astype(np.uint8)
+    return Image.fromarray(np.concatenate([colors, opacity], axis=-1))
+
+
 def reduced(linear: Floats, reduction: int) -> Floats:
-    """Means over squares of `reduction` pixels; shape (rows, columns, 3), both divisible by it."""
+    """Means over squares of `reduction` pixels; shape (rows, columns, components), both divisible by it."""
     rows, columns, components = linear.shape
     blocks = linear.reshape(rows // reduction, reduction, columns // reduction, reduction, components)
     means: Floats = blocks.mean(axis=(1, 3), dtype=np.float32)
