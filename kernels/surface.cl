@@ -84,11 +84,12 @@ INLINE void noise_add(pixel *p, shot s, mask active) {
     p->coverage_square += pick(active, s.coverage * s.coverage, R(0.0));
 }
 
-// The standard error of a pixel's mean, the larger one of brightness and coverage.
-INLINE real noise_of(const pixel *p) {
+// The standard error of a pixel's mean: of its brightness, or of its coverage if that is larger and is seen.
+INLINE real noise_of(const pixel *p, int transparent) {
     const real share = R(1.0) / p->shots;
     const real mean = p->brightness * share, coverage = p->coverage * share;
-    const real variance = fmax(p->brightness_square * share - mean * mean, p->coverage_square * share - coverage * coverage);
+    const real of_coverage = transparent ? p->coverage_square * share - coverage * coverage : R(0.0);
+    const real variance = fmax(p->brightness_square * share - mean * mean, of_coverage);
     return sqrt(fmax(variance, R(0.0)) / fmax(p->shots - R(1.0), R(1.0)));
 }
 #endif
@@ -140,7 +141,9 @@ __kernel void surface(__global float *film, __global uint *statistics, __global 
 #if ADAPTIVE
         noise_add(&p, s, active);
         // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
-        if (sample + 1 >= settings->min_samples && (sample & 3) == 3) active &= less((real)(settings->noise), noise_of(&p));
+        if (sample + 1 >= settings->min_samples && (sample & 3) == 3) {
+            active &= less((real)(settings->noise), noise_of(&p, material->transparent));
+        }
 #endif
     }
 
