@@ -14,7 +14,8 @@ Keys of the table:
       page      the page of docs/ that shows it
       scene     a name of `scenes`
       set       dotted key: value, replaced in every panel
-      panels    one mapping of dotted keys to values for each panel
+      panels    one mapping of dotted keys to values for each panel. With `show: samples` a panel shows that channel
+                instead of the colours: from none, dark, to `renderer.samples`, light
       columns   panels in a row; all of them if not given
       size      width and height of a panel, pixels
       zoom      each pixel of a panel is shown as a square of so many; 1 if not given
@@ -30,12 +31,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import yaml
 from PIL import Image
 
 from clfractal.api import load_scene, render
+from clfractal.files.srgb import encode8
 from clfractal.render.outputs import png_bytes
 from clfractal.scene.model import Scene
+from clfractal.scene.palettes import PALETTES
+from clfractal.scene.palettes import table as table_of
 
 DOCS = Path(__file__).resolve().parent
 TABLE = DOCS / "pictures.yaml"
@@ -45,19 +51,27 @@ LARGEST_FILE = 300_000  # bytes
 
 
 @dataclass(frozen=True, slots=True)
+class Panel:
+    """A scene, and what of it is shown."""
+
+    scene: Scene
+    samples: bool  # how many samples each pixel took, instead of its colour
+
+
+@dataclass(frozen=True, slots=True)
 class Picture:
     """One row of the table: its scenes, from left to right and from top to bottom, all of one size."""
 
     name: str
     page: str
-    panels: tuple[Scene, ...]
+    panels: tuple[Panel, ...]
     columns: int
     zoom: int
 
     @property
     def panel_size(self) -> tuple[int, int]:
         """Width and height of a panel, pixels of the picture."""
-        image = self.panels[0].image
+        image = self.panels[0].scene.image
         return image.width * self.zoom, image.height * self.zoom
 
     @property
@@ -88,13 +102,17 @@ def _picture(name: str, row: Mapping[str, Any], scenes: Mapping[str, Any]) -> Pi
     if width % zoom or height % zoom:
         raise ValueError(f"{TABLE.name}: {name}: size {width} x {height} is no multiple of zoom {zoom}")
     for_all = {**row.get("set", {}), "image.width": width // zoom, "image.height": height // zoom}
-    panels = tuple(_scene(scenes[row["scene"]], {**for_all, **panel}) for panel in row["panels"])
+    panels = tuple(_panel(scenes[row["scene"]], {**for_all, **panel}) for panel in row["panels"])
     return Picture(name, row["page"], panels, row.get("columns", len(panels)), zoom)
 
 
-def _scene(base: Mapping[str, Any], values: Mapping[str, Any]) -> Scene:
+def _panel(base: Mapping[str, Any], values: dict[str, Any]) -> Panel:
+    show = values.pop("show", None)
+    if show not in (None, "samples"):
+        raise ValueError(f"{TABLE.name}: a panel cannot show {show!r}")
     # JSON is YAML, and has no line breaks or bare words that the shell form of a value could trip over.
-    return load_scene(base, overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()])
+    scene = load_scene(base, overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()])
+    return Panel(scene, samples=show == "samples")
 
 
 def make_picture(picture: Picture) -> None:
@@ -106,11 +124,15 @@ def make_picture(picture: Picture) -> None:
     width, height = picture.panel_size
     whole = Image.new("RGBA", picture.size)
     seconds = 0.0
-    for index, scene in enumerate(picture.panels):
-        film = render(scene, channels=["R", "G", "B", "A"])
+    for index, panel in enumerate(picture.panels):
+        film = render(panel.scene, channels=["R", "G", "B", "A", "samples"])
         seconds += film.header["seconds"]
-        with Image.open(io.BytesIO(png_bytes(film))) as panel:
-            shown = panel.convert("RGBA").resize((width, height), Image.Resampling.NEAREST)
+        if panel.samples:
+            shown = Image.fromarray(_heat(film["samples"] / np.float32(panel.scene.renderer.samples)))
+        else:
+            with Image.open(io.BytesIO(png_bytes(film))) as shown:
+                shown.load()
+        shown = shown.convert("RGBA").resize((width, height), Image.Resampling.NEAREST)
         row, column = divmod(index, picture.columns)
         whole.paste(shown, (column * (width + GAP), row * (height + GAP)))
     whole.save(picture.path, optimize=True)
@@ -120,6 +142,13 @@ def make_picture(picture: Picture) -> None:
         raise ValueError(
             f"{picture.path.name} is larger than {LARGEST_FILE // 1000} kB: make its panels smaller"
         )
+
+
+def _heat(values: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
+    """Values in 0..1, shape (rows, columns), as colours from dark to light; shape (rows, columns, 3)."""
+    palette = encode8(table_of(PALETTES["hearth"], 256)[None])[0]
+    colors: npt.NDArray[np.uint8] = palette[np.rint(values * 255).astype(np.intp)]
+    return colors
 
 
 def main(names: Sequence[str]) -> None:
