@@ -95,4 +95,19 @@ INLINE scalar lanes_sum(real value) {
     return sum;
 }
 
+// In how many lanes a mask is true.
+INLINE int lanes_count(mask m) {
+#if LANES == 1
+    return m ? 1 : 0;
+#elif defined(__has_builtin) && !defined(INTERPRETED)
+#if __has_builtin(__builtin_reduce_add)
+    return -(int)__builtin_reduce_add(m);
+#else
+    return (int)lanes_sum(pick(m, R(1.0), R(0.0)));
+#endif
+#else
+    return (int)lanes_sum(pick(m, R(1.0), R(0.0)));
+#endif
+}
+
 #include "repairs.h"

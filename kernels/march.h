@@ -18,147 +18,185 @@
 #define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
 
-// Marches the active lanes towards one goal, the same for all lanes:
+#define BACK_STEPS R(4.5)        // a point's evaluations inside, before it counts as hit where it begins
+
+// The march of a packet towards one goal, the same for all lanes:
 //   GOAL_SURFACE  the surface: hits are proved, and a step that ended inside is narrowed down to it
 //   GOAL_SHADOW   whether anything is in the way: a step that ended inside is a hit
 //   GOAL_TOUCH    how far a whole pixel's cone is free: the first proved touch, at a point still outside
-INLINE crossing march(ray r, mask active, int goal, __constant const struct March *settings,
-                      __constant const struct Orbit *orbit, __constant const scalar *k) {
-    crossing found = nothing_met(r.near);
-    real t = r.near;
-    real low = t;                            // the last point known to be outside
-    real high = (real)(REAL_LARGEST);        // a point known to be inside
-    real relaxation = (real)(settings->relaxation);
-    real radius_before = (real)(REAL_LARGEST), step_before = R(0.0);
+typedef struct {
+    ray r;
+    mask active;
+    crossing found;
+    real t;
+    real low;         // the last point known to be outside
+    real high;        // a point known to be inside
+    real relaxation, radius_before, step_before;
 #if !HAS_DERIVATIVE
-    mask proving = active & ~active;
-    vec probe = r.origin;
-    vec probe_downhill = r.direction;
-    real probe_radius = R(0.0);
-    real probes = R(0.0), factor = PROOF_FACTOR;
-    real retry_t = R(0.0), retry_radius = R(0.0);   // the next proof is due from this t on, or below this distance
+    mask proving;
+    vec probe, probe_downhill;
+    real probe_radius, probes, factor;
+    real retry_t, retry_radius;   // the next proof is due from this t on, or below this distance
 #endif
-    for (int i = 0; i < settings->max_steps; ++i) {
-        if (!any_lane(active)) break;
-        const vec on_ray = vec_along(r.origin, t, r.direction);
+} march;
+
+// Lanes `fresh` begin a march along new rays; the others go on with theirs.
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+    m->r = ray_pick(fresh, r, m->r);
+    m->active |= fresh;
+    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    m->t = pick(fresh, r.near, m->t);
+    m->low = pick(fresh, r.near, m->low);
+    m->high = pick(fresh, (real)(REAL_LARGEST), m->high);
+    m->relaxation = pick(fresh, (real)(settings->relaxation), m->relaxation);
+    m->radius_before = pick(fresh, (real)(REAL_LARGEST), m->radius_before);
+    m->step_before = pick(fresh, R(0.0), m->step_before);
+#if !HAS_DERIVATIVE
+    m->proving &= ~fresh;
+    m->probe = vec_pick(fresh, r.origin, m->probe);
+    m->probe_downhill = vec_pick(fresh, r.direction, m->probe_downhill);
+    m->probe_radius = pick(fresh, R(0.0), m->probe_radius);
+    m->probes = pick(fresh, R(0.0), m->probes);
+    m->factor = pick(fresh, PROOF_FACTOR, m->factor);
+    m->retry_t = pick(fresh, R(0.0), m->retry_t);
+    m->retry_radius = pick(fresh, R(0.0), m->retry_radius);
+#endif
+}
+
+// One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
+INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                       __constant const scalar *k) {
+    const vec on_ray = vec_along(m->r.origin, m->t, m->r.direction);
 #if HAS_DERIVATIVE
-        const sphere here = orbit_scalar_distance(on_ray, active, orbit, k);
+    const sphere here = orbit_scalar_distance(on_ray, m->active, orbit, k);
 #else
-        surface_point surface;
-        const vec point = vec_pick(proving, probe, on_ray);
-        const sphere here = orbit_dual_distance(point, active, orbit, k, &surface);
+    surface_point surface;
+    const vec point = vec_pick(m->proving, m->probe, on_ray);
+    const sphere here = orbit_dual_distance(point, m->active, orbit, k, &surface);
 #endif
-        // A distance grows no faster than one moves: where the estimate says otherwise it has met a point at which the
-        // derivative vanishes, and means nothing.
-        real radius = here.step * (real)(settings->step_scale);
-        const real cone = (real)(settings->detail) * (r.footprint + r.spread * t);
-        found.steps += pick(active, R(1.0), R(0.0));
-        found.count += pick(active, here.count, R(0.0));
+    // A distance grows no faster than one moves: where the estimate says otherwise it has met a point at which the
+    // derivative vanishes, and means nothing.
+    real radius = here.step * (real)(settings->step_scale);
+    const real cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
+    m->found.steps += pick(m->active, R(1.0), R(0.0));
+    m->found.count += pick(m->active, here.count, R(0.0));
 
 #if HAS_DERIVATIVE
-        radius = fmin(radius, radius_before + step_before);
-        const mask marching = active;
+    radius = fmin(radius, m->radius_before + m->step_before);
+    const mask marching = m->active;
 #else
-        radius = pick(proving, radius, fmin(radius, radius_before + step_before));
-        // Lanes that prove a hit: arrived, given up, or one step further down.
-        mask failed = active & ~active;
-        if (any_lane(proving)) {
-            const vec offset = vec_sub(point, on_ray);
-            real arrival = PROOF_ARRIVED * cone;
+    radius = pick(m->proving, radius, fmin(radius, m->radius_before + m->step_before));
+    // Lanes that prove a hit: arrived, given up, or one step further down.
+    mask failed = m->active & ~m->active;
+    if (any_lane(m->proving)) {
+        const vec offset = vec_sub(point, on_ray);
+        real arrival = PROOF_ARRIVED * cone;
 #if LOGARITHMIC
-            const mask low = less(potential(here, surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
-            arrival = pick(low, arrival, PROOF_LANDED * cone);
+        const mask close = less(potential(here, surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
+        arrival = pick(close, arrival, PROOF_LANDED * cone);
 #endif
-            const real along = vec_dot(offset, r.direction);
-            const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
-            const mask arrived = proving & (here.inside | less(radius, arrival)) & ~astray;
-            failed = proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), probes));
-            found.hit |= arrived;
-            found.t = pick(arrived, t, found.t);
-            active &= ~arrived;
-            retry_t = pick(failed, t + PROOF_APART * cone, retry_t);
-            retry_radius = pick(failed, PROOF_CLOSER * radius_before, retry_radius);
-            t = pick(failed, t + PROOF_ONWARD * cone, t);
-            proving &= ~(arrived | failed);
-        }
-        const mask marching = active & ~proving & ~failed;
-        vec downhill = r.direction;
-        if (any_lane(proving | (marching & less(radius, cone)))) {
-            downhill = vec_scale(vec_normalize(surface.gradient), R(-1.0));
-            // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
-            const mask turned = less(vec_dot(downhill, probe_downhill), R(0.0));
-            const mask slow = less(R(0.5) * probe_radius, radius);
-            factor = pick(proving, factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
-        }
-#endif
-
-        // Over-relaxation (Keinert et al. 2014, sec. 3.1): if this sphere does not touch the one before, something may lie
-        // between them, so go back to the end of the one before.
-        const mask overshot = marching & less(R(1.0), relaxation) & less(radius + radius_before, step_before);
-        const mask inside = marching & ~overshot & here.inside;
-        const mask outside = marching & ~overshot & ~here.inside;
-        if (i > 0) found.bad += pick(inside & ~less(high, (real)(REAL_LARGEST)), R(1.0), R(0.0));
-        high = pick(inside, t, high);
-        low = pick(outside, t, low);
-#if MARCH_KEEPS_SURFACE
-        found.surface.gradient = vec_pick(outside, surface.gradient, found.surface.gradient);
-        found.surface.square = pick(outside, surface.square, found.surface.square);
-        found.surface.square_before = pick(outside, surface.square_before, found.surface.square_before);
-        found.end_count = pick(outside, here.count, found.end_count);
-#endif
-
-        // The pixel's cone touches the solid, or the crossing is narrowed down.
-        const mask bracketed = marching & less(high, (real)(REAL_LARGEST));
-#if HAS_DERIVATIVE
-        const mask touched = outside & less(radius, cone);
-#else
-        const mask touched = outside & less(radius, cone) & (less_equal(retry_t, t) | less(radius, retry_radius));
-#endif
-        const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(high - low, R(0.0625) * cone) : inside;
-#if HAS_DERIVATIVE
-        const mask done = touched | narrow;
-#else
-        // A bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be
-        // proved again.
-#if POINTS > 1
-        const mask proved = less(fabs(t - r.known), (real)(settings->known_reach) * cone);
-        const mask done = narrow | (touched & (bracketed | proved));
-#else
-        const mask done = narrow | (touched & bracketed);
-#endif
-        proving |= touched & ~done;
-        real down = factor * fmax(radius, PROOF_LANDED * cone);
-#if POINTS > 1
-        // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
-        if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * PROOF_REACH * cone);
-#endif
-        probe = vec_pick(proving, vec_along(point, down, downhill), probe);
-        probe_downhill = downhill;
-        probe_radius = radius;
-        probes = pick(proving, pick(touched, R(0.0), probes + R(1.0)), probes);
-#endif
-        found.hit |= done;
-        found.t = pick(done, low, found.t);
-        active &= ~done;
-
-#if HAS_DERIVATIVE
-        const real step = radius * relaxation;
-#else
-        const real step = fmax(radius * relaxation, PROOF_CREEP * cone);
-#endif
-        const real onward = pick(overshot, low + radius_before, t + step);
-#if !HAS_DERIVATIVE
-        relaxation = pick(failed, R(1.0), relaxation);
-        step_before = pick(failed, PROOF_ONWARD * cone, step_before);
-        const mask moving = marching & ~proving;
-#else
-        const mask moving = marching;
-#endif
-        relaxation = pick(overshot, R(1.0), relaxation);
-        step_before = pick(overshot, radius_before, pick(moving, step, step_before));
-        radius_before = pick(marching & ~overshot, radius, radius_before);
-        t = pick(bracketed, R(0.5) * (low + high), pick(moving, onward, t));
-        active &= less(t, r.far);
+        const real along = vec_dot(offset, m->r.direction);
+        const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
+        const mask arrived = m->proving & (here.inside | less(radius, arrival)) & ~astray;
+        failed = m->proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), m->probes));
+        m->found.hit |= arrived;
+        m->found.t = pick(arrived, m->t, m->found.t);
+        m->active &= ~arrived;
+        m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
+        m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
+        m->t = pick(failed, m->t + PROOF_ONWARD * cone, m->t);
+        m->proving &= ~(arrived | failed);
     }
-    return found;
+    const mask marching = m->active & ~m->proving & ~failed;
+    vec downhill = m->r.direction;
+    if (any_lane(m->proving | (marching & less(radius, cone)))) {
+        downhill = vec_scale(vec_normalize(surface.gradient), R(-1.0));
+        // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
+        const mask turned = less(vec_dot(downhill, m->probe_downhill), R(0.0));
+        const mask slow = less(R(0.5) * m->probe_radius, radius);
+        m->factor = pick(m->proving, m->factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
+    }
+#endif
+
+    // Over-relaxation (Keinert et al. 2014, sec. 3.1): if this sphere does not touch the one before, something may lie
+    // between them, so go back to the end of the one before.
+    const mask overshot = marching & less(R(1.0), m->relaxation) & less(radius + m->radius_before, m->step_before);
+    mask inside = marching & ~overshot & here.inside;
+#if POINTS > 1
+    // A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time.
+    const mask early = inside & less_equal((real)(REAL_LARGEST), m->radius_before) & less(m->r.known, RAY_NOTHING_KNOWN) &
+                       less(m->found.steps, BACK_STEPS);
+    inside &= ~early;
+    m->low = pick(early, fmax(m->t - (real)(settings->known_reach) * cone * m->found.steps, R(0.0)), m->low);
+#endif
+    const mask outside = marching & ~overshot & ~here.inside;
+    // (Not where it has only just begun.)
+    const mask surprised = inside & ~less(m->high, (real)(REAL_LARGEST)) & less(R(1.5), m->found.steps);
+    m->found.bad += pick(surprised, R(1.0), R(0.0));
+    m->high = pick(inside, m->t, m->high);
+    m->low = pick(outside, m->t, m->low);
+#if MARCH_KEEPS_SURFACE
+    m->found.surface.gradient = vec_pick(outside, surface.gradient, m->found.surface.gradient);
+    m->found.surface.square = pick(outside, surface.square, m->found.surface.square);
+    m->found.surface.square_before = pick(outside, surface.square_before, m->found.surface.square_before);
+    m->found.end_count = pick(outside, here.count, m->found.end_count);
+#endif
+
+    // The pixel's cone touches the solid, or the crossing is narrowed down.
+    const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
+#if HAS_DERIVATIVE
+    const mask touched = outside & less(radius, cone);
+#else
+    const mask touched = outside & less(radius, cone) & (less_equal(m->retry_t, m->t) | less(radius, m->retry_radius));
+#endif
+    const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, R(0.0625) * cone) : inside;
+#if HAS_DERIVATIVE
+    const mask done = touched | narrow;
+#else
+    // A bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be
+    // proved again.
+#if POINTS > 1
+    const mask proved = less(fabs(m->t - m->r.known), (real)(settings->known_reach) * cone);
+    const mask done = narrow | (touched & (bracketed | proved));
+#else
+    const mask done = narrow | (touched & bracketed);
+#endif
+    m->proving |= touched & ~done;
+    real down = m->factor * fmax(radius, PROOF_LANDED * cone);
+#if POINTS > 1
+    // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
+    if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * PROOF_REACH * cone);
+#endif
+    m->probe = vec_pick(m->proving, vec_along(point, down, downhill), m->probe);
+    m->probe_downhill = downhill;
+    m->probe_radius = radius;
+    m->probes = pick(m->proving, pick(touched, R(0.0), m->probes + R(1.0)), m->probes);
+#endif
+    m->found.hit |= done;
+    m->found.t = pick(done, m->low, m->found.t);
+    m->active &= ~done;
+
+#if HAS_DERIVATIVE
+    const real step = radius * m->relaxation;
+#else
+    const real step = fmax(radius * m->relaxation, PROOF_CREEP * cone);
+#endif
+    const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
+#if !HAS_DERIVATIVE
+    m->relaxation = pick(failed, R(1.0), m->relaxation);
+    m->step_before = pick(failed, PROOF_ONWARD * cone, m->step_before);
+    const mask moving = marching & ~m->proving;
+#else
+    const mask moving = marching;
+#endif
+    m->relaxation = pick(overshot, R(1.0), m->relaxation);
+    m->step_before = pick(overshot, m->radius_before, pick(moving, step, m->step_before));
+#if POINTS > 1
+    m->radius_before = pick(marching & ~overshot & ~early, radius, m->radius_before);
+    m->t = pick(bracketed, R(0.5) * (m->low + m->high), pick(early, m->low, pick(moving, onward, m->t)));
+#else
+    m->radius_before = pick(marching & ~overshot, radius, m->radius_before);
+    m->t = pick(bracketed, R(0.5) * (m->low + m->high), pick(moving, onward, m->t));
+#endif
+    m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
 }

@@ -12,39 +12,57 @@
 #define SHADOW_FIRST R(2.0)   // step, in the ray's footprints
 #define SHADOW_GROWTH R(1.5)
 
-INLINE crossing march(ray r, mask active, int goal, __constant const struct March *settings,
-                      __constant const struct Orbit *orbit, __constant const scalar *k) {
-    crossing found = nothing_met(r.near);
+typedef struct {
+    ray r;
+    mask active;
+    crossing found;
+    real t, pace;
+    real low, high;   // the last points seen outside and inside
+    mask seen_outside, seen_inside;
+} march;
+
+// Lanes `fresh` begin a march along new rays; the others go on with theirs.
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+    const real step = (real)(settings->step);
+    const real start = goal == GOAL_POINT ? clamp(r.known, r.near, r.far) : r.near;
+    m->r = ray_pick(fresh, r, m->r);
+    m->active |= fresh;
+    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    m->t = pick(fresh, start, m->t);
+    m->pace = pick(fresh, goal == GOAL_SHADOW ? fmin(SHADOW_FIRST * r.footprint, step) : step, m->pace);
+    m->low = pick(fresh, start, m->low);
+    m->high = pick(fresh, start, m->high);
+    m->seen_outside &= ~fresh;
+    m->seen_inside &= ~fresh;
+}
+
+// One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
+INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                       __constant const scalar *k) {
     const real step = (real)(settings->step);
     const int narrows = goal == GOAL_SURFACE || goal == GOAL_POINT;
-    real pace = goal == GOAL_SHADOW ? fmin(SHADOW_FIRST * r.footprint, step) : step;
-    real t = goal == GOAL_POINT ? clamp(r.known, r.near, r.far) : r.near;
-    real low = t, high = t;  // the last points seen outside and inside
-    mask seen_outside = active & ~active, seen_inside = active & ~active;
-    while (any_lane(active)) {
-        const sphere here = orbit_solid(vec_along(r.origin, t, r.direction), active, orbit->iterations, orbit, k);
-        found.steps += pick(active, R(1.0), R(0.0));
-        found.count += pick(active, here.count, R(0.0));
-        const mask inside = active & here.inside;
-        const mask outside = active & ~here.inside;
-        seen_inside |= inside;
-        seen_outside |= outside;
-        low = pick(outside, t, low);
-        high = pick(inside, t, high);
+    const vec point = vec_along(m->r.origin, m->t, m->r.direction);
+    const sphere here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
+    m->found.steps += pick(m->active, R(1.0), R(0.0));
+    m->found.count += pick(m->active, here.count, R(0.0));
+    const mask inside = m->active & here.inside;
+    const mask outside = m->active & ~here.inside;
+    m->seen_inside |= inside;
+    m->seen_outside |= outside;
+    m->low = pick(outside, m->t, m->low);
+    m->high = pick(inside, m->t, m->high);
 
-        // What is inside from the beginning of the ray on is hit there.
-        const mask bracketed = seen_inside & seen_outside;
-        const mask finest = bracketed & less_equal(high - low, R(2.0) * (real)(REAL_EPSILON) * fmax(fabs(t), step));
-        const mask cut = inside & ~seen_outside & less_equal(t, r.near);
-        const mask done = active & (narrows ? finest | cut : inside);
-        found.hit |= done;
-        found.t = pick(done, pick(bracketed, low, t), found.t);
-        active &= ~done;
+    // What is inside from the beginning of the ray on is hit there.
+    const mask bracketed = m->seen_inside & m->seen_outside;
+    const real finest = R(2.0) * (real)(REAL_EPSILON) * fmax(fabs(m->t), step);
+    const mask cut = inside & ~m->seen_outside & less_equal(m->t, m->r.near);
+    const mask done = m->active & (narrows ? (bracketed & less_equal(m->high - m->low, finest)) | cut : inside);
+    m->found.hit |= done;
+    m->found.t = pick(done, pick(bracketed, m->low, m->t), m->found.t);
+    m->active &= ~done;
 
-        const real onward = pick(inside, fmax(t - pace, r.near), t + pace);
-        t = pick(bracketed, R(0.5) * (low + high), onward);
-        pace = fmin(SHADOW_GROWTH * pace, step);
-        active &= less_equal(t, r.far);
-    }
-    return found;
+    const real onward = pick(inside, fmax(m->t - m->pace, m->r.near), m->t + m->pace);
+    m->t = pick(bracketed, R(0.5) * (m->low + m->high), onward);
+    m->pace = fmin(SHADOW_GROWTH * m->pace, step);
+    m->active &= less_equal(m->t, m->r.far);
 }

@@ -8,10 +8,8 @@ typedef struct {
     mask touched;
     real touch_t, touch_cone;   // of the shared march, and the pixel's cone there
     bits seed;
-    real known;                 // where a hit is proved already
     real count;                 // points that found the surface
-    real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels ...
-    real across, below;         // ... and of the present point: its place, in pixels from the middle
+    real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
     vec point, normal;
     real smooth;
     color tint;                 // sum over the points
@@ -40,7 +38,6 @@ INLINE void points_touched(pixel_points *p, crossing met, ray eye_ray, world w) 
     p->touched = met.hit;
     p->touch_t = met.t;
     p->touch_cone = eye_ray.footprint + eye_ray.spread * met.t;
-    p->known = met.t;
     p->count = R(0.0);
     p->nearest = (real)(REAL_LARGEST);
     p->point = eye_ray.origin;
@@ -61,15 +58,16 @@ INLINE void points_touched(pixel_points *p, crossing met, ray eye_ray, world w) 
 #endif
 }
 
-// The ray of the next point, from a little before where the pixel's cone touched on.
+// The ray of a point, from half a footprint before where the pixel's cone touched on.
 INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, real lens_y, world w) {
-    point_offset(point_of_turn(turn), p->seed, &p->across, &p->below);
-    ray r = camera_ray(x + p->across, y + p->below, lens_x, lens_y, w.view);
+    real across, below;
+    point_offset(point_of_turn(turn), p->seed, &across, &below);
+    ray r = camera_ray(x + across, y + below, lens_x, lens_y, w.view);
 #if SEARCH == SEARCH_STEPS
     r.known = p->touch_t;
 #else
-    r.near = fmax(p->touch_t - p->touch_cone, R(0.0));
-    r.known = p->known;
+    r.near = fmax(p->touch_t - R(0.5) * p->touch_cone, R(0.0));
+    r.known = p->touch_t;
 #endif
     r.footprint *= (real)(w.settings->point_share);
     r.spread *= (real)(w.settings->point_share);
@@ -79,9 +77,10 @@ INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, re
 INLINE void points_add(pixel_points *p, int turn, ray leg, crossing met, vec normal, real smooth, world w) {
     const mask found = met.hit;
     const vec point = vec_along(leg.origin, met.t, leg.direction);
-    p->known = pick(found, met.t, p->known);
     p->count += pick(found, R(1.0), R(0.0));
-    const real offset = p->across * p->across + p->below * p->below;
+    real across, below;
+    point_offset(point_of_turn(turn), p->seed, &across, &below);
+    const real offset = across * across + below * below;
     const mask nearer = found & less(offset, p->nearest);
     p->nearest = pick(nearer, offset, p->nearest);
     p->point = vec_pick(nearer, point, p->point);

@@ -91,6 +91,29 @@ INLINE crossing nothing_met(real t) {
     return c;
 }
 
+INLINE ray ray_pick(mask m, ray yes, ray no) {
+    const ray r = {vec_pick(m, yes.origin, no.origin), vec_pick(m, yes.direction, no.direction), pick(m, yes.near, no.near),
+                   pick(m, yes.far, no.far), pick(m, yes.footprint, no.footprint), pick(m, yes.spread, no.spread),
+                   pick(m, yes.known, no.known)};
+    return r;
+}
+
+INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
+    crossing c;
+    c.hit = (m & yes.hit) | (~m & no.hit);
+    c.t = pick(m, yes.t, no.t);
+    c.steps = pick(m, yes.steps, no.steps);
+    c.count = pick(m, yes.count, no.count);
+    c.bad = pick(m, yes.bad, no.bad);
+#if MARCH_KEEPS_SURFACE
+    c.surface.gradient = vec_pick(m, yes.surface.gradient, no.surface.gradient);
+    c.surface.square = pick(m, yes.surface.square, no.surface.square);
+    c.surface.square_before = pick(m, yes.surface.square_before, no.surface.square_before);
+    c.end_count = pick(m, yes.end_count, no.end_count);
+#endif
+    return c;
+}
+
 // What a march is after (see march.h and march_steps.h).
 #define GOAL_SURFACE 0
 #define GOAL_SHADOW 1

@@ -1,5 +1,5 @@
 // One shot at a pixel: its ray from the eye, the points that share its march, and what lights them, in one loop of legs
-// around one march, so that the march is compiled once. Legs of a path, in order:
+// around one march, so that the march is compiled once. Rays of several turns go together (batch.h). Legs of a path, in order:
 //
 //   STAGE_EYE      the ray from the eye, or after a bounce the mirrored one. With several points to the pixel the ray only
 //                  finds out how far the pixel's whole cone is free
@@ -19,6 +19,21 @@ typedef struct {
     vec normal, point;
     real smooth, steps;   // escape count; distance evaluations of the rays from the eye
 } shot;
+
+// Turns of a stage, each with one ray of every pixel.
+INLINE int stage_turns(int stage, __constant const struct March *settings) {
+    if (stage == STAGE_POINT) return POINTS;
+    if (stage == STAGE_AMBIENT) return settings->cosine_rays + settings->map_rays;
+    return stage == STAGE_LIGHT ? settings->light_count * settings->light_rays : 1;
+}
+
+// The turn after this one: some lights need fewer rays than the one that needs most.
+INLINE int next_turn(int stage, int turn, world w) {
+    if (stage != STAGE_LIGHT) return turn + 1;
+    const int light = turn / w.settings->light_rays;
+    const int next = turn + 1;
+    return next - light * w.settings->light_rays < w.lights[light].rays ? next : (light + 1) * w.settings->light_rays;
+}
 
 // The shot at (x, y), in pixels from the picture's top left corner. `index` counts the shots at each lane's pixel, whose
 // column and row `columns` and `rows` tell.
@@ -59,94 +74,107 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
 #if POINTS > 1
     pixel_points points = points_begin(columns, rows, sample, seed);
 #endif
+    batch rays;
     int stage = STAGE_EYE, turn = 0, bounce = 0;
     for (;;) {
-        // The leg's ray.
-        ray leg = path;
-        mask active = on_path;
-        int goal = GOAL_SURFACE;
-        incidence in;
-        in.strength = R(0.0);
-        const int light_index = stage == STAGE_LIGHT ? turn / w.settings->light_rays : 0;
-        __constant const struct Light *light = w.lights + light_index;
-        if (stage == STAGE_EYE) {
-            active &= ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
+        // The legs' rays: several turns at once, so that lanes need not wait for each other.
+        const int goal = stage == STAGE_EYE ? (POINTS > 1 && bounce == 0 ? GOAL_TOUCH : GOAL_SURFACE)
+                         : stage == STAGE_POINT ? (SEARCH == SEARCH_STEPS ? GOAL_POINT : GOAL_SURFACE) : GOAL_SHADOW;
+        const int first = turn, end = stage_turns(stage, w.settings);
+        int legs = 0;
+        rays.count = 0;
+        for (; legs < BATCH_TURNS && turn < end; ++legs) {
+            ray leg = path;
+            mask active = on_path;
+            real strength = R(0.0);
+            if (stage == STAGE_EYE) {
+                if (goal == GOAL_TOUCH) {
+                    leg.footprint *= (real)(w.settings->touch_share);
+                    leg.spread *= (real)(w.settings->touch_share);
+                }
+            }
 #if POINTS > 1
-            if (bounce == 0) {
-                goal = GOAL_TOUCH;
-                leg.footprint *= (real)(w.settings->touch_share);
-                leg.spread *= (real)(w.settings->touch_share);
+            else if (stage == STAGE_POINT) {
+                leg = points_ray(&points, turn, x, y, lens_x, lens_y, w);
+                active = points.touched;
             }
 #endif
-        }
-#if POINTS > 1
-        else if (stage == STAGE_POINT) {
-            leg = points_ray(&points, turn, x, y, lens_x, lens_y, w);
-            active = points.touched & ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
-            goal = SEARCH == SEARCH_STEPS ? GOAL_POINT : GOAL_SURFACE;
-        }
-#endif
-        else {
-            goal = GOAL_SHADOW;
+            else {
+                incidence in;
 #if HAS_AMBIENT
-            if (stage == STAGE_AMBIENT) in = ambient_ray(&here, turn, sample, columns, rows, bounce, w);
+                if (stage == STAGE_AMBIENT) in = ambient_ray(&here, turn, sample, columns, rows, bounce, w);
 #endif
-            if (stage == STAGE_LIGHT) {
-                in = light_at(light, here.point);
+                if (stage == STAGE_LIGHT) {
+                    const int light_index = turn / w.settings->light_rays;
+                    __constant const struct Light *light = w.lights + light_index;
+                    in = light_at(light, here.point);
 #if HAS_SOFT_LIGHT
-                in.toward = soft_light(in.toward, light, light_index, turn % w.settings->light_rays, sample, columns, rows,
-                                       bounce, w);
+                    in.toward = soft_light(in.toward, light, light_index, turn % w.settings->light_rays, sample, columns, rows,
+                                           bounce, w);
 #endif
-                if (light->shadow == 0) active = active & ~active;
+                    if (light->shadow == 0) active = active & ~active;
+                }
+                active &= faces(&here, in.toward);
+                strength = in.strength;
+                // Leave the surface far enough for the ray not to meet the very bump it starts from.
+                leg.origin = vec_along(here.point, here.cone * (real)(w.settings->shadow_lift), here.normal);
+                leg.direction = in.toward;
+                leg.near = R(0.0);
+                leg.far = in.distance;
+                leg.footprint = here.cone * (real)(w.settings->shadow_detail);
+                leg.spread = R(0.0);
             }
-            active &= faces(&here, in.toward);
-            // Leave the surface far enough for the ray not to meet the very bump it starts from.
-            leg.origin = vec_along(here.point, here.cone * (real)(w.settings->shadow_lift), here.normal);
-            leg.direction = in.toward;
-            leg.near = R(0.0);
-            leg.far = in.distance;
-            leg.footprint = here.cone * (real)(w.settings->shadow_detail);
-            leg.spread = R(0.0);
             active &= ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
+            batch_add(&rays, legs, leg, strength, active);
+            turn = next_turn(stage, turn, w);
         }
+        batch_run(&rays, goal, w.settings, w.orbit, w.k);
 
+        // What they tell.
+        ray leg = path;
         crossing met = nothing_met(R(0.0));
-        if (any_lane(active)) {
-            met = march(leg, active, goal, w.settings, w.orbit, w.k);
-            cost->steps += met.steps;
-            cost->count += met.count;
-            if (stage <= STAGE_POINT) cost->bad += met.bad;
-            if (stage <= STAGE_POINT && bounce == 0) result.steps += met.steps;
-        }
         vec normal = none;
         real smooth = R(0.0);
-        if (goal != GOAL_SHADOW && goal != GOAL_TOUCH && any_lane(met.hit)) {
-            surface_at(leg, &met, met.hit, w, &normal, &smooth, cost);
-        }
-
-        // What it tells, and the next leg.
-        if (stage == STAGE_AMBIENT || stage == STAGE_LIGHT) {
-            const vec to_viewer = vec_scale(path.direction, R(-1.0));
-#if HAS_AMBIENT
-            if (stage == STAGE_AMBIENT) {
-                const color more = ambient_light(&here, turn, in, met, w, &open);
-                gathered = color_pick(on_path, color_add(gathered, more), gathered);
-                if (++turn < w.settings->cosine_rays + w.settings->map_rays) continue;
-                gathered = limited(gathered, w.settings);
-                stage = STAGE_LIGHT;
-                turn = 0;
-                if (w.settings->light_count > 0) continue;
-            } else
+        int at = first;
+        for (int i = 0; i < legs; ++i) {
+            leg = batch_ray(&rays, i);
+            met = batch_found(&rays, i);
+            cost->steps += met.steps;
+            cost->count += met.count;
+            if (stage <= STAGE_POINT) {
+                cost->bad += met.bad;
+                if (bounce == 0) result.steps += met.steps;
+                if (goal != GOAL_TOUCH && any_lane(met.hit)) surface_at(leg, &met, met.hit, w, &normal, &smooth, cost);
+#if POINTS > 1
+                if (stage == STAGE_POINT) points_add(&points, at, leg, met, normal, smooth, w);
 #endif
-            {
-                const color more = lit_by(&here, in, ~met.hit, open, to_viewer, light, w.material);
-                gathered = color_pick(on_path, color_add(gathered, color_scale(more, (real)(light->share))), gathered);
-                ++turn;
-                // Lights that need fewer rays than the one that needs most.
-                if (turn % w.settings->light_rays >= light->rays) turn = (light_index + 1) * w.settings->light_rays;
-                if (turn < w.settings->light_count * w.settings->light_rays) continue;
+            } else {
+                incidence in;
+                in.toward = leg.direction;
+                in.strength = batch_strength(&rays, i);
+#if HAS_AMBIENT
+                if (stage == STAGE_AMBIENT) {
+                    gathered = color_pick(on_path, color_add(gathered, ambient_light(&here, at, in, met, w, &open)), gathered);
+                }
+#endif
+                if (stage == STAGE_LIGHT) {
+                    __constant const struct Light *light = w.lights + at / w.settings->light_rays;
+                    const vec to_viewer = vec_scale(path.direction, R(-1.0));
+                    const color more = lit_by(&here, in, ~met.hit, open, to_viewer, light, w.material);
+                    gathered = color_pick(on_path, color_add(gathered, color_scale(more, (real)(light->share))), gathered);
+                }
             }
-        } else {
+            at = next_turn(stage, at, w);
+        }
+        if (turn < end) continue;
+
+        // What comes next.
+        if (stage == STAGE_AMBIENT) {
+            gathered = limited(gathered, w.settings);
+            stage = STAGE_LIGHT;
+            turn = 0;
+            if (w.settings->light_count > 0) continue;
+        } else if (stage != STAGE_LIGHT) {
             mask found = met.hit;
 #if POINTS > 1
             if (bounce == 0) {
@@ -155,9 +183,6 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
                     stage = STAGE_POINT;
                     turn = 0;
                     if (any_lane(met.hit)) continue;
-                } else {
-                    points_add(&points, turn, leg, met, normal, smooth, w);
-                    if (++turn < POINTS) continue;
                 }
                 found = points_spot(&points, eye_ray, &here, &result.coverage, w);
             } else
@@ -221,6 +246,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
         path.near = R(0.0);
         path.far = (real)(REAL_LARGEST);
         stage = STAGE_EYE;
+        turn = 0;
         ++bounce;
     }
     color background = sky(eye_ray.direction, y, 0, w);

@@ -17,6 +17,7 @@
 #else
 #include "march.h"
 #endif
+#include "batch.h"
 #include "sampling.h"
 #include "shade.h"
 #include "normals.h"
