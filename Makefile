@@ -11,6 +11,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 # The tests run in a folder that holds links to them but no `clfractal`: they find the installed one.
 STAGE := build/stage
+# A worker for each core; compiling a kernel keeps one busy for seconds. Idle workers take tests of others.
+PARALLEL := -n auto --dist worksteal
 STAGED := tests benchmarks docs scenes README.md CHANGELOG.md pyproject.toml Makefile
 
 PYTHON := $(shell for python in python3.13 python3.12 python3.11 python3 python; do \
@@ -28,7 +30,7 @@ demo: $(VENV)/.installed
 install: $(VENV)/.installed
 
 test: lint $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(CURDIR)/$(BIN)/python -P -m pytest $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(CURDIR)/$(BIN)/python -P -m pytest $(PARALLEL) $(ARGUMENTS)
 
 lint: $(VENV)/.tested-with
 	$(BIN)/ruff check .

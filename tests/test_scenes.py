@@ -55,7 +55,8 @@ THESIS_FIGURES = {
     "figure16": "figure 16",
 }
 
-each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+# By module: all tests of one scene come together, and in one process, which renders it once.
+each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem, scope="module")
 
 
 def comment(path: Path) -> list[str]:

@@ -55,7 +55,7 @@ def _examine(implementation: Implementation) -> list[str]:
         return ["not there and not to be installed"]
     environment.update(_oclgrind_checks(implementation))
     found = []
-    if not _run(["pytest", "-q", "-m", "conformance", *_tests(implementation)], environment):
+    if not _run(["pytest", "-q", "-n", "auto", "-m", "conformance", *_tests(implementation)], environment):
         found.append("conformance tests fail")
     for kind in ("tiny",) if implementation.simulator else ("full", "tiny"):
         pictures = _pictures(implementation, kind)

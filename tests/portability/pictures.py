@@ -28,7 +28,7 @@ CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "
 _LIGHTS = """
 lights:
   - {type: directional, direction: [-1, 1, -1]}
-  - {type: point, position: [2, -2, 1], color: [0.3, 0.4, 0.6], intensity: 2, falloff: inverse_square}
+  - {type: point, position: %s, color: [0.3, 0.4, 0.6], intensity: 2, falloff: inverse_square}
 """
 
 _SCENES: dict[str, str] = {
@@ -72,11 +72,13 @@ def picture(
     """All channels of a picture, shape (channels, height, width); with the best lane count if none is given."""
     lanes = lanes or tune.best_lanes(device, precision)
     # The formula's bounds say where the camera has to be for the picture to be filled.
-    bounds = load_scene(_scene_text(name, (0.0, -9.0, 0.0), (0.0, 0.0, 0.0), size)).chain
+    far = (0.0, -99.0, 0.0)
+    bounds = load_scene(_scene_text(name, far, (0.0, 0.0, 0.0), far, size)).chain
     x, y, z = (float(value) for value in bounds.center)
     radius = float(bounds.radius)
     position = (x + 0.7 * radius, y - 2.1 * radius, z + 0.7 * radius)
-    scene = load_scene(_scene_text(name, position, (x, y, z), size))
+    lamp = (x + radius, y - radius, z + 0.5 * radius)
+    scene = load_scene(_scene_text(name, position, (x, y, z), lamp, size))
     plan = make_plan(scene, precision=precision, lanes=lanes, channels=CHANNELS)
     film = Film(plan.channels, size, plan.region)
     engine.render(scene, plan, device, film)
@@ -86,12 +88,18 @@ def picture(
     return np.stack([film[channel] for channel in CHANNELS])
 
 
-def _scene_text(name: str, position: Sequence[float], target: Sequence[float], size: tuple[int, int]) -> str:
+def _scene_text(
+    name: str,
+    position: Sequence[float],
+    target: Sequence[float],
+    lamp: Sequence[float],
+    size: tuple[int, int],
+) -> str:
     width, height = size
     return (
         f"version: 1\nformula: {_SCENES[name]}\nimage: {{width: {width}, height: {height}}}\n"
         f"camera: {{position: {list(position)}, target: {list(target)}, fov: 45{_LENSES.get(name, '')}}}\n"
-        f"renderer: {_RENDERERS.get(name, '{samples: 2}')}\n{_LIGHTS}{_MORE.get(name, '')}"
+        f"renderer: {_RENDERERS.get(name, '{samples: 2}')}\n{_LIGHTS % list(lamp)}{_MORE.get(name, '')}"
     )
 
 
