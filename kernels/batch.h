@@ -54,11 +54,11 @@ INLINE void crossing_store(crossing c, scalar *numbers, int stride) {
     lanes_store(c.count, numbers + 3 * stride);
     lanes_store(c.bad, numbers + 4 * stride);
 #if MARCH_KEEPS_SURFACE
-    lanes_store(c.surface.gradient.x, numbers + 5 * stride);
-    lanes_store(c.surface.gradient.y, numbers + 6 * stride);
-    lanes_store(c.surface.gradient.z, numbers + 7 * stride);
-    lanes_store(c.surface.square, numbers + 8 * stride);
-    lanes_store(c.surface.square_before, numbers + 9 * stride);
+    lanes_store(c.end_surface.gradient.x, numbers + 5 * stride);
+    lanes_store(c.end_surface.gradient.y, numbers + 6 * stride);
+    lanes_store(c.end_surface.gradient.z, numbers + 7 * stride);
+    lanes_store(c.end_surface.square, numbers + 8 * stride);
+    lanes_store(c.end_surface.square_before, numbers + 9 * stride);
     lanes_store(c.end_count, numbers + 10 * stride);
 #endif
 }
@@ -71,10 +71,10 @@ INLINE crossing crossing_load(const scalar *numbers, int stride) {
     c.count = lanes_load(numbers + 3 * stride);
     c.bad = lanes_load(numbers + 4 * stride);
 #if MARCH_KEEPS_SURFACE
-    c.surface.gradient = vec_of(lanes_load(numbers + 5 * stride), lanes_load(numbers + 6 * stride),
+    c.end_surface.gradient = vec_of(lanes_load(numbers + 5 * stride), lanes_load(numbers + 6 * stride),
                                 lanes_load(numbers + 7 * stride));
-    c.surface.square = lanes_load(numbers + 8 * stride);
-    c.surface.square_before = lanes_load(numbers + 9 * stride);
+    c.end_surface.square = lanes_load(numbers + 8 * stride);
+    c.end_surface.square_before = lanes_load(numbers + 9 * stride);
     c.end_count = lanes_load(numbers + 10 * stride);
 #endif
     return c;

@@ -136,9 +136,9 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     m->high = pick(inside, m->t, m->high);
     m->low = pick(outside, m->t, m->low);
 #if MARCH_KEEPS_SURFACE
-    m->found.surface.gradient = vec_pick(outside, surface.gradient, m->found.surface.gradient);
-    m->found.surface.square = pick(outside, surface.square, m->found.surface.square);
-    m->found.surface.square_before = pick(outside, surface.square_before, m->found.surface.square_before);
+    m->found.end_surface.gradient = vec_pick(outside, surface.gradient, m->found.end_surface.gradient);
+    m->found.end_surface.square = pick(outside, surface.square, m->found.end_surface.square);
+    m->found.end_surface.square_before = pick(outside, surface.square_before, m->found.end_surface.square_before);
     m->found.end_count = pick(outside, here.count, m->found.end_count);
 #endif
 

@@ -70,7 +70,7 @@ typedef struct {
     real count;   // formula applications of all of them
     real bad;     // steps that the distance called safe and that ended inside
 #if MARCH_KEEPS_SURFACE
-    surface_point surface;  // at t, with the applications there; a gradient of 0 if t was never seen from outside
+    surface_point end_surface;  // at t, with the applications there; a gradient of 0 if t was never seen from outside
     real end_count;
 #endif
 } crossing;
@@ -83,9 +83,9 @@ INLINE crossing nothing_met(real t) {
     c.count = R(0.0);
     c.bad = R(0.0);
 #if MARCH_KEEPS_SURFACE
-    c.surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
-    c.surface.square = R(1.0);
-    c.surface.square_before = R(1.0);
+    c.end_surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
+    c.end_surface.square = R(1.0);
+    c.end_surface.square_before = R(1.0);
     c.end_count = R(0.0);
 #endif
     return c;
@@ -106,9 +106,9 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
     c.count = pick(m, yes.count, no.count);
     c.bad = pick(m, yes.bad, no.bad);
 #if MARCH_KEEPS_SURFACE
-    c.surface.gradient = vec_pick(m, yes.surface.gradient, no.surface.gradient);
-    c.surface.square = pick(m, yes.surface.square, no.surface.square);
-    c.surface.square_before = pick(m, yes.surface.square_before, no.surface.square_before);
+    c.end_surface.gradient = vec_pick(m, yes.end_surface.gradient, no.end_surface.gradient);
+    c.end_surface.square = pick(m, yes.end_surface.square, no.end_surface.square);
+    c.end_surface.square_before = pick(m, yes.end_surface.square_before, no.end_surface.square_before);
     c.end_count = pick(m, yes.end_count, no.end_count);
 #endif
     return c;

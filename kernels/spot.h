@@ -45,7 +45,7 @@ INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
 // at first). Normals from the positions of points need it.
 INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, real *smooth, tally *cost) {
 #if MARCH_KEEPS_SURFACE
-    const surface_point surface = met->surface;
+    const surface_point surface = met->end_surface;
     const sphere there = {R(0.0), met->end_count, less(R(1.0), R(0.0))};
 #elif POLISH
     surface_point surface;

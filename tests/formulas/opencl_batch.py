@@ -20,7 +20,9 @@ from clfractal.resources import folder
 
 Floats = npt.NDArray[np.floating[Any]]
 
-_DEFINED = re.compile(r"^(?:INLINE \w+|__kernel void|#define|#undef) (\w+)|^\} (\w+);", re.MULTILINE)
+_DEFINED = re.compile(
+    r"^(?:INLINE \w+|__kernel void|#define|#undef) (\w+)|^(?:\}|typedef [\w(), ]+) (\w+);", re.MULTILINE
+)
 _INCLUDES = re.compile(r'^#include "(?:lanes|vectors|structs|formula|orbit|numbers/\w+)\.h"\n', re.MULTILINE)
 
 HEAD = "".join(
