@@ -1,14 +1,45 @@
 // Rays of a packet's pixels that wait for a lane, and what they find. A pixel sends several rays for one purpose: to its
 // points, to parts of a light, into the hemisphere. Were they marched turn by turn, all lanes would wait for the slowest pixel
 // of each turn (70 % of all lanes with 3 x 3 points); here a lane that is done takes the next ray, whichever pixel sent it.
-// What a ray finds depends on nothing but the ray, so the order is free.
-#if POINTS > 1 || HAS_AMBIENT || HAS_SOFT_LIGHT
+// What a ray finds depends on nothing but the ray, so the order is free. The steps of the search by steps are too cheap, and
+// neighbours' too alike, for it to pay (a quarter slower).
+#if SEARCH == SEARCH_DISTANCE && (POINTS > 1 || HAS_AMBIENT || HAS_SOFT_LIGHT)
 #define BATCH_TURNS 9
-#define REFILL (LANES > 4 ? LANES / 4 : 1)   // idle lanes that are worth a pause for new rays
 #else
 #define BATCH_TURNS 1
-#define REFILL LANES
 #endif
+
+#if BATCH_TURNS == 1
+// One ray of each pixel, in the pixel's own lane: nothing waits, and nothing need be written down.
+typedef struct {
+    ray r;
+    crossing found;
+    real strength;
+    mask waiting;
+} batch;
+
+INLINE void batch_clear(batch *b) { b->strength = R(0.0); }
+
+INLINE void batch_add(batch *b, int turn, ray r, real strength, mask wanted) {
+    b->r = r;
+    b->strength = strength;
+    b->waiting = wanted;
+}
+
+INLINE ray batch_ray(const batch *b, int turn) { return b->r; }
+INLINE crossing batch_found(const batch *b, int turn) { return b->found; }
+INLINE real batch_strength(const batch *b, int turn) { return b->strength; }
+
+INLINE void batch_run(batch *b, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                      __constant const scalar *k) {
+    march m = {0};
+    march_begin(&m, b->r, b->waiting, goal, settings);
+    m.found.t = b->r.near;
+    while (any_lane(m.active)) march_step(&m, goal, settings, orbit, k);
+    b->found = m.found;
+}
+#else
+#define REFILL (LANES > 2 ? LANES / 2 : 1)   // idle lanes that are worth a pause for new rays
 #define BATCH_RAYS (BATCH_TURNS * LANES)
 #define RAY_NUMBERS 11
 #define CROSSING_NUMBERS (MARCH_KEEPS_SURFACE ? 11 : 5)
@@ -80,6 +111,8 @@ INLINE crossing crossing_load(const scalar *numbers, int stride) {
     return c;
 }
 
+INLINE void batch_clear(batch *b) { b->count = 0; }
+
 // Adds one ray of each pixel; those that are not wanted have met nothing.
 INLINE void batch_add(batch *b, int turn, ray r, real strength, mask wanted) {
     lanes_store(strength, b->strength + turn * LANES);
@@ -130,3 +163,4 @@ INLINE void batch_run(batch *b, int goal, __constant const struct March *setting
         march_step(&m, goal, settings, orbit, k);
     }
 }
+#endif

@@ -82,7 +82,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
                          : stage == STAGE_POINT ? (SEARCH == SEARCH_STEPS ? GOAL_POINT : GOAL_SURFACE) : GOAL_SHADOW;
         const int first = turn, end = stage_turns(stage, w.settings);
         int legs = 0;
-        rays.count = 0;
+        batch_clear(&rays);
         for (; legs < BATCH_TURNS && turn < end; ++legs) {
             ray leg = path;
             mask active = on_path;
