@@ -20,7 +20,22 @@ from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float64]
 
-CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps", "samples")
+CHANNELS = (
+    "R",
+    "G",
+    "B",
+    "A",
+    "Z",
+    "N.X",
+    "N.Y",
+    "N.Z",
+    "P.X",
+    "P.Y",
+    "P.Z",
+    "iterations",
+    "steps",
+    "samples",
+)
 
 # Squaring the quaternion x + iy + jz squares its length, so after n applications |z| <= 4 is the ball of radius
 # 4^(2^-n) exactly.
