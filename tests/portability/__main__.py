@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -54,17 +55,31 @@ def _examine(implementation: Implementation) -> list[str]:
         print(error)
         return ["not there and not to be installed"]
     environment.update(_oclgrind_checks(implementation))
+    # Most of the time goes into compiling, one core each.
+    with ThreadPoolExecutor(2) as both:
+        parts = [part.result() for part in [both.submit(part, implementation, environment) for part in PARTS]]
+    found = [fault for part in parts for fault in part]
+    if implementation.simulator:
+        found += _memory_faults(environment)
+    return found
+
+
+def _conformance_faults(implementation: Implementation, environment: Mapping[str, str]) -> list[str]:
+    passed = _run(["pytest", "-q", "-m", "conformance", *_tests(implementation)], environment)
+    return [] if passed else ["conformance tests fail"]
+
+
+def _picture_faults(implementation: Implementation, environment: Mapping[str, str]) -> list[str]:
     found = []
-    if not _run(["pytest", "-q", "-n", "auto", "-m", "conformance", *_tests(implementation)], environment):
-        found.append("conformance tests fail")
     for kind in ("tiny",) if implementation.simulator else ("full", "tiny"):
         pictures = _pictures(implementation, kind)
         pictures.unlink(missing_ok=True)
         if not _run(["tests.portability.pictures", str(pictures), kind], environment):
             found.append(f"the {kind} pictures fail")
-    if implementation.simulator:
-        found += _memory_faults(environment)
     return found
+
+
+PARTS = (_conformance_faults, _picture_faults)
 
 
 def _tests(implementation: Implementation) -> list[str]:
