@@ -55,8 +55,8 @@ def _examine(implementation: Implementation) -> list[str]:
         print(error)
         return ["not there and not to be installed"]
     environment.update(_oclgrind_checks(implementation))
-    # Most of the time goes into compiling, one core each.
-    with ThreadPoolExecutor(2) as both:
+    # Most of the time goes into compiling, one core each. (The simulator's processes share a log.)
+    with ThreadPoolExecutor(1 if implementation.simulator else 2) as both:
         parts = [part.result() for part in [both.submit(part, implementation, environment) for part in PARTS]]
     found = [fault for part in parts for fault in part]
     if implementation.simulator:
