@@ -20,7 +20,7 @@ from clfractal.render.outputs import save_outputs
 from clfractal.render.plan import Plan, PrecisionChoice, choose_precision, make_plan
 from clfractal.render.probe import probe_for
 from clfractal.render.tiled import TiledStore
-from clfractal.render.view import camera_view
+from clfractal.render.view import scene_view
 from clfractal.scene.model import Scene
 
 MAX_SAMPLES = 65_536
@@ -50,7 +50,7 @@ class Job:
     def header(self) -> dict[str, Any]:
         """What picture files tell about the picture (see `Film`); `seconds` is added when it is known."""
         scene = self.scene
-        view = camera_view(scene.camera, scene.image.width, scene.image.height)
+        view = scene_view(scene)
         return {
             "scene": write_document(self.resolved()),
             "version": clfractal.__version__,

@@ -13,9 +13,10 @@ import pyopencl as cl
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError
 from clfractal.render.plan import Plan
-from clfractal.render.surface import Batch, SurfaceWorker
 from clfractal.render.tiled import TiledStore
 from clfractal.render.tiles import TILE, Tile
+from clfractal.render.worker import Batch, TileWorker
+from clfractal.render.workers import make_worker
 from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float32]
@@ -87,7 +88,7 @@ def render(
     tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first.
 
     Raises:
-        DeviceError, KernelBuildError: see `SurfaceWorker`.
+        DeviceError, KernelBuildError: see `TileWorker`.
     """
     order = store.grid.order_from_center()
     pending = order[~store.done[order]]
@@ -95,7 +96,7 @@ def render(
     state.tiles_before = state.tiles_done
     if len(pending) == 0:
         return state
-    worker = SurfaceWorker(scene, plan, device, capacity=min(CAPACITY, len(pending)), on_compile=on_compile)
+    worker = make_worker(scene, plan, device, capacity=min(CAPACITY, len(pending)), on_compile=on_compile)
     state.build_ms = worker.program.build_ms
     state.started = time.perf_counter()
     _Loop(worker, store, state, progress).run(pending)
@@ -104,7 +105,7 @@ def render(
 
 def render_tile(scene: Scene, plan: Plan, device: Device, tile: Tile) -> Floats:
     """One tile on its own: float32 of shape (channels, height, width), the same bits as in a whole render."""
-    worker = SurfaceWorker(scene, plan, device, capacity=1)
+    worker = make_worker(scene, plan, device, capacity=1)
     batch = worker.start(np.array([tile.index], np.int32))
     wait(batch, device)
     film, _ = worker.collect(batch)
@@ -129,7 +130,7 @@ class _Loop:
     """Keeps two batches under way, so that the device does not wait for the host."""
 
     def __init__(
-        self, worker: SurfaceWorker, store: TiledStore, state: Progress, progress: ProgressCallback | None
+        self, worker: TileWorker, store: TiledStore, state: Progress, progress: ProgressCallback | None
     ) -> None:
         self.worker, self.store, self.state, self.progress = worker, store, state, progress
         units = max(worker.device.info.compute_units, 1)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from clfractal.device.orbit import ORBIT, Record
+from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.formulas.language import Chain
 from clfractal.render.environment import PackedEnvironment, material_fields
 from clfractal.render.tiles import Region
 from clfractal.render.view import View
@@ -40,20 +40,6 @@ VIEW = Struct(
         Field("region_top", "int", 0, "first row to render"),
         Field("region_right", "int", 0, "first column right of the region"),
         Field("region_bottom", "int", 0, "first row below the region"),
-    ],
-)
-
-ORBIT = Struct(
-    "Orbit",
-    [
-        Field("iterations", "int", 0, "most applications of the formula"),
-        Field("longest", "int", 0, "applications allowed to get from the bailout to the distance bailout"),
-        Field("bailout_square", "real", 0, "|z|^2 beyond which a point has escaped"),
-        Field("distance_square", "real", 0, "|z|^2 beyond which distances are exact enough"),
-        Field("log_bailout", "real", 0, "natural logarithm of the bailout"),
-        Field("log_distance_bailout", "real", 0, "natural logarithm of the distance bailout"),
-        Field("log2_degree", "real", 0, "binary logarithm of the degree of one application"),
-        Field("solid_radius", "real", 0, "radius in z that holds the last solid, for degree 1"),
     ],
 )
 
@@ -148,9 +134,6 @@ MATERIAL = Struct(
 STRUCTS = (VIEW, ORBIT, MARCH, LIGHT, MATERIAL)
 
 LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
-# Applications past the iteration limit that get a lane from the bailout to the distance bailout. Degree 2 needs four
-# from 4 to 1000, degree 1.1 in a chain some twenty.
-EXTRA_APPLICATIONS = 24
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
@@ -159,8 +142,6 @@ FILTERS = ("box", "tent", "blackman_harris")
 FILTER_WIDTHS = {"box": 1.0, "tent": 2.0, "blackman_harris": 3.0}
 # Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
 EXTRA_TESTS = 64
-
-Record = np.ndarray[Any, np.dtype[np.void]]
 
 
 def struct_text() -> str:
@@ -193,28 +174,9 @@ def view_record(view: View, width: int, height: int, region: Region, precision: 
     return VIEW.value(precision, values)
 
 
-def orbit_record(chain: Chain, iterations: int, precision: Precision, bailout: float | None = None) -> Record:
-    """The limits of an orbit; `bailout` replaces the formula's own."""
-    inner = bailout if bailout is not None else chain.bailout
-    outer = max(inner, chain.distance_bailout)
-    # Linear maps measure the solid of exactly `iterations` applications; one more would be a smaller solid.
-    linear = chain.degree <= 1
-    values = {
-        "iterations": iterations,
-        "longest": iterations if linear or outer == inner else iterations + EXTRA_APPLICATIONS,
-        "bailout_square": inner**2,
-        "distance_square": outer**2,
-        "log_bailout": math.log(inner),
-        "log_distance_bailout": math.log(outer),
-        "log2_degree": math.log2(chain.degree) / chain.cycle_length if chain.degree > 1 else 0.0,
-        "solid_radius": chain.solid_radius,
-    }
-    return ORBIT.value(precision, values)
-
-
 def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
     """The settings of the march, of a pixel's shots and of the rays that they send."""
-    chain, renderer = scene.chain, scene.renderer
+    chain, renderer = scene.chain, scene.surface
     center, radius = used_bounds(scene)
     points = renderer.used_points.count
     point_share = 1 / math.sqrt(points)
@@ -267,7 +229,7 @@ class HemisphereRays:
 
 def hemisphere_rays(scene: Scene) -> HemisphereRays:
     """Ambient occlusion and the environment's light share the rays that are spread like the cosine."""
-    occlusion = scene.renderer.ambient_occlusion
+    occlusion = scene.surface.ambient_occlusion
     open_rays = occlusion.rays if occlusion is not None else 0
     lit_rays = scene.environment.rays if scene.environment is not None else 0
     return HemisphereRays(max(open_rays, (lit_rays + 1) // 2), lit_rays // 2, lit_rays > 0)

@@ -12,9 +12,11 @@ from clfractal.device.structs import Precision
 from clfractal.errors import SceneError, Where
 from clfractal.files.channels import check_channels
 from clfractal.render.tiles import Region
-from clfractal.render.view import View, camera_view
-from clfractal.scene.checks import used_bounds
+from clfractal.render.view import View, scene_view
+from clfractal.scene.checks import used_bounds, used_boxes
 from clfractal.scene.model import Scene
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import VolumeRenderer
 
 PrecisionChoice = Literal["auto", "float32", "float64"]
 
@@ -56,12 +58,31 @@ def finest_steps(scene: Scene, view: View) -> float:
         nearest = float(np.linalg.norm(center - view.eye)) - radius
         footprint *= min(nearest, plane) / plane if nearest > 0 else 1.0
     magnitude = max(float(np.abs(view.center).max()), float(np.abs(view.origin).max()), 1e-30)
+    unit = magnitude * float(np.finfo(np.float32).eps)
     renderer = scene.renderer
+    if isinstance(renderer, VolumeRenderer):
+        return _finest_voxels(scene, renderer)
+    if not isinstance(renderer, SurfaceRenderer):
+        return footprint / unit
     # The points of a pixel lie closer, and normals that are made from their places need them exact.
     footprint /= math.sqrt(renderer.used_points.count)
     if renderer.normal != "gradient" or scene.coloring.by == "residual":
         footprint /= PLACES_PER_POINT
-    return renderer.detail * footprint / (magnitude * float(np.finfo(np.float32).eps))
+    return renderer.detail * footprint / unit
+
+
+def _finest_voxels(scene: Scene, renderer: VolumeRenderer) -> float:
+    """Of a volume it is the voxels that are evaluated; their coordinates are found in float64, and rounded once."""
+    _, box = used_boxes(scene, renderer)
+    sides = np.array(box.sides)
+    resolution = renderer.resolution if isinstance(renderer.resolution, tuple) else (renderer.resolution,) * 3
+    voxel = float(
+        (sides / np.array(resolution)).min()
+        if isinstance(renderer.resolution, tuple)
+        else sides.max() / resolution[0]
+    )
+    magnitude = max(float((np.abs(np.array(box.center)) + sides / 2).max()), 1e-30)
+    return voxel / (magnitude * float(np.finfo(np.float32).eps))
 
 
 def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool) -> tuple[Precision, str]:
@@ -74,7 +95,7 @@ def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool
         raise SceneError("the device has no float64; use float32", Where("--precision"))
     if wanted != "auto":
         return wanted, ""
-    view = camera_view(scene.camera, scene.image.width, scene.image.height)
+    view = scene_view(scene)
     if finest_steps(scene, view) >= FLOAT32_STEPS_PER_PIXEL:
         return "float32", ""
     if has_float64:

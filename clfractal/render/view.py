@@ -10,7 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.plane import Placed
 
 Vector = npt.NDArray[np.float64]
 
@@ -98,3 +101,23 @@ def camera_view(camera: PerspectiveCamera | OrthographicCamera, width: int, heig
         plane_height, center, eye = camera.height, position, None
     plane_width = plane_height * width / height
     return View(center, side, up, axis, plane_width, plane_height, eye, position, lens_radius, focus_distance)
+
+
+def plane_view(plane: Placed, width: int, height: int) -> View:
+    """A plane as it lies in space, seen from straight above: an orthographic view whose depth is 0 on the plane.
+
+    All of the plane is in the picture: one that is narrower or wider than the picture has more of space beside it.
+    """
+    center, side, up, normal = (
+        np.array(vector, float) for vector in (plane.center, plane.side, plane.up, plane.normal)
+    )
+    shown = max(plane.height, plane.width * height / width)
+    return View(center, side, up, -normal, shown * width / height, shown, None, center)
+
+
+def scene_view(scene: Scene) -> View:
+    """What a scene's picture shows: the plane of the cut-plane renderer, else what its camera sees."""
+    width, height = scene.image.width, scene.image.height
+    if isinstance(scene.renderer, CutPlaneRenderer):
+        return plane_view(scene.renderer.plane.placed, width, height)
+    return camera_view(scene.camera, width, height)

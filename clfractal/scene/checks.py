@@ -7,6 +7,8 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import Box, VolumeRenderer
 
 MAX_STEPS_THROUGH = 1_000_000
 # A point that has not escaped after so many applications is inside for every practical purpose: it bounds the time
@@ -17,16 +19,42 @@ _MOST_APPLICATIONS = 2_000
 def check_parts(scene: Scene) -> None:
     """Raises SceneError, at its dotted path, for what is wrong only together."""
     radius = used_bounds(scene)[1]
-    _check_step(scene.renderer.step, radius, "renderer.step")
     _check_step(scene.coloring.step, radius, "coloring.step")
-    _check_residual(scene)
+    if isinstance(scene.renderer, SurfaceRenderer):
+        _check_step(scene.renderer.step, radius, "renderer.step")
+        _check_residual(scene, scene.renderer)
+    if isinstance(scene.renderer, VolumeRenderer):
+        used_boxes(scene, scene.renderer)
     _check_lights(scene)
 
 
 def used_bounds(scene: Scene) -> tuple[Vector, float]:
     """Centre and radius of the ball that is looked in, scene units: the renderer's, or the formula's own."""
-    bounds = scene.renderer.bounds
+    bounds = scene.renderer.bounds if isinstance(scene.renderer, SurfaceRenderer) else None
     return (bounds.center, bounds.radius) if bounds else (scene.chain.center, scene.chain.radius)
+
+
+def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:
+    """The box that a volume's picture shows, and the one that is filled after all zooms.
+
+    Raises:
+        SceneError: a zoom's box is not within the one before.
+    """
+    center, radius = used_bounds(scene)
+    first = renderer.box if renderer.box is not None else Box(center=center, size=2 * radius)
+    last = first
+    for index, zoom in enumerate(renderer.zoom):
+        sides = last.sides
+        smaller = (sides[0] / zoom.scale, sides[1] / zoom.scale, sides[2] / zoom.scale)
+        for here, there, side, part in zip(zoom.center, last.center, sides, smaller, strict=True):
+            if abs(here - there) > 0.5 * (side - part) * (1 + 1e-9) + 1e-14 * abs(there):
+                raise SceneError(
+                    f"the box must lie within the one before, {there - side / 2:.17g} to {there + side / 2:.17g},"
+                    f" got {here - part / 2:.17g} to {here + part / 2:.17g}",
+                    Where(path=f"renderer.zoom.{index}.center"),
+                )
+        last = Box(center=zoom.center, size=smaller)
+    return first, last
 
 
 def _check_step(step: float | None, radius: float, path: str) -> None:
@@ -46,9 +74,9 @@ def _check_step(step: float | None, radius: float, path: str) -> None:
         )
 
 
-def _check_residual(scene: Scene) -> None:
+def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
     """Through fewer points than four a plane fits exactly."""
-    count = scene.renderer.used_points.count
+    count = renderer.used_points.count
     if scene.coloring.by == "residual" and count < 4:
         raise SceneError(
             f"residual needs at least 4 points of a pixel (renderer.points), got {count}",

@@ -16,7 +16,8 @@ from clfractal.scene.coloring import Coloring
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Image, Material, Output
-from clfractal.scene.surface import Renderer
+from clfractal.scene.renderer import Renderer
+from clfractal.scene.surface import SurfaceRenderer
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
@@ -83,6 +84,12 @@ class Scene(Section):
         from clfractal.scene.environment import read_map
 
         return read_map(self.environment, self.folder)
+
+    @property
+    def surface(self) -> SurfaceRenderer:
+        """The surface renderer's settings, of a scene that has them."""
+        assert isinstance(self.renderer, SurfaceRenderer)
+        return self.renderer
 
     def resolved(self) -> dict[str, Any]:
         """Plain data (as for YAML or JSON) with every default filled in; it loads back to an equal scene."""

@@ -3,17 +3,16 @@
 from math import isqrt
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from clfractal.scene.base import Position, Section, chosen_by, problem
+from clfractal.scene.base import Position, Section, problem
+from clfractal.scene.sampled import Sampled
 
 Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 
 # The normals that are made from a middle point and the eight around it: of a grid with an odd side.
 GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")
 MAX_POINTS = 64
-# Where `min_samples` leaves it open: fewer tell too little about how much a pixel's samples scatter.
-USUAL_MIN_SAMPLES = 16
 
 
 class Ball(Section):
@@ -50,7 +49,7 @@ class AmbientOcclusion(Section):
     )
 
 
-class SurfaceRenderer(Section):
+class SurfaceRenderer(Sampled):
     """The boundary of the set, found by marching along each ray."""
 
     tag = "surface"
@@ -84,28 +83,9 @@ class SurfaceRenderer(Section):
     ambient_occlusion: AmbientOcclusion | None = Field(
         None, description="darkens what sees little of its surroundings; none if null"
     )
-    samples: int = Field(
-        1, ge=1, le=65_536, description="rays per pixel; the most of them if `noise` is given"
-    )
-    noise: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
-        None, description="a pixel gets no more samples once its standard error is below this; all if null"
-    )
-    min_samples: Annotated[int, Field(strict=True, ge=4, le=65_536)] | None = Field(
-        None, description="samples before the noise of a pixel is judged; 16, or all if fewer, if null"
-    )
-    filter: Literal["box", "tent", "blackman_harris"] = Field(
-        "box", description="how samples around a pixel are weighted"
-    )
-    filter_width: Annotated[float, Field(strict=True, ge=0.1, le=16)] | None = Field(
-        None, description="the filter's width, pixels; box 1, tent 2, blackman_harris 3 if null"
-    )
     firefly_limit: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
         10.0,
         description="most light that one sample's mirror or environment rays may bring, after exposure; no limit if null",
-    )
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of samples, points and rays")
-    precision: Literal["auto", "float32", "float64"] = Field(
-        "auto", description="number type of the rays; auto: float64 where pixels are too fine for float32"
     )
 
     @model_validator(mode="after")
@@ -121,25 +101,9 @@ class SurfaceRenderer(Section):
             raise problem(f"{self.normal} needs at least 4 points, got {count}", "normal")
         return self
 
-    @model_validator(mode="after")
-    def _enough_samples(self) -> Self:
-        if self.noise is not None and self.min_samples is not None and self.min_samples > self.samples:
-            raise problem(f"must be at most samples ({self.samples}), got {self.min_samples}", "min_samples")
-        return self
-
-    @property
-    def used_min_samples(self) -> int:
-        """Samples before the noise of a pixel is judged, never more than `samples`."""
-        wanted = USUAL_MIN_SAMPLES if self.min_samples is None else self.min_samples
-        return min(wanted, self.samples)
-
     @property
     def used_points(self) -> Points:
         """The points in use, where `points` leaves them to the normal."""
         if self.points is not None:
             return self.points
         return Points(pattern="grid", count=1 if self.normal == "gradient" else 9)
-
-
-# With one class there is nothing to choose; a second makes this a union like Camera's.
-Renderer = Annotated[Annotated[SurfaceRenderer, Tag("surface")], chosen_by("type", "surface")]

@@ -1,0 +1,25 @@
+"""Which renderer draws a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from clfractal.device.select import Device
+from clfractal.render.plan import Plan
+from clfractal.render.surface import SurfaceWorker
+from clfractal.render.worker import TileWorker
+from clfractal.scene.model import Scene
+
+WORKERS: dict[str, type[TileWorker]] = {"surface": SurfaceWorker}
+
+
+def make_worker(
+    scene: Scene,
+    plan: Plan,
+    device: Device,
+    *,
+    capacity: int,
+    on_compile: Callable[[str], None] | None = None,
+) -> TileWorker:
+    """The worker of the scene's renderer; see `TileWorker`."""
+    return WORKERS[scene.renderer.type](scene, plan, device, capacity=capacity, on_compile=on_compile)

@@ -1,0 +1,59 @@
+"""The cut-plane renderer's settings, and cut planes that stand in another renderer's picture."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, Tag
+
+from clfractal.scene.base import Color, Coordinate, Fraction, Section, chosen_by_word
+from clfractal.scene.coloring import Stop
+from clfractal.scene.plane import Plane
+from clfractal.scene.sampled import Sampled
+
+Palette = Annotated[
+    Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
+    | Annotated[tuple[Stop, ...], Field(strict=False, min_length=2, max_length=256), Tag("stops")],
+    Field(
+        discriminator=chosen_by_word("name", "stops"),
+        description="a palette's name, or stops in order of `at`",
+    ),
+]
+
+
+class EscapeColors(Section):
+    """Colours of a plane through the set: the palette at scale * curve(count / limit) + offset, and one for the inside."""
+
+    palette: Palette = "viridis"
+    mode: Literal["smooth", "stepped"] = Field("smooth", description="smooth counts, or whole ones")
+    curve: Literal["linear", "root", "log"] = Field(
+        "linear", description="of count / limit: itself, its square root, or log(count) / log(limit)"
+    )
+    scale: Coordinate = Field(1.0, description="palettes from count 0 to the limit")
+    offset: Coordinate = Field(0.0, description="start in the palette")
+    repeat: bool = Field(False, description="whether the palette begins again after its end")
+    inside: Color = Field((0.0, 0.0, 0.0), description="of points that never escape, linear Rec. 709")
+
+
+class CutPlaneRenderer(Sampled):
+    """The formula on a plane: escape counts as colours, one evaluation for each sample."""
+
+    tag = "cut_plane"
+    type: Literal["cut_plane"] = "cut_plane"
+    plane: Plane = Field(default_factory=dict, validate_default=True)
+    colors: EscapeColors = Field(default_factory=dict, validate_default=True)
+    periodicity: bool = Field(
+        True, description="whether points inside are found early, by orbits that come back"
+    )
+
+
+class CutPlane(Section):
+    """A plane that stands in the picture of the object, coloured by escape counts."""
+
+    plane: Plane = Field(default_factory=dict, validate_default=True)
+    colors: EscapeColors = Field(default_factory=dict, validate_default=True)
+    opacity: Fraction = Field(0.8, description="of the plane outside the set; 0: not shown there")
+    cut: bool = Field(False, description="whether the object in front of the plane is removed")
+    iterations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] | None = Field(
+        None, description="most applications of the formula on the plane; the scene's if null"
+    )
+    count: int = Field(1, ge=1, le=256, description="parallel planes")
+    spacing: Coordinate = Field(0.1, description="from one to the next along the normal, scene units")

@@ -1,0 +1,17 @@
+"""The ways to look at a scene, chosen by `renderer.type`."""
+
+from typing import Annotated
+
+from pydantic import Tag
+
+from clfractal.scene.base import chosen_by
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import VolumeRenderer
+
+Renderer = Annotated[
+    Annotated[SurfaceRenderer, Tag("surface")]
+    | Annotated[VolumeRenderer, Tag("volume")]
+    | Annotated[CutPlaneRenderer, Tag("cut_plane")],
+    chosen_by("type", "surface"),
+]

@@ -1,0 +1,46 @@
+"""What every renderer has: samples of a pixel, how they are put together, and the number type."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.scene.base import Section, problem
+
+# Where `min_samples` leaves it open: fewer tell too little about how much a pixel's samples scatter.
+USUAL_MIN_SAMPLES = 16
+
+
+class Sampled(Section):
+    """Samples, their filter, and the number type."""
+
+    samples: int = Field(
+        1, ge=1, le=65_536, description="rays per pixel; the most of them if `noise` is given"
+    )
+    noise: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
+        None, description="a pixel gets no more samples once its standard error is below this; all if null"
+    )
+    min_samples: Annotated[int, Field(strict=True, ge=4, le=65_536)] | None = Field(
+        None, description="samples before the noise of a pixel is judged; 16, or all if fewer, if null"
+    )
+    filter: Literal["box", "tent", "blackman_harris"] = Field(
+        "box", description="how samples around a pixel are weighted"
+    )
+    filter_width: Annotated[float, Field(strict=True, ge=0.1, le=16)] | None = Field(
+        None, description="the filter's width, pixels; box 1, tent 2, blackman_harris 3 if null"
+    )
+    seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of samples, points and rays")
+    precision: Literal["auto", "float32", "float64"] = Field(
+        "auto", description="number type; auto: float64 where pixels are too fine for float32"
+    )
+
+    @model_validator(mode="after")
+    def _enough_samples(self) -> Self:
+        if self.noise is not None and self.min_samples is not None and self.min_samples > self.samples:
+            raise problem(f"must be at most samples ({self.samples}), got {self.min_samples}", "min_samples")
+        return self
+
+    @property
+    def used_min_samples(self) -> int:
+        """Samples before the noise of a pixel is judged, never more than `samples`."""
+        wanted = USUAL_MIN_SAMPLES if self.min_samples is None else self.min_samples
+        return min(wanted, self.samples)

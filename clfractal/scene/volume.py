@@ -1,0 +1,126 @@
+"""The volume renderer's settings: the box that is filled, what its voxels hold, and how rays go through."""
+
+from math import prod
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, Tag, model_validator
+
+from clfractal.scene.base import Color, Fraction, Position, Section, Vector, problem
+from clfractal.scene.sampled import Sampled
+
+MAX_RESOLUTION = 16_384
+Side = Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION)]
+Sides = Annotated[tuple[Side, Side, Side], Field(strict=False), Tag("sides")]
+Size = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
+
+
+class Box(Section):
+    """A box in space, its sides along the axes."""
+
+    center: Position = Field((0.0, 0.0, 0.0), description="scene units")
+    size: Annotated[tuple[Size, Size, Size], Field(strict=False)] | Size = Field(
+        4.0, description="its sides, scene units; one number for a cube"
+    )
+
+    @property
+    def sides(self) -> Vector:
+        """Lengths of the sides, scene units."""
+        return self.size if isinstance(self.size, tuple) else (self.size, self.size, self.size)
+
+
+class Zoom(Section):
+    """A smaller box within the one before."""
+
+    center: Position = Field(description="of the smaller box, scene units")
+    scale: Annotated[float, Field(strict=True, ge=1, le=1e15, allow_inf_nan=False)] = Field(
+        description="how many times its sides go into those of the box before"
+    )
+
+
+class OpacityStop(Section):
+    """An opacity at a value of a voxel; between two stops it is mixed."""
+
+    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel")
+    opacity: Fraction = Field(description="of the length of a voxel's side, 0 to 1")
+
+
+class ColorStop(Section):
+    """A colour at a value of a voxel; between two stops colours are mixed in linear light."""
+
+    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel")
+    color: Color = Field(description="linear Rec. 709")
+
+
+class Transfer(Section):
+    """What the values of voxels look like."""
+
+    opacity: Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = (
+        Field(None, description="stops in order of `at`; a surface at the middle value if null")
+    )
+    color: Annotated[tuple[ColorStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = Field(
+        None, description="stops in order of `at`; the material's colour if null"
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        for name in ("opacity", "color"):
+            stops = getattr(self, name) or ()
+            for index in range(1, len(stops)):
+                if stops[index].at < stops[index - 1].at:
+                    raise problem(
+                        f"must be at least {stops[index - 1].at:g}, that of the stop before,"
+                        f" got {stops[index].at:g}",
+                        f"{name}.{index}.at",
+                    )
+        return self
+
+
+class VolumeRenderer(Sampled):
+    """Rays through a grid of voxels, front to back, until nothing shines through."""
+
+    tag = "volume"
+    type: Literal["volume"] = "volume"
+    box: Box | None = Field(None, description="what is filled; a cube around the formula's bounds if null")
+    zoom: Annotated[tuple[Zoom, ...], Field(strict=False, max_length=64)] = Field(
+        (), description="smaller boxes, each within the one before; shown as large as the first"
+    )
+    resolution: Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION), Tag("side")] | Sides = Field(
+        512, description="voxels along the longest side, or along x, y and z"
+    )
+    file: str | None = Field(
+        None,
+        min_length=1,
+        description="a grid to show in place of the formula: NRRD or NPY, beside the scene",
+    )
+    value: Literal["inside", "coverage", "iterations"] = Field(
+        "inside",
+        description="of a voxel: whether its middle is inside, which part of it is, or its smooth count",
+    )
+    sub_points: int = Field(3, ge=1, le=16, description="points along each side of a voxel for `coverage`")
+    store: Literal["byte", "float"] = Field("byte", description="how values are kept: in 8 bits or in 32")
+    fill: Literal["octree", "brute"] = Field(
+        "octree", description="skip what the distance says is outside, or evaluate every voxel"
+    )
+    normals: Literal["gradient", "least_squares", "exact"] = Field(
+        "gradient",
+        description="central differences, a plane through the surface in a voxel, or the Jacobian",
+    )
+    normal_radius: int = Field(
+        1, ge=0, le=4, description="of the low-pass filter before `gradient`, voxels; 0: none"
+    )
+    interpolation: Literal["trilinear", "nearest"] = Field(
+        "trilinear", description="values between the middles of voxels"
+    )
+    step: Annotated[float, Field(strict=True, ge=0.01, le=4)] = Field(
+        0.5, description="along the ray, in sides of a voxel"
+    )
+    opacity_limit: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+        0.99, description="a ray ends once it is that opaque"
+    )
+    transfer: Transfer = Field(default_factory=dict, validate_default=True)
+    shadows: bool = Field(False, description="whether lights with a shadow send rays through the grid")
+
+    @property
+    def magnification(self) -> float:
+        """How many times the smallest box goes into the first."""
+        return prod(zoom.scale for zoom in self.zoom)
