@@ -1,23 +1,7 @@
 // Shading after the thesis's Eq. 5: for each light
 //   colour * intensity * (ambient * M + s * (diffuse * M * max(0, N.L) + specular * max(0, R.V)^shininess)),
 // M the surface's colour, s 0 in shadow and 1 outside. Colours are linear Rec. 709.
-typedef struct {
-    real r, g, b;
-} color;
-
-INLINE color color_of(real r, real g, real b) {
-    const color c = {r, g, b};
-    return c;
-}
-INLINE color color_splat(__constant const scalar *c) { return color_of((real)(c[0]), (real)(c[1]), (real)(c[2])); }
-INLINE color color_pick(mask m, color yes, color no) {
-    return color_of(pick(m, yes.r, no.r), pick(m, yes.g, no.g), pick(m, yes.b, no.b));
-}
-INLINE color color_mix(color a, color b, real share) {
-    return color_of(a.r + (b.r - a.r) * share, a.g + (b.g - a.g) * share, a.b + (b.b - a.b) * share);
-}
-INLINE color color_add(color a, color b) { return color_of(a.r + b.r, a.g + b.g, a.b + b.b); }
-INLINE color color_scale(color a, real s) { return color_of(a.r * s, a.g * s, a.b * s); }
+#include "color.h"
 
 // A light as seen from a point of the surface.
 typedef struct {
@@ -60,28 +44,9 @@ INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask 
                     in.strength * (real)(light->color[2]) * (body * surface.b + specular));
 }
 
-// Where a quantity lies in the palette, 0 to 1: the palette repeats, or its ends go on.
+// Where coloring.h's quantity lies in the palette, 0 to 1.
 INLINE real palette_place(real quantity, __constant const struct Material *material) {
-    const real where = quantity * (real)(material->palette_scale) + (real)(material->palette_offset);
-    const real place = material->palette_repeat ? where - floor(where) : clamp(where, R(0.0), R(1.0));
-    return pick(is_nan(place), R(0.0), place);
-}
-
-// A palette of PALETTE_SIZE colours, entry i at i / (PALETTE_SIZE - 1), blended linearly between neighbours. One that repeats
-// is squeezed by a 256th, where its last colour blends into its first.
-INLINE color palette_color(real place, int repeat, __global const float *palette) {
-    scalar at[LANES], red[LANES], green[LANES], blue[LANES];
-    const int intervals = repeat ? PALETTE_SIZE : PALETTE_SIZE - 1;
-    lanes_store(place * (real)((scalar)intervals), at);
-    for (int lane = 0; lane < LANES; ++lane) {
-        const int first = clamp((int)at[lane], 0, intervals - 1);
-        const int second = (first + 1) & (PALETTE_SIZE - 1);
-        const float share = (float)at[lane] - (float)first;
-        red[lane] = mix(palette[3 * first], palette[3 * second], share);
-        green[lane] = mix(palette[3 * first + 1], palette[3 * second + 1], share);
-        blue[lane] = mix(palette[3 * first + 2], palette[3 * second + 2], share);
-    }
-    return color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
+    return place_in_palette(quantity, material->palette_scale, material->palette_offset, material->palette_repeat);
 }
 
 // The surface's own colour M; `quantity` is that of coloring.h.

@@ -11,15 +11,6 @@
 #define STAGE_AMBIENT 2
 #define STAGE_LIGHT 3
 
-typedef struct {
-    color radiance;       // over the background; premultiplied where that is transparent
-    mask hit;             // of the rest: where any point of the pixel found the surface
-    real coverage;        // part of the points that did
-    real depth;           // along the view axis
-    vec normal, point;
-    real smooth, steps;   // escape count; distance evaluations of the rays from the eye
-} shot;
-
 // Turns of a stage, each with one ray of every pixel.
 INLINE int stage_turns(int stage, __constant const struct March *settings) {
     if (stage == STAGE_POINT) return POINTS;

@@ -1,0 +1,42 @@
+// Colours, linear Rec. 709, and palettes.
+typedef struct {
+    real r, g, b;
+} color;
+
+INLINE color color_of(real r, real g, real b) {
+    const color c = {r, g, b};
+    return c;
+}
+INLINE color color_splat(__constant const scalar *c) { return color_of((real)(c[0]), (real)(c[1]), (real)(c[2])); }
+INLINE color color_pick(mask m, color yes, color no) {
+    return color_of(pick(m, yes.r, no.r), pick(m, yes.g, no.g), pick(m, yes.b, no.b));
+}
+INLINE color color_mix(color a, color b, real share) {
+    return color_of(a.r + (b.r - a.r) * share, a.g + (b.g - a.g) * share, a.b + (b.b - a.b) * share);
+}
+INLINE color color_add(color a, color b) { return color_of(a.r + b.r, a.g + b.g, a.b + b.b); }
+INLINE color color_scale(color a, real s) { return color_of(a.r * s, a.g * s, a.b * s); }
+
+// Where a quantity lies in the palette, 0 to 1, at scale * quantity + offset: the palette repeats, or its ends go on.
+INLINE real place_in_palette(real quantity, scalar scale, scalar offset, int repeat) {
+    const real where = quantity * (real)(scale) + (real)(offset);
+    const real place = repeat ? where - floor(where) : clamp(where, R(0.0), R(1.0));
+    return pick(is_nan(place), R(0.0), place);
+}
+
+// A palette of PALETTE_SIZE colours, entry i at i / (PALETTE_SIZE - 1), blended linearly between neighbours. One that repeats
+// is squeezed by a 256th, where its last colour blends into its first.
+INLINE color palette_color(real place, int repeat, __global const float *palette) {
+    scalar at[LANES], red[LANES], green[LANES], blue[LANES];
+    const int intervals = repeat ? PALETTE_SIZE : PALETTE_SIZE - 1;
+    lanes_store(place * (real)((scalar)intervals), at);
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int first = clamp((int)at[lane], 0, intervals - 1);
+        const int second = (first + 1) & (PALETTE_SIZE - 1);
+        const float share = (float)at[lane] - (float)first;
+        red[lane] = mix(palette[3 * first], palette[3 * second], share);
+        green[lane] = mix(palette[3 * first + 1], palette[3 * second + 1], share);
+        blue[lane] = mix(palette[3 * first + 2], palette[3 * second + 2], share);
+    }
+    return color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
+}

@@ -1,0 +1,85 @@
+// What the samples of a pixel add up to, for every renderer.
+
+// What one sample found.
+typedef struct {
+    color radiance;       // over the background; premultiplied where that is transparent
+    mask hit;             // of the rest: where anything was found
+    real coverage;        // part of the sample that found something
+    real depth;           // along the view axis
+    vec normal, point;
+    real smooth, steps;   // escape count; evaluations
+} shot;
+
+// Sums over the shots of a pixel, and what the one nearest to its middle found.
+typedef struct {
+    color radiance;
+    real coverage, shots;
+    real brightness, brightness_square;   // of each shot, for its noise
+    real coverage_square;
+    real nearest;                         // distance squared of the kept shot from the middle, pixels
+    real depth;
+    vec normal, point;
+    real smooth, steps;
+} pixel;
+
+INLINE pixel pixel_start(void) {
+    pixel p = {0};
+    p.nearest = (real)(REAL_LARGEST);
+    return p;
+}
+
+// `offset`: distance squared of the shot from the pixel's middle, pixels.
+INLINE void pixel_add(pixel *p, shot s, mask active, real offset) {
+    const real one = pick(active, R(1.0), R(0.0));
+    p->radiance = color_pick(active, color_add(p->radiance, s.radiance), p->radiance);
+    p->coverage += pick(active, s.coverage, R(0.0));
+    p->shots += one;
+    // Data channels take the sample nearest the pixel's centre, never an average.
+    const mask nearer = active & less(offset, p->nearest);
+    const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
+    p->nearest = pick(nearer, offset, p->nearest);
+    p->depth = pick(nearer, pick(s.hit, s.depth, (real)(INFINITY)), p->depth);
+    p->normal = vec_pick(nearer, vec_pick(s.hit, s.normal, zero), p->normal);
+    p->point = vec_pick(nearer, vec_pick(s.hit, s.point, zero), p->point);
+    p->smooth = pick(nearer, pick(s.hit, s.smooth, R(0.0)), p->smooth);
+    p->steps = pick(nearer, s.steps, p->steps);
+}
+
+#if ADAPTIVE
+// Adds a shot to what tells a pixel's noise: brightness as the eye sees it, the square root of luminance, and coverage.
+INLINE void noise_add(pixel *p, shot s, mask active) {
+    const real luminance = R(0.2126) * s.radiance.r + R(0.7152) * s.radiance.g + R(0.0722) * s.radiance.b;
+    const real seen = pick(active, sqrt(fmax(luminance, R(0.0))), R(0.0));
+    p->brightness += seen;
+    p->brightness_square += seen * seen;
+    p->coverage_square += pick(active, s.coverage * s.coverage, R(0.0));
+}
+
+// The standard error of a pixel's mean: of its brightness, or of its coverage if that is larger and is seen.
+INLINE real noise_of(const pixel *p, int transparent) {
+    const real share = R(1.0) / p->shots;
+    const real mean = p->brightness * share, coverage = p->coverage * share;
+    const real of_coverage = transparent ? p->coverage_square * share - coverage * coverage : R(0.0);
+    const real variance = fmax(p->brightness_square * share - mean * mean, of_coverage);
+    return sqrt(fmax(variance, R(0.0)) / fmax(p->shots - R(1.0), R(1.0)));
+}
+#endif
+
+// Writes a pixel's channels; `slots` tells for each its place among the wanted ones, or -1; `film` begins at the tile.
+INLINE void pixel_write(__global float *film, __constant const int *slots, const int *place, const pixel *p) {
+    const real share = R(1.0) / fmax(p->shots, R(1.0));
+    write_channel(film, slots[CHANNEL_R], place, p->radiance.r * share);
+    write_channel(film, slots[CHANNEL_G], place, p->radiance.g * share);
+    write_channel(film, slots[CHANNEL_B], place, p->radiance.b * share);
+    write_channel(film, slots[CHANNEL_A], place, p->coverage * share);
+    write_channel(film, slots[CHANNEL_Z], place, p->depth);
+    write_channel(film, slots[CHANNEL_NX], place, p->normal.x);
+    write_channel(film, slots[CHANNEL_NY], place, p->normal.y);
+    write_channel(film, slots[CHANNEL_NZ], place, p->normal.z);
+    write_channel(film, slots[CHANNEL_PX], place, p->point.x);
+    write_channel(film, slots[CHANNEL_PY], place, p->point.y);
+    write_channel(film, slots[CHANNEL_PZ], place, p->point.z);
+    write_channel(film, slots[CHANNEL_ITERATIONS], place, p->smooth);
+    write_channel(film, slots[CHANNEL_STEPS], place, p->steps);
+    write_channel(film, slots[CHANNEL_SAMPLES], place, p->shots);
+}
