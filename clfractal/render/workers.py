@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clfractal.device.select import Device
+from clfractal.render.cut_plane import CutPlaneWorker
 from clfractal.render.plan import Plan
 from clfractal.render.surface import SurfaceWorker
 from clfractal.render.worker import TileWorker
 from clfractal.scene.model import Scene
 
-WORKERS: dict[str, type[TileWorker]] = {"surface": SurfaceWorker}
+WORKERS: dict[str, type[TileWorker]] = {"surface": SurfaceWorker, "cut_plane": CutPlaneWorker}
 
 
 def make_worker(

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from clfractal.scene.coloring import Coloring, Stop
 
 SIZE = 256
-_WHERE = Where(path="coloring.palette")
 
 
 def palette_table(coloring: Coloring) -> NDArray[np.float32]:
@@ -28,15 +27,18 @@ def palette_table(coloring: Coloring) -> NDArray[np.float32]:
     Raises:
         SceneError: no palette has this name.
     """
-    if isinstance(coloring.palette, str):
-        return _named(coloring.palette).copy()
-    return _from_stops(coloring.palette)
+    return named_table(coloring.palette)
 
 
-def check_palette(palette: str | Sequence[Stop]) -> None:
-    """Raises SceneError, at coloring.palette, for a name that no palette has."""
+def named_table(palette: str | Sequence[Stop]) -> NDArray[np.float32]:
+    """As `palette_table`, of a palette by its name or stops."""
+    return _named(palette).copy() if isinstance(palette, str) else _from_stops(palette)
+
+
+def check_palette(palette: str | Sequence[Stop], path: str = "coloring.palette") -> None:
+    """Raises SceneError, at the key that it stands under, for a name that no palette has."""
     if isinstance(palette, str) and palette.removesuffix("_r") not in PALETTES:
-        _colormap(palette)
+        _colormap(palette, path)
 
 
 def _from_stops(stops: Sequence[Stop]) -> NDArray[np.float32]:
@@ -57,7 +59,7 @@ def _named(name: str) -> NDArray[np.float32]:
     return decode(colors[:, :3]).astype(np.float32)
 
 
-def _colormap(name: str) -> Colormap:
+def _colormap(name: str, path: str = "coloring.palette") -> Colormap:
     # Here, since it takes longer to import than a small picture to render.
     from cmap import Colormap
 
@@ -70,7 +72,7 @@ def _colormap(name: str) -> Colormap:
             if guess
             else f"; known: {', '.join(PALETTES)}, and the names of cmap's catalog"
         )
-        raise SceneError(f"unknown palette {name[:60]!r}{hint}", _WHERE) from error
+        raise SceneError(f"unknown palette {name[:60]!r}{hint}", Where(path=path)) from error
 
 
 def _names() -> list[str]:

@@ -1,0 +1,103 @@
+// Escape of points of a plane: exact counts with no distances, and orbits that come back found early.
+//
+// From the build: PERIODICITY (0 or 1) and PERIOD_CHECK, applications between two looks for an orbit that came back, a
+// multiple of the chain's cycle.
+
+// The bits of two numbers are the same: unlike `equal`, for zeros of either sign it tells them apart.
+#if REAL_IS_DOUBLE
+#if LANES == 1
+#define same_bits(a, b) (-(as_long(a) == as_long(b)))
+#else
+#define same_bits(a, b) (JOIN(as_long, LANES)(a) == JOIN(as_long, LANES)(b))
+#endif
+#elif LANES == 1
+#define same_bits(a, b) (-(as_int(a) == as_int(b)))
+#else
+#define same_bits(a, b) (as_mask(a) == as_mask(b))
+#endif
+
+typedef struct {
+    real count;         // applications until |z| > bailout, whole or smooth; the limit for points that never get there
+    mask inside;
+    real applications;  // that it took to know
+} escaped;
+
+// The escape of points. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
+// of the distances of orbit.h; else they are whole, those of `orbit_count`.
+//
+// A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
+// ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
+// 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
+// will do: an orbit that comes near itself may still escape.
+INLINE escaped plane_escape(vec point, mask active, int smooth, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    state c, z;
+    start(point, k, &c, &z);
+    const real radius_square = (real)(smooth ? orbit->distance_square : orbit->bailout_square);
+    real square = state_square(z);
+    real square_before = square;
+    real count = (real)((scalar)min(FIRST_COUNT, orbit->iterations));
+    mask alive = active & less_equal(square, radius_square);
+    mask inside = active & ~active;
+#if PERIODICITY && !HAS_SHAPE
+    state kept = z;
+    real highest = square;  // |z|^2 since then
+    int next_keep = FIRST_COUNT + PERIOD_CHECK;
+#endif
+    int n = FIRST_COUNT, limit = orbit->iterations;
+    for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
+        while (n < limit) {
+            if (!any_lane(alive)) break;
+            const int end = min(n + PERIOD_CHECK, limit);
+            for (; n < end; ++n) {
+                if (!any_lane(alive)) break;
+                z = state_pick(alive, apply(n, z, c, k), z);
+#if !LOGARITHMIC
+                square_before = pick(alive, square, square_before);
+#endif
+                square = state_square(z);
+                count += pick(alive, R(1.0), R(0.0));
+                alive &= less_equal(square, radius_square);
+#if PERIODICITY && !HAS_SHAPE
+                if (smooth) highest = fmax(highest, square);
+#endif
+            }
+#if PERIODICITY && !HAS_SHAPE
+            mask back = alive & same_bits(z.s0, kept.s0) & same_bits(z.s1, kept.s1) & same_bits(z.s2, kept.s2);
+#if STATE_SIZE > 3
+            back &= same_bits(z.s3, kept.s3);
+#endif
+            // An orbit that comes and goes between the two radii is inside or not by the last application.
+            if (smooth) back &= less_equal(highest, (real)(orbit->bailout_square));
+            inside |= back;
+            alive &= ~back;
+            if (n >= next_keep) {
+                kept = z;
+                highest = square;
+                next_keep = 2 * n;
+            }
+#endif
+        }
+        if (past_limit) break;
+        // At the limit: inside, or on the way from the bailout to the distance bailout.
+#if HAS_SHAPE
+        inside |= alive & less_equal(solid_distance(z, k), R(0.0));
+#else
+        inside |= smooth ? alive & settled(square, orbit) : alive;
+#endif
+        alive &= ~inside;
+        limit = orbit->longest;
+    }
+    escaped result;
+    result.applications = count;
+    result.inside = inside;
+    if (smooth) {
+        const sphere last = {R(0.0), count, inside};
+        surface_point surface;
+        surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
+        surface.square = square;
+        surface.square_before = square_before;
+        count = smooth_count(last, surface, orbit);
+    }
+    result.count = pick(inside, (real)((scalar)orbit->iterations), count);
+    return result;
+}
