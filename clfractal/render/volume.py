@@ -1,0 +1,222 @@
+"""The volume renderer: what its rays read besides the grid, and the tables that tell what values look like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.source import FlatText, flatten
+from clfractal.device.structs import Field, Struct
+from clfractal.render import layout
+from clfractal.render.plan import Plan
+from clfractal.render.view import scene_view
+from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
+from clfractal.scene.checks import used_boxes
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.fill import fill_grid
+from clfractal.voxels.grid import Grid
+
+TRANSFER_SIZE = 1024
+# Shadow rays leave the surface by this many voxels, so that they do not meet the voxel that they start from.
+SHADOW_LIFT = 1.5
+
+GRID = Struct(
+    "Grid",
+    [
+        Field("corner", "real", 3, "the box's least corner, in the picture's scene units"),
+        Field("scale", "real", 3, "voxels per scene unit"),
+        Field("sides", "int", 3, "voxels along x, y and z"),
+        Field("bricks", "int", 3, "bricks along x, y and z"),
+        Field("pool_bricks", "int", 0, "stored bricks in each buffer"),
+    ],
+)
+
+VOLUME = Struct(
+    "Volume",
+    [
+        Field("step", "real", 0, "from one place of a ray to the next, scene units"),
+        Field("level", "real", 0, "value of the surface, as it is kept"),
+        Field("low", "real", 0, "first value of the transfer table, as it is kept"),
+        Field("range", "real", 0, "one over the width of its values"),
+        Field("value_scale", "real", 0, "a kept value's worth"),
+        Field("opacity_limit", "real", 0, "a ray ends once it is that opaque"),
+        Field("shadow_lift", "real", 0, "where shadow rays start above the surface, scene units"),
+        Field("max_steps", "int", 0, "most places of a ray"),
+        Field("samples", "int", 0, "shots per pixel, at most"),
+        Field("min_samples", "int", 0, "shots before the noise is judged"),
+        Field("noise", "real", 0, "standard error at which a pixel is done"),
+        Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
+        Field("filter_width", "real", 0, "its width, pixels"),
+        Field("seed", "uint", 0, "chooses the places of the samples"),
+        Field("light_count", "int", 0, "number of lights"),
+    ],
+)
+
+STRUCTS = (layout.VIEW, layout.LIGHT, layout.MATERIAL, GRID, VOLUME)
+Floats = npt.NDArray[np.float32]
+
+
+def settings_of(scene: Scene) -> VolumeRenderer:
+    """The renderer of a volume scene."""
+    assert isinstance(scene.renderer, VolumeRenderer)
+    return scene.renderer
+
+
+def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
+    """The whole text of the program; the formula is no part of it."""
+    settings = settings_of(scene)
+    defines = {
+        **tile_defines(plan),
+        # The grid is looked at in a measure of its own, whatever it was filled with.
+        "REAL_IS_DOUBLE": 0,
+        "PALETTE_SIZE": 256,
+        "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
+        "TRANSFER_SIZE": TRANSFER_SIZE,
+        "SURFACE": int(settings.transfer.opacity is None),
+        "VALUE_IS_FLOAT": int(grid.is_float),
+        "NEAREST": int(settings.interpolation == "nearest"),
+        "POOLS": len(grid.values),
+        "HAS_SHADOWS": int(settings.shadows and any(light.shadow for light in scene.lights)),
+        "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
+        "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
+        "ADAPTIVE": int(settings.noise is not None),
+        # What headers of the surface's colours ask for.
+        "COLORING": 0,
+        "COLORING_SOLID": 0,
+        "COLORING_NORMAL": 1,
+    }
+    structs = "".join(struct.c_text() for struct in STRUCTS)
+    return flatten("volume.cl", generated={"structs.h": structs}, defines=defines)
+
+
+class VolumeWorker(TileWorker):
+    """Fills a scene's grid, then renders tiles of its picture."""
+
+    kernel_name = "volume"
+
+    def text(self) -> FlatText:
+        return program_text(self.scene, self.plan, self.grid)
+
+    def records(self) -> list[KernelArgument]:
+        """The constants and the grid's buffers, in the kernel's order."""
+        scene, plan = self.scene, self.plan
+        settings = settings_of(scene)
+        width, height = scene.image.width, scene.image.height
+        self.grid = fill_grid(
+            scene,
+            settings,
+            self.device,
+            lanes=plan.lanes,
+            precision=plan.precision,
+            on_compile=self.on_compile,
+        )
+        four = (0, 1, 2, 3)
+        return [
+            layout.view_record(scene_view(scene), width, height, plan.region, "float32"),
+            volume_record(scene, plan, self.grid),
+            grid_record(scene, self.grid),
+            layout.material_record(scene, "float32"),
+            layout.light_records(scene, "float32"),
+            transfer_table(scene, self.grid),
+            self.grid.table,
+            *(_one_of(self.grid.values, pool) for pool in four),
+            *(_one_of(self.grid.normals, pool) for pool in four),
+            channel_slots(plan),
+        ]
+
+
+def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
+    """Where the grid lies in the picture: in the first box, whatever is zoomed to."""
+    shown, _ = used_boxes(scene, settings_of(scene))
+    # A resolution that does not divide the box evenly goes past it a little.
+    size = np.array(grid.spacing) * np.array(grid.shape) * _zoom(scene)
+    values = {
+        "corner": np.array(shown.center) - size / 2,
+        "scale": np.array(grid.shape) / size,
+        "sides": grid.shape,
+        "bricks": grid.bricks,
+        "pool_bricks": grid.pool_bricks,
+    }
+    return GRID.value("float32", values)
+
+
+def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
+    """How rays go through the grid and how pixels are put together."""
+    settings = settings_of(scene)
+    voxel = float(min(grid.spacing)) * _zoom(scene)
+    step = settings.step * voxel
+    longest = float(np.linalg.norm(np.array(grid.spacing) * np.array(grid.shape))) * _zoom(scene)
+    low, high = value_range(scene, grid)
+    width = settings.filter_width
+    values = {
+        "step": step,
+        "level": (low + high) / 2,
+        "low": low,
+        "range": 1 / (high - low),
+        "value_scale": grid.value_scale,
+        "opacity_limit": settings.opacity_limit,
+        "shadow_lift": SHADOW_LIFT * voxel,
+        "max_steps": int(np.ceil(longest / step)) + 2,
+        "samples": plan.samples,
+        "min_samples": min(settings.used_min_samples, plan.samples),
+        "noise": settings.noise or 0.0,
+        "filter": layout.FILTERS.index(settings.filter),
+        "filter_width": width if width is not None else layout.FILTER_WIDTHS[settings.filter],
+        "seed": settings.seed,
+        "light_count": len(scene.lights),
+    }
+    return VOLUME.value("float32", values)
+
+
+def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
+    """The values between which the transfer table lies, as they are kept."""
+    transfer = settings_of(scene).transfer
+    stops = [stop.at for stop in (*(transfer.opacity or ()), *(transfer.color or ()))]
+    if not stops:
+        return grid.low, grid.high
+    kept = [at / grid.value_scale for at in stops]
+    low, high = min(kept), max(kept)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def transfer_table(scene: Scene, grid: Grid) -> Floats:
+    """Opacity of one step, red, green and blue (linear) at TRANSFER_SIZE values; shape (TRANSFER_SIZE, 4)."""
+    settings = settings_of(scene)
+    transfer = settings.transfer
+    low, high = value_range(scene, grid)
+    values = np.linspace(low, high, TRANSFER_SIZE) * grid.value_scale
+    table = np.empty((TRANSFER_SIZE, 4))
+    if transfer.opacity is None:
+        table[:, 0] = 1.0
+    else:
+        opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
+        # An opacity is that of one voxel's side; a step is a part of it (Beer's law).
+        table[:, 0] = 1 - (1 - opacity) ** settings.step
+    if transfer.color is None:
+        table[:, 1:] = scene.material.color
+    else:
+        table[:, 1:] = _mixed(values, [(stop.at, stop.color) for stop in transfer.color])
+    return np.ascontiguousarray(table, np.float32)
+
+
+def _mixed(
+    values: npt.NDArray[np.float64], stops: Sequence[tuple[float, Sequence[float]]]
+) -> npt.NDArray[np.float64]:
+    at = [place for place, _ in stops]
+    columns = zip(*(numbers for _, numbers in stops), strict=True)
+    return np.stack([np.interp(values, at, column) for column in columns], axis=1)
+
+
+def _zoom(scene: Scene) -> float:
+    """Scene units of the picture per scene unit of what is filled."""
+    return settings_of(scene).magnification
+
+
+def _one_of(pools: Sequence[cl.Buffer], pool: int) -> cl.Buffer:
+    return pools[min(pool, len(pools) - 1)]

@@ -1,0 +1,60 @@
+// One View makes all rays: a plane with an eye behind it, at infinity for an orthographic camera.
+typedef struct {
+    vec origin;       // scene units
+    vec direction;    // length 1
+    real near, far;   // the part of the ray to search, distances from the origin
+    real footprint;   // a pixel's width at distance 0 ...
+    real spread;      // ... and how much it grows per unit of distance
+    real known;       // distance of a hit that is proved already, on a ray of the same pixel
+} ray;
+
+#define RAY_NOTHING_KNOWN ((real)(REAL_LARGEST))
+
+// The ray through the picture at (x, y), in pixels from the top left corner, and through the lens at (lens_x, lens_y), in
+// lens radii from its middle.
+INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, __constant const struct View *view) {
+    const real across = x - (real)(view->center_x);
+    const real below = y - (real)(view->center_y);
+    const vec on_plane = vec_along(vec_along(vec_splat(view->center), across, vec_splat(view->right)), below, vec_splat(view->down));
+    ray r;
+    r.near = R(0.0);
+    r.far = (real)(REAL_LARGEST);
+    r.known = RAY_NOTHING_KNOWN;
+    if (view->perspective) {
+        // Relative to the eye, so that a far-off camera loses no more digits than it must.
+        const vec from_eye = vec_sub(on_plane, vec_splat(view->eye));
+        const real inverse = R(1.0) / sqrt(vec_dot(from_eye, from_eye));
+        r.origin = vec_splat(view->eye);
+        r.direction = vec_scale(from_eye, inverse);
+        r.footprint = R(0.0);
+        r.spread = (real)(view->pixel_size) * inverse;
+#if HAS_LENS
+        // A thin lens: whatever its point, all rays of a pixel meet again in the plane of focus.
+        const real to_focus = (real)(view->focus_distance) / vec_dot(r.direction, vec_splat(view->axis));
+        const vec on_lens = vec_along(vec_along(vec_of(R(0.0), R(0.0), R(0.0)), lens_x * (real)(view->lens_radius),
+                                                vec_splat(view->side)),
+                                      lens_y * (real)(view->lens_radius), vec_splat(view->up));
+        r.direction = vec_normalize(vec_sub(vec_scale(r.direction, to_focus), on_lens));
+        r.origin = vec_add(r.origin, on_lens);
+#endif
+    } else {
+        r.origin = on_plane;
+        r.direction = vec_splat(view->axis);
+        r.footprint = (real)(view->pixel_size);
+        r.spread = R(0.0);
+    }
+    return r;
+}
+
+// Cuts a ray to the formula's bounding sphere; lanes that miss it are not in the result.
+INLINE mask ray_clip(ray *r, __constant const scalar *center, scalar radius) {
+    const vec offset = vec_sub(r->origin, vec_splat(center));
+    const real middle = -vec_dot(offset, r->direction);
+    // Distance of the ray from the centre, by the perpendicular: b^2 - c would cancel for a far-off origin.
+    const vec nearest = vec_along(offset, middle, r->direction);
+    const real half_square = (real)(radius * radius) - vec_dot(nearest, nearest);
+    const real half_chord = sqrt(fmax(half_square, R(0.0)));
+    r->near = fmax(r->near, middle - half_chord);
+    r->far = fmin(r->far, middle + half_chord);
+    return less(R(0.0), half_square) & less(r->near, r->far);
+}

@@ -1,0 +1,71 @@
+// Loads from places that differ from lane to lane. Where the compiler generates x86 code directly it is told the instruction;
+// elsewhere lane after lane.
+#if LANES == 1
+#define to_ints(a) ((int)(a))
+#define to_reals(a) ((real)(a))
+#define ints_load(array) ((array)[0])
+#define ints_store(value, array) ((array)[0] = (value))
+#else
+#define to_ints(a) JOIN(convert_int, LANES)(a)
+#define to_reals(a) JOIN(convert_float, LANES)(a)
+#define ints_load(array) JOIN(vload, LANES)(0, array)
+#define ints_store(value, array) JOIN(vstore, LANES)(value, 0, array)
+#endif
+typedef mask ints;
+#if LANES == 1
+#define pick_ints(m, yes, no) ((m) ? (yes) : (no))
+#else
+#define pick_ints(m, yes, no) select((ints)(no), (ints)(yes), m)
+#endif
+
+#if defined(__has_builtin) && !defined(INTERPRETED)
+#if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
+#define gather_at(base, index, scale) \
+    __builtin_ia32_gathersiv16si((int16)(0), (const void *)(size_t)(base), index, (ushort)(0xffff), scale)
+#elif LANES == 8 && defined(__AVX2__) && __has_builtin(__builtin_ia32_gatherd_d256)
+#define gather_at(base, index, scale) \
+    __builtin_ia32_gatherd_d256((int8)(0), (__private const int *)(size_t)(base), index, (int8)(-1), scale)
+#endif
+#endif
+
+// 32 bits at base + index, in whole ints.
+INLINE ints gather_ints(__global const int *base, ints index) {
+#ifdef gather_at
+    return gather_at(base, index, 4);
+#else
+    int where[LANES], found[LANES];
+    ints_store(index, where);
+    for (int lane = 0; lane < LANES; ++lane) found[lane] = base[where[lane]];
+    return ints_load(found);
+#endif
+}
+
+INLINE real gather_floats(__global const float *base, ints index) {
+#ifdef gather_at
+    return as_real(gather_at(base, index, 4));
+#else
+    int where[LANES];
+    float found[LANES];
+    ints_store(index, where);
+    for (int lane = 0; lane < LANES; ++lane) found[lane] = base[where[lane]];
+    return lanes_load(found);
+#endif
+}
+
+// The bytes at base + index and at the next place. (Up to two more are read.)
+INLINE void gather_pair(__global const uchar *base, ints index, real *first, real *second) {
+#ifdef gather_at
+    const ints both = gather_at(base, index, 1);
+    *first = to_reals(both & 255);
+    *second = to_reals((both >> 8) & 255);
+#else
+    int where[LANES], one[LANES], two[LANES];
+    ints_store(index, where);
+    for (int lane = 0; lane < LANES; ++lane) {
+        one[lane] = base[where[lane]];
+        two[lane] = base[where[lane] + 1];
+    }
+    *first = to_reals(ints_load(one));
+    *second = to_reals(ints_load(two));
+#endif
+}

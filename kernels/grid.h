@@ -1,0 +1,129 @@
+// A grid of voxels in bricks: 8 x 8 x 8 cells between the middles of voxels, 9 x 9 x 9 samples, so that what lies in a cell is
+// found in one brick. `table` tells for each brick where it is stored, or, below 0, how large the empty octree node around it is.
+#define BRICK_CELLS 8
+#define BRICK_SIDE 9
+#define BRICK_STRIDE 736   // samples from one brick to the next
+
+#include "gather.h"
+
+typedef struct {
+    __constant const struct Grid *about;
+    __global const int *table;
+    __global const sample *values[4];
+    __global const uchar *normals[4];
+} grid;
+
+// A place among the cells: which one, and where in it, 0 to 1.
+typedef struct {
+    ints x, y, z;
+    real u, v, w;
+} cell;
+
+// The cell that holds a point, given in voxels from the grid's corner; beyond the outermost middles the nearest goes on.
+INLINE cell cell_at(vec p, __constant const struct Grid *about) {
+    const real x = clamp(p.x - R(0.5), R(0.0), (real)((scalar)(about->sides[0] - 1)));
+    const real y = clamp(p.y - R(0.5), R(0.0), (real)((scalar)(about->sides[1] - 1)));
+    const real z = clamp(p.z - R(0.5), R(0.0), (real)((scalar)(about->sides[2] - 1)));
+    cell c;
+    c.x = min(to_ints(x), (ints)(about->sides[0] - 2));
+    c.y = min(to_ints(y), (ints)(about->sides[1] - 2));
+    c.z = min(to_ints(z), (ints)(about->sides[2] - 2));
+    c.u = x - to_reals(c.x);
+    c.v = y - to_reals(c.y);
+    c.w = z - to_reals(c.z);
+    return c;
+}
+
+// The table's entry for a cell's brick.
+INLINE ints brick_at(cell c, grid g) {
+    return gather_ints(g.table, ((c.z >> 3) * g.about->bricks[1] + (c.y >> 3)) * g.about->bricks[0] + (c.x >> 3));
+}
+
+// Where a cell's first corner lies in its stored brick.
+INLINE ints corner_of(cell c) { return ((c.z & 7) * BRICK_SIDE + (c.y & 7)) * BRICK_SIDE + (c.x & 7); }
+
+INLINE real between(real a, real b, real share) { return a + (b - a) * share; }
+
+INLINE void value_pair(__global const sample *values, ints index, real *first, real *second) {
+#if VALUE_IS_FLOAT
+    *first = gather_floats(values, index);
+    *second = gather_floats(values, index + 1);
+#else
+    gather_pair(values, index, first, second);
+#endif
+}
+
+// The value in one buffer of stored bricks, as it is kept (0 to 255 in 8 bits).
+INLINE real pool_value(__global const sample *values, cell c, ints at) {
+    real a, b, d, e;
+    value_pair(values, at, &a, &b);
+    value_pair(values, at + BRICK_SIDE, &d, &e);
+#if NEAREST
+    const mask right = less_equal(R(0.5), c.u), up = less_equal(R(0.5), c.v), deep = less_equal(R(0.5), c.w);
+    const real low = pick(up, pick(right, e, d), pick(right, b, a));
+#else
+    const real low = between(between(a, b, c.u), between(d, e, c.u), c.v);
+#endif
+    value_pair(values, at + BRICK_SIDE * BRICK_SIDE, &a, &b);
+    value_pair(values, at + BRICK_SIDE * BRICK_SIDE + BRICK_SIDE, &d, &e);
+#if NEAREST
+    return pick(deep, pick(up, pick(right, e, d), pick(right, b, a)), low);
+#else
+    return between(low, between(between(a, b, c.u), between(d, e, c.u), c.v), c.w);
+#endif
+}
+
+// Adds a corner's normal, in 127.5ths, with a weight.
+INLINE void normal_add(__global const uchar *normals, ints at, real weight, vec *sum) {
+    const ints found = gather_ints((__global const int *)normals, at);
+    // 128 in all three says that there is none.
+    const mask none = equal(to_reals(found & 0xffffff), R(8421504.0));
+    weight = pick(none, R(0.0), weight);
+    sum->x += weight * (to_reals(found & 255) - R(127.5));
+    sum->y += weight * (to_reals((found >> 8) & 255) - R(127.5));
+    sum->z += weight * (to_reals((found >> 16) & 255) - R(127.5));
+}
+
+INLINE vec pool_normal(__global const uchar *normals, cell c, ints at) {
+    vec sum = vec_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < 8; ++i) {
+        const real across = (i & 1) ? c.u : R(1.0) - c.u, up = (i & 2) ? c.v : R(1.0) - c.v, deep = (i & 4) ? c.w : R(1.0) - c.w;
+        const int further = (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
+        normal_add(normals, at + further, across * up * deep, &sum);
+    }
+    return sum;
+}
+
+// The value at a place of stored bricks.
+INLINE real grid_value(cell c, ints slots, mask active, grid g) {
+    const ints corner = corner_of(c);
+#if POOLS == 1
+    return pool_value(g.values[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner);
+#else
+    real value = R(0.0);
+    for (int pool = 0; pool < POOLS; ++pool) {
+        const ints place = slots - pool * g.about->pool_bricks;
+        const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
+        if (!any_lane(here)) continue;
+        value = pick(here, pool_value(g.values[pool], c, pick_ints(here, place, 0) * BRICK_STRIDE + corner), value);
+    }
+    return value;
+#endif
+}
+
+// The normal at a place of stored bricks, length 1, or 0 where there is none: blended from those of the cell's corners.
+INLINE vec grid_normal(cell c, ints slots, mask active, grid g) {
+    const ints corner = corner_of(c);
+#if POOLS == 1
+    return vec_normalize(pool_normal(g.normals[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner));
+#else
+    vec normal = vec_of(R(0.0), R(0.0), R(0.0));
+    for (int pool = 0; pool < POOLS; ++pool) {
+        const ints place = slots - pool * g.about->pool_bricks;
+        const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
+        if (!any_lane(here)) continue;
+        normal = vec_pick(here, pool_normal(g.normals[pool], c, pick_ints(here, place, 0) * BRICK_STRIDE + corner), normal);
+    }
+    return vec_normalize(normal);
+#endif
+}
