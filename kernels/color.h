@@ -27,16 +27,23 @@ INLINE real place_in_palette(real quantity, scalar scale, scalar offset, int rep
 // A palette of PALETTE_SIZE colours, entry i at i / (PALETTE_SIZE - 1), blended linearly between neighbours. One that repeats
 // is squeezed by a 256th, where its last colour blends into its first.
 INLINE color palette_color(real place, int repeat, __global const float *palette) {
-    scalar at[LANES], red[LANES], green[LANES], blue[LANES];
     const int intervals = repeat ? PALETTE_SIZE : PALETTE_SIZE - 1;
+    scalar at[LANES];
+    float low[3][LANES], high[3][LANES], share[LANES];
     lanes_store(place * (real)((scalar)intervals), at);
     for (int lane = 0; lane < LANES; ++lane) {
         const int first = clamp((int)at[lane], 0, intervals - 1);
         const int second = (first + 1) & (PALETTE_SIZE - 1);
-        const float share = (float)at[lane] - (float)first;
-        red[lane] = mix(palette[3 * first], palette[3 * second], share);
-        green[lane] = mix(palette[3 * first + 1], palette[3 * second + 1], share);
-        blue[lane] = mix(palette[3 * first + 2], palette[3 * second + 2], share);
+        share[lane] = (float)at[lane] - (float)first;
+        for (int i = 0; i < 3; ++i) {
+            low[i][lane] = palette[3 * first + i];
+            high[i][lane] = palette[3 * second + i];
+        }
     }
-    return color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
+    // In loops of their own, which compilers make one instruction of.
+    scalar mixed[3][LANES];
+    for (int i = 0; i < 3; ++i) {
+        for (int lane = 0; lane < LANES; ++lane) mixed[i][lane] = mix(low[i][lane], high[i][lane], share[lane]);
+    }
+    return color_of(lanes_load(mixed[0]), lanes_load(mixed[1]), lanes_load(mixed[2]));
 }

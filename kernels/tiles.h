@@ -20,22 +20,22 @@ typedef struct {
 // The pixels of packet number `packet` of a tile whose top left pixel is `corner`.
 INLINE packet_pixels packet_at(int packet, int2 corner, __constant const struct View *view) {
     packet_pixels p;
-    scalar wanted[LANES], x[LANES], y[LANES];
+    // The bits of a packet's number and of a lane's are apart, so that their columns add up.
+    const int first = packet * LANES;
+    const int left = morton_column(first), top = morton_column(first >> 1);
+    scalar x[LANES], y[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
-        const int number = packet * LANES + lane;
-        const int column = morton_column(number), row = morton_column(number >> 1);
+        const int column = left + morton_column(lane), row = top + morton_column(lane >> 1);
+        p.place[lane] = row * TILE + column;
         p.columns[lane] = corner.x + column;
         p.rows[lane] = corner.y + row;
-        p.place[lane] = row * TILE + column;
-        x[lane] = (scalar)p.columns[lane] + S(0.5);
-        y[lane] = (scalar)p.rows[lane] + S(0.5);
-        wanted[lane] = (p.columns[lane] >= view->region_left && p.columns[lane] < view->region_right &&
-                        p.rows[lane] >= view->region_top && p.rows[lane] < view->region_bottom)
-                           ? S(1.0) : S(0.0);
+        x[lane] = (scalar)morton_column(lane) + S(0.5);
+        y[lane] = (scalar)morton_column(lane >> 1) + S(0.5);
     }
-    p.in_region = less(R(0.0), lanes_load(wanted));
-    p.x = lanes_load(x);
-    p.y = lanes_load(y);
+    p.x = lanes_load(x) + (real)((scalar)(corner.x + left));
+    p.y = lanes_load(y) + (real)((scalar)(corner.y + top));
+    p.in_region = less((real)((scalar)view->region_left), p.x) & less(p.x, (real)((scalar)view->region_right)) &
+                  less((real)((scalar)view->region_top), p.y) & less(p.y, (real)((scalar)view->region_bottom));
     return p;
 }
 
@@ -44,5 +44,15 @@ INLINE void write_channel(__global float *film, int slot, const int *place, real
     if (slot < 0) return;
     scalar each[LANES];
     lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) film[slot * TILE_PIXELS + place[lane]] = (float)each[lane];
+    __global float *to = film + slot * TILE_PIXELS;
+#if LANES >= 8
+    // Four in a row: the curve goes through 2 x 2 pixels, then through those right of them, then through the 4 x 2 below.
+    for (int row = 0; row < LANES / 4; ++row) {
+        const int lane = (row & 1) * 2 + (row >> 1) * 8;
+        vstore4((float4)((float)each[lane], (float)each[lane + 1], (float)each[lane + 4], (float)each[lane + 5]), 0,
+                to + place[lane]);
+    }
+#else
+    for (int lane = 0; lane < LANES; ++lane) to[place[lane]] = (float)each[lane];
+#endif
 }
