@@ -1,0 +1,1 @@
+"""Grids of voxels: filling them, their normals and octree, and their exchange."""

@@ -1,0 +1,263 @@
+"""Filling a grid with a formula's values, its normals, and its octree, on a device."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.launch import run_in_parts
+from clfractal.device.orbit import orbit_record
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.formulas.opencl import write_formula
+from clfractal.scene.checks import used_boxes
+from clfractal.scene.model import Scene
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels import programs
+from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
+from clfractal.voxels.lattice import Lattice, Places, all_places, lattice_of, unpack_places
+from clfractal.voxels.octree import descend
+from clfractal.voxels.store import Evaluated, store
+
+# Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
+SLOW_APPLICATIONS = 1e7
+
+
+@dataclass(frozen=True, slots=True)
+class FillProgress:
+    """How far a fill is: the stage (`octree`, `fill`, `store` or `normals`), and its bricks."""
+
+    stage: str
+    done: int
+    total: int
+
+
+ProgressCallback = Callable[[FillProgress], None]
+
+
+def fill_grid(
+    scene: Scene,
+    renderer: VolumeRenderer,
+    device: Device,
+    *,
+    lanes: int,
+    precision: Precision,
+    on_compile: Callable[[str], None] | None = None,
+    progress: ProgressCallback | None = None,
+) -> Grid:
+    """The grid of a scene's formula in the renderer's last box, with its values, normals and octree.
+
+    `octree` fills skip what the distance shows to be outside; `brute` evaluates every voxel. Values of kind
+    `iterations` know no empty bricks: all are evaluated and stored.
+
+    Args:
+        scene: has the formula.
+        renderer: what is filled and how (its `file` is not looked at).
+        device: where.
+        lanes: points of a packet.
+        precision: number type of points and orbits; normals by differences are float32.
+        on_compile: told a line if programs have to be compiled first.
+        progress: called after each launch; an exception in it, or a KeyboardInterrupt, ends the fill.
+
+    Raises:
+        DeviceError: status 2, told before anything is evaluated, if the grid does not fit; status 3, the device failed.
+        KernelBuildError: a program does not compile.
+    """
+    lattice = lattice_of(used_boxes(scene, renderer)[1], renderer.resolution)
+    check_grid(lattice, renderer, device)
+    return _Filler(scene, renderer, device, lattice, lanes, precision, progress).run(on_compile)
+
+
+def check_grid(lattice: Lattice, renderer: VolumeRenderer, device: Device) -> None:
+    """Refuses a grid that cannot fit, whatever is in it.
+
+    Raises:
+        DeviceError: status 2, with the memory needed at least and had.
+    """
+    x, y, z = lattice.shape
+    what = f"a grid of {x} x {y} x {z} voxels"
+    evaluated = int(np.prod(lattice.evaluated_bricks, dtype=object))
+    bricks = int(np.prod(lattice.bricks, dtype=object))
+    per_brick = 8 + 4 + 4
+    largest = 4 * evaluated
+    if renderer.value == "iterations":
+        sample = SAMPLE_BYTES[renderer.store]
+        per_brick += 512 * sample + 736 * (sample + 4)
+        largest = 512 * sample * evaluated
+    elif renderer.fill == "brute":
+        per_voxel = 512 * SAMPLE_BYTES[renderer.store] if renderer.value == "coverage" else 64
+        per_brick += per_voxel
+        largest = per_voxel * evaluated
+    device.check_memory(per_brick * evaluated, what, largest=largest)
+    device.check_memory(0, what, largest=4 * bricks)
+
+
+class _Filler:
+    """One fill: the constants on the device, and the stages."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        renderer: VolumeRenderer,
+        device: Device,
+        lattice: Lattice,
+        lanes: int,
+        precision: Precision,
+        progress: ProgressCallback | None,
+    ) -> None:
+        self.scene, self.renderer, self.device, self.lattice = scene, renderer, device, lattice
+        self.lanes, self.precision, self.progress = lanes, precision, progress
+        self.sub_points = renderer.sub_points if renderer.value == "coverage" else 1
+        self.stats = GridStats()
+
+    def run(self, on_compile: Callable[[str], None] | None) -> Grid:
+        renderer, chain = self.renderer, self.scene.chain
+        whole = renderer.value == "iterations"
+        octree = renderer.fill == "octree" and not whole
+        sample: Kind = "byte" if renderer.value == "inside" else renderer.store
+        source: programs.Source = "bits" if renderer.value == "inside" else "bricks"
+        recipes = [
+            programs.fill_recipe(chain, renderer, self.lanes, self.precision),
+            programs.store_recipe(source, sample, renderer.store, renderer.normal_radius),
+        ]
+        if octree:
+            recipes.append(programs.nodes_recipe(chain, self.lanes, self.precision))
+        if not whole:
+            recipes.append(programs.classify_recipe(source, sample))
+        built = programs.build_all(self.device, recipes, on_compile)
+        kernels = {recipe.kernel: each for recipe, each in zip(recipes, built, strict=True)}
+        start = time.perf_counter()
+        self._upload()
+        every = self.lattice.evaluated_bricks
+        places = self._descend(kernels["empty_nodes"]) if octree else all_places(every)
+        evaluated = self._fill(kernels["fill_bricks"], places, source, sample)
+        grid = store(
+            self.device,
+            self.lattice,
+            evaluated,
+            kept=renderer.store,
+            range=(0.0, float(self.scene.formula.iterations)) if whole else (0.0, 1.0),
+            classify=kernels.get("classify_bricks"),
+            keep=kernels["store_bricks"],
+            stats=self.stats,
+            tell=self._tell,
+        )
+        stats = replace(
+            grid.stats,
+            build_ms=sum(each.build_ms for each in built),
+            wall_ms=1e3 * (time.perf_counter() - start),
+        )
+        return replace(grid, stats=stats)
+
+    def _upload(self) -> None:
+        chain, precision = self.scene.chain, self.precision
+        iterations = self.scene.formula.iterations
+        records: list[npt.NDArray[Any]] = [
+            self.lattice.axes(precision, self.sub_points),
+            self.lattice.record(precision, self.sub_points, chain.step_scale).reshape(1),
+            orbit_record(chain, iterations, precision).reshape(1),
+            np.array(write_formula(chain).constants, precision),
+        ]
+        self.constants = [upload(self.device, record) for record in records]
+        packets = 512 / self.lanes * self.sub_points**3
+        units = max(self.device.info.compute_units, 1)
+        bricks = 0.05 * units * SLOW_APPLICATIONS / (packets * max(iterations, 1))
+        self.first_part = int(np.clip(bricks, units, 2048))
+
+    def _descend(self, empty_nodes: programs.Built) -> Places:
+        device, kernel = self.device, empty_nodes.kernel
+        milliseconds = 0.0
+
+        def empty(nodes: Places, cells: int) -> npt.NDArray[np.bool_]:
+            nonlocal milliseconds
+            packets = -(-len(nodes) // self.lanes)
+            padded = np.zeros(packets * self.lanes, np.uint64)
+            padded[: len(nodes)] = nodes
+            result = np.empty(len(padded), np.uint8)
+            if packets:
+                places, flags = upload(device, padded), device.buffer(len(padded), "nodes")
+                with device.failures("looking at nodes"):
+                    kernel.set_args(flags, places, *map(np.int32, (0, packets, cells)), *self.constants)
+                milliseconds += run_in_parts(
+                    device,
+                    kernel,
+                    2,
+                    packets,
+                    doing="looking at nodes",
+                    group=empty_nodes.group,
+                    first_part=64 * self.first_part,
+                )
+                cl.enqueue_copy(device.queue, result, flags)
+            self._tell("octree", len(nodes), len(nodes))
+            return result[: len(nodes)].astype(np.bool_)
+
+        places, looked = descend(self.lattice, empty)
+        self.stats = replace(self.stats, nodes=looked, octree_ms=milliseconds)
+        return places
+
+    def _fill(
+        self, fill_bricks: programs.Built, places: Places, source: programs.Source, sample: Kind
+    ) -> Evaluated:
+        device, kernel = self.device, fill_bricks.kernel
+        brick_bytes = 64 if source == "bits" else 512 * SAMPLE_BYTES[sample]
+        samples = device.buffer(max(len(places), 1) * brick_bytes, "the voxels' values")
+        bricks = upload(device, places)
+        x, y, z = self.lattice.evaluated_bricks
+        numbers = np.full(x * y * z, -1, np.int32)
+        at = unpack_places(places)
+        numbers[at[:, 0] + x * (at[:, 1] + y * at[:, 2])] = np.arange(len(places), dtype=np.int32)
+        scale = 1.0
+        if sample == "byte":
+            limit = self.scene.formula.iterations if self.renderer.value == "iterations" else 1
+            scale = 255.0 / max(limit, 1)
+        with device.failures("filling the grid"):
+            kernel.set_args(samples, bricks, np.int32(0), np.float32(scale), *self.constants)
+        milliseconds = run_in_parts(
+            device,
+            kernel,
+            2,
+            len(places),
+            doing="filling the grid",
+            items=fill_bricks.items,
+            group=fill_bricks.group,
+            first_part=self.first_part,
+            done=lambda done: self._tell("fill", done, len(places)),
+        )
+        points = len(places) * 512 * self.sub_points**3
+        self.stats = replace(self.stats, evaluated_voxels=points, fill_ms=milliseconds)
+        # What 1 is to the source: a bit, 255 of a byte, or 1 of a share.
+        unit = 255.0 if source == "bricks" and sample == "byte" else 1.0
+        top = 255.0 if self.renderer.store == "byte" else 1.0
+        whole = unit
+        if sample == "float" and self.renderer.value == "iterations":
+            whole = float(self.scene.formula.iterations)
+        return Evaluated(
+            places,
+            at,
+            samples,
+            bricks,
+            upload(device, numbers),
+            scale=1.0 if source == "bricks" else top,
+            whole=whole,
+            opaque=whole if self.renderer.value == "iterations" else 0.5 * whole,
+        )
+
+    def _tell(self, stage: str, done: int, total: int) -> None:
+        if self.progress is not None:
+            self.progress(FillProgress(stage, done, total))
+
+
+def upload(device: Device, array: npt.NDArray[Any]) -> cl.Buffer:
+    """A buffer with an array's bytes."""
+    data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
+    buffer = device.buffer(max(data.nbytes, 16), "a grid's constants", read_only=True)
+    if data.nbytes:
+        with device.failures("uploading constants"):
+            cl.enqueue_copy(device.queue, buffer, data)
+    return buffer

@@ -1,0 +1,60 @@
+"""Memory for bricks on a device: a pool is one buffer, or up to four where one would be too large for the device."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pyopencl as cl
+
+from clfractal.device.select import Device
+from clfractal.voxels.lattice import BRICK_STRIDE
+
+MOST_PARTS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How slots are spread over the parts of a pool.
+
+    Attributes:
+        slots: slots of all parts together.
+        part_slots: slots of every part but the last.
+    """
+
+    slots: int
+    part_slots: int
+
+    @property
+    def parts(self) -> int:
+        """Buffers of a pool."""
+        return -(-self.slots // self.part_slots)
+
+    def ranges(self) -> Iterator[tuple[int, int]]:
+        """First slot of each part, and the one after its last."""
+        for part in range(self.parts):
+            first = part * self.part_slots
+            yield first, min(first + self.part_slots, self.slots)
+
+
+def plan_pools(device: Device, slots: int, sample_bytes: tuple[int, ...], others: int, what: str) -> Layout:
+    """The layout of pools of `slots` bricks whose samples take `sample_bytes` each, beside `others` bytes.
+
+    Raises:
+        DeviceError: status 2, with the memory needed and had, when they do not fit.
+    """
+    slots = max(slots, 1)
+    largest = BRICK_STRIDE * max(sample_bytes)
+    device.check_memory(slots * BRICK_STRIDE * sum(sample_bytes) + others, what)
+    in_one = device.info.max_alloc // largest
+    if slots <= in_one:
+        return Layout(slots, slots)
+    device.check_memory(0, what, largest=-(-slots // MOST_PARTS) * largest)
+    return Layout(slots, in_one)
+
+
+def allocate(device: Device, layout: Layout, sample_bytes: int, what: str) -> tuple[cl.Buffer, ...]:
+    """The buffers of a pool."""
+    return tuple(
+        device.buffer((after - first) * BRICK_STRIDE * sample_bytes, what) for first, after in layout.ranges()
+    )

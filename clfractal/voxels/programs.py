@@ -1,0 +1,177 @@
+"""The programs that fill and store a grid: one for each kernel, so that each is kept ready to run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal
+
+import pyopencl as cl
+
+from clfractal.device import program
+from clfractal.device.compiler import Argument, Warm
+from clfractal.device.orbit import ORBIT
+from clfractal.device.select import Device
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+from clfractal.formulas.language import Chain
+from clfractal.formulas.opencl import write_formula
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.grid import SAMPLE_BYTES, Kind
+from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
+
+Source = Literal["bits", "bricks", "slab"]
+
+FILL_KINDS = ("inside", "coverage", "iterations")
+SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
+C_TYPES: dict[Kind, str] = {"byte": "uchar", "float": "float"}
+# Work-items of a group that take a brick each, or a packet of nodes.
+BRICK_GROUP = (1, 16)
+NODE_POINTS = 64
+# Applications between two looks at a packet.
+CHUNK = 4
+
+_BUFFER = Argument("buffer", 8192)
+_INT = Argument("scalar", dtype="int32")
+_FLOAT = Argument("scalar", dtype="float32")
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """A program to build: its text's entry file and defines, its kernel, and the groups that it runs in."""
+
+    entry: str
+    kernel: str
+    defines: dict[str, object]
+    precision: Precision
+    chain: Chain | None
+    items: int
+    group: tuple[int, int]
+    arguments: tuple[Argument, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Built:
+    """A program's kernel, and how it is launched."""
+
+    kernel: cl.Kernel
+    items: int
+    group: tuple[int, int]
+    build_ms: float
+
+
+def build_all(
+    device: Device, recipes: Sequence[Recipe], on_compile: Callable[[str], None] | None = None
+) -> list[Built]:
+    """Builds programs, beside each other where they have to be compiled.
+
+    Raises:
+        KernelBuildError: a program does not compile.
+        DeviceError: the driver failed.
+    """
+    told: list[str] = []
+
+    def tell(line: str) -> None:
+        if not told and on_compile is not None:
+            told.append(line)
+            on_compile(line)
+
+    def build(recipe: Recipe) -> Built:
+        structs = EXTENT.c_text() if recipe.chain is None else ORBIT.c_text() + LATTICE.c_text()
+        generated = {"structs.h": structs}
+        if recipe.chain is not None:
+            generated["formula.h"] = write_formula(recipe.chain).text
+        text = flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
+        warm = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
+        flags = program.math_flags(recipe.precision)
+        built = program.build(
+            device, text.text, flags=flags, sources=text.sources, warm=warm, on_compile=tell
+        )
+        return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
+
+    with ThreadPoolExecutor(max(len(recipes), 1)) as pool:
+        return list(pool.map(build, recipes))
+
+
+def nodes_recipe(chain: Chain, lanes: int, precision: Precision) -> Recipe:
+    """`empty_nodes`: which nodes of the octree hold nothing."""
+    return Recipe(
+        "voxels_nodes.cl",
+        "empty_nodes",
+        _formula_defines(chain, lanes, precision),
+        precision,
+        chain,
+        1,
+        (1, max(NODE_POINTS // lanes, 1)),
+        (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
+    )
+
+
+def fill_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
+    """`fill_bricks`: the values of bricks' voxels."""
+    sample: Kind = "byte" if renderer.value == "inside" else renderer.store
+    items = BRICK**3 // max(lanes, BRICK)
+    return Recipe(
+        "voxels_fill.cl",
+        "fill_bricks",
+        {
+            **_formula_defines(chain, lanes, precision),
+            **{f"FILL_{name.upper()}": number for number, name in enumerate(FILL_KINDS)},
+            "FILL_KIND": FILL_KINDS.index(renderer.value),
+            **_sample_defines(sample),
+        },
+        precision,
+        chain,
+        items,
+        (items, 1),
+        (_BUFFER, _BUFFER, _INT, _FLOAT, *[_BUFFER] * 4),
+    )
+
+
+def classify_recipe(source: Source, sample: Kind) -> Recipe:
+    """`classify_bricks`: which bricks are outside or inside as a whole."""
+    return Recipe(
+        "voxels_bricks.cl",
+        "classify_bricks",
+        {**_source_defines(source, sample), "NORMALS": 0, "VALUE": "uchar", "VALUE_BYTES": 1, "RADIUS": 0},
+        "float32",
+        None,
+        1,
+        BRICK_GROUP,
+        (_BUFFER, _BUFFER, _INT, _INT, *[_BUFFER] * 3),
+    )
+
+
+def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int) -> Recipe:
+    """`store_bricks`: samples and gradient normals of stored bricks."""
+    defines = {
+        **_source_defines(source, sample),
+        "NORMALS": 1,
+        "VALUE": C_TYPES[kept],
+        "VALUE_BYTES": SAMPLE_BYTES[kept],
+        "RADIUS": radius,
+    }
+    arguments = (*[_BUFFER] * 3, _INT, _INT, _INT, *[_BUFFER] * 3)
+    return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, 1, BRICK_GROUP, arguments)
+
+
+def _formula_defines(chain: Chain, lanes: int, precision: Precision) -> dict[str, object]:
+    cycle = chain.cycle_length
+    return {
+        "LANES": lanes,
+        "REAL_IS_DOUBLE": int(precision == "float64"),
+        "CHUNK": cycle * -(-CHUNK // cycle),
+    }
+
+
+def _sample_defines(sample: Kind) -> dict[str, object]:
+    return {"SAMPLE": C_TYPES[sample], "SAMPLE_BYTES": SAMPLE_BYTES[sample]}
+
+
+def _source_defines(source: Source, sample: Kind) -> dict[str, object]:
+    return {
+        **{f"SOURCE_{name.upper()}": number for number, name in enumerate(SOURCES)},
+        "SOURCE": SOURCES.index(source),
+        **_sample_defines(sample),
+    }

@@ -1,0 +1,192 @@
+"""From evaluated bricks to a grid: which are kept, their samples and normals, and the table over them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.launch import run_in_parts
+from clfractal.device.select import Device
+from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
+from clfractal.voxels.lattice import BRICK_STRIDE, EXTENT, Lattice, Places
+from clfractal.voxels.octree import levels
+from clfractal.voxels.pool import allocate, plan_pools
+from clfractal.voxels.programs import Built
+
+OUTSIDE, INSIDE, MIXED = 0, 1, 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluated:
+    """The bricks whose voxels have been evaluated.
+
+    Attributes:
+        places: where they are among the lattice's evaluated bricks; `at` the same, shape (n, 3).
+        samples: their voxels, on the device.
+        bricks: `places` on the device.
+        numbers: of each place its number among them or -1, on the device, x fastest.
+        scale: factor from a value to what is stored.
+        whole: the value of a voxel that is inside as a whole.
+        opaque: the least value that counts as inside.
+    """
+
+    places: Places
+    at: npt.NDArray[np.int64]
+    samples: cl.Buffer
+    bricks: cl.Buffer
+    numbers: cl.Buffer
+    scale: float
+    whole: float
+    opaque: float
+
+
+def store(
+    device: Device,
+    lattice: Lattice,
+    evaluated: Evaluated,
+    *,
+    kept: Kind,
+    range: tuple[float, float],
+    classify: Built | None,
+    keep: Built,
+    stats: GridStats,
+    tell: Callable[[str, int, int], None],
+) -> Grid:
+    """The grid of evaluated bricks. Those outside as a whole are left out, those inside as a whole share a slot.
+
+    `classify` finds them; without it every brick is kept.
+
+    Raises:
+        DeviceError: status 2 if what is kept does not fit.
+    """
+    extent = extent_buffer(device, lattice, evaluated.scale, evaluated.whole, evaluated.opaque)
+    count = len(evaluated.places)
+    milliseconds = 0.0
+    within = (evaluated.at < np.array(lattice.bricks)).all(axis=1)
+    classes = np.full(count, MIXED, np.uint8)
+    if classify is not None and count:
+        found = device.buffer(count, "classes of bricks")
+        with device.failures("looking at bricks"):
+            classify.kernel.set_args(
+                found,
+                evaluated.bricks,
+                np.int32(0),
+                np.int32(count),
+                evaluated.samples,
+                evaluated.numbers,
+                extent,
+            )
+        milliseconds += run_in_parts(
+            device,
+            classify.kernel,
+            2,
+            count,
+            doing="looking at bricks",
+            group=classify.group,
+            first_part=4096,
+        )
+        with device.failures("looking at bricks"):
+            cl.enqueue_copy(device.queue, classes, found)
+    solid_slot = 0 if classify is not None else None
+    first_slot = 0 if solid_slot is None else 1
+    mixed = np.flatnonzero(within & (classes == MIXED))
+    solid = evaluated.at[within & (classes == INSIDE)]
+    stored = evaluated.at[mixed]
+    bz, by, bx = lattice.bricks[::-1]
+    entries = np.full((bz, by, bx), -1, np.int32)
+    entries[stored[:, 2], stored[:, 1], stored[:, 0]] = first_slot + np.arange(len(mixed), dtype=np.int32)
+    entries[solid[:, 2], solid[:, 1], solid[:, 0]] = 0
+    entries = levels(entries)
+
+    slots = first_slot + len(mixed)
+    sizes = (SAMPLE_BYTES[kept], 4)
+    others = evaluated.samples.size + 4 * entries.size
+    layout = plan_pools(device, slots, sizes, others, f"a grid with {slots} stored bricks")
+    values = allocate(device, layout, sizes[0], "the grid's values")
+    normals = allocate(device, layout, sizes[1], "the grid's normals")
+    table = device.buffer(entries.nbytes, "the grid's table", read_only=True)
+    with device.failures("storing the grid"):
+        cl.enqueue_copy(device.queue, table, entries.reshape(-1))
+    if solid_slot is not None:
+        _store_solid(device, values[0], normals[0], kept)
+    places = evaluated.places[mixed]
+    for (first, after), value_part, normal_part in zip(layout.ranges(), values, normals, strict=True):
+        low, high = max(first - first_slot, 0), after - first_slot
+        if high <= low:
+            continue
+        part = device.buffer(8 * (high - low), "places", read_only=True)
+        slot = max(first_slot - first, 0)
+        with device.failures("storing the grid"):
+            cl.enqueue_copy(device.queue, part, np.ascontiguousarray(places[low:high]))
+            keep.kernel.set_args(
+                value_part,
+                normal_part,
+                part,
+                np.int32(0),
+                np.int32(high - low),
+                np.int32(slot),
+                evaluated.samples,
+                evaluated.numbers,
+                extent,
+            )
+        milliseconds += run_in_parts(
+            device,
+            keep.kernel,
+            3,
+            high - low,
+            doing="storing the grid",
+            group=keep.group,
+            first_part=1024,
+            done=partial(_tell_from, tell, low, len(mixed)),
+        )
+    stats = replace(
+        stats,
+        stored_bricks=len(mixed),
+        solid_bricks=len(solid),
+        pool_bytes=sum(buffer.size for buffer in (*values, *normals, table)),
+        store_ms=milliseconds,
+    )
+    return Grid(
+        lattice, kept, range, device, layout, entries, table, values, normals, solid_slot, stats=stats
+    )
+
+
+def _tell_from(tell: Callable[[str, int, int], None], before: int, total: int, done: int) -> None:
+    tell("store", before + done, total)
+
+
+def extent_buffer(
+    device: Device, lattice: Lattice, scale: float, whole: float, opaque: float, first_layer: int = 0
+) -> cl.Buffer:
+    """The struct of the kernels that store bricks, on the device."""
+    least = min(lattice.spacing)
+    record = EXTENT.value(
+        "float32",
+        {
+            "bricks": lattice.evaluated_bricks,
+            "last": [n - 1 for n in lattice.shape],
+            "first_layer": first_layer,
+            "whole": whole,
+            "opaque": opaque,
+            "scale": scale,
+            "stretch": [least / spacing for spacing in lattice.spacing],
+        },
+    )
+    buffer = device.buffer(record.nbytes, "the grid's extent", read_only=True)
+    with device.failures("uploading constants"):
+        cl.enqueue_copy(device.queue, buffer, record.reshape(1).view(np.uint8))
+    return buffer
+
+
+def _store_solid(device: Device, values: cl.Buffer, normals: cl.Buffer, kept: Kind) -> None:
+    """The slot 0: inside as a whole, without normals."""
+    value = np.full(BRICK_STRIDE, 255 if kept == "byte" else 1, DTYPES[kept])
+    normal = np.full((BRICK_STRIDE, 4), (NO_NORMAL, NO_NORMAL, NO_NORMAL, 255), np.uint8)
+    with device.failures("storing the grid"):
+        cl.enqueue_copy(device.queue, values, value)
+        cl.enqueue_copy(device.queue, normals, normal)

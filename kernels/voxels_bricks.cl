@@ -1,0 +1,175 @@
+// What is stored of a grid: bricks of 9 x 9 x 9 samples with their normals. One work-item takes one brick.
+//
+// From the build besides what voxels_bricks.h needs: VALUE, the type of a stored value, and VALUE_BYTES; NORMALS, whether
+// normals are wanted; RADIUS of the low-pass filter before them, voxels.
+#include "structs.h"
+#include "voxels_bricks.h"
+
+// 0: no voxel of the brick, its ninth layer included, is in the solid; 1: all are, as a whole; 2: neither.
+__kernel void classify_bricks(__global uchar *classes, __global const ulong *bricks, int first, int count,
+                              __global const SAMPLE *samples, __global const int *numbers,
+                              __constant const struct Extent *extent) {
+    const size_t brick = (size_t)first + get_global_id(1);
+    if (brick >= count) return;
+    const surroundings around = surroundings_of(bricks[brick], numbers, extent);
+    bool some = false, all = true;
+    for (int z = 0; z < BRICK_SIDE; ++z) {
+        for (int y = 0; y < BRICK_SIDE; ++y) {
+            const row r = load_row(samples, &around, y, z, extent);
+#if SOURCE == SOURCE_BITS
+            const uint own = (r >> BRICK) & 0x1ff;
+            some |= own != 0;
+            all &= own == 0x1ff;
+#else
+            for (int x = 0; x < BRICK_SIDE; ++x) {
+                some |= r.value[BRICK + x] != 0.0f;
+                all &= r.value[BRICK + x] >= extent->whole;
+            }
+#endif
+        }
+        if (some && !all) break;
+    }
+    classes[brick] = all ? 1 : some ? 2 : 0;
+}
+
+#if NORMALS
+// Weights of the binomial low-pass filter of RADIUS, and of the central difference after it, for voxels 1, 2, ... away (the
+// other side has the same, and the same negated): as differences of equal values they give exactly 0.
+#if RADIUS == 0
+#define SMOOTH {1.0f}
+#define DIFFER {1.0f}
+#elif RADIUS == 1
+#define SMOOTH {2.0f, 1.0f}
+#define DIFFER {2.0f, 1.0f}
+#elif RADIUS == 2
+#define SMOOTH {6.0f, 4.0f, 1.0f}
+#define DIFFER {5.0f, 4.0f, 1.0f}
+#elif RADIUS == 3
+#define SMOOTH {20.0f, 15.0f, 6.0f, 1.0f}
+#define DIFFER {14.0f, 14.0f, 6.0f, 1.0f}
+#else
+#define SMOOTH {70.0f, 56.0f, 28.0f, 8.0f, 1.0f}
+#define DIFFER {42.0f, 48.0f, 27.0f, 8.0f, 1.0f}
+#endif
+#define REACH (RADIUS + 1)  // voxels that a normal depends on, to each side
+#define LAYERS (BRICK_SIDE + 2 * REACH)
+
+// 1/sqrt of each; a vector of 16 is more than some compilers can take the root of.
+INLINE float16 reciprocal_root(float16 a) {
+    float16 result = (float16)(0.0f);
+    result.lo = 1.0f / sqrt(a.lo);
+    result.s8 = 1.0f / sqrt(a.s8);
+    return result;
+}
+
+// A component of a normal as the 8 bits of a colour.
+INLINE uint16 color_of(float16 component) { return convert_uint16(component * 127.5f + 128.0f); }
+
+// Eq. 6 of Englund 2010 after the filter: n = -G/|G| with G the central differences, (n + 1)/2 in red, green and blue, `alpha`
+// above. (The thesis prints f(x - 1) - f(x - 1).) Where G is 0 there is no normal, 128 in each.
+INLINE uint16 packed_normal(float16 gx, float16 gy, float16 gz, uint16 alpha) {
+    const float16 largest = fmax(fmax(fabs(gx), fabs(gy)), fabs(gz));
+    const int16 usable = (largest > 0.0f) & (largest <= 3.0e38f);
+    const float16 scale = select((float16)(0.0f), -1.0f / largest, usable);
+    gx = select((float16)(0.0f), gx * scale, usable);
+    gy = select((float16)(0.0f), gy * scale, usable);
+    gz = select((float16)(0.0f), gz * scale, usable);
+    const float16 square = gx * gx + gy * gy + gz * gz;  // 1 to 3, or 0
+    const float16 unit = reciprocal_root(fmax(square, 0.5f));
+    return color_of(gx * unit) | color_of(gy * unit) << 8 | color_of(gz * unit) << 16 | alpha << 24;
+}
+#endif
+
+// A row's nine values.
+INLINE void store_values(__global VALUE *out, float16 row) {
+#if VALUE_BYTES == 1
+    vstore8(convert_uchar8(row.lo), 0, out);
+    out[8] = convert_uchar(row.s8);
+#else
+    vstore8(row.lo, 0, out);
+    out[8] = row.s8;
+#endif
+}
+
+// Values and normals of the bricks from `first` on, into slots from `slot` on.
+__kernel void store_bricks(__global VALUE *values, __global uint *normals, __global const ulong *bricks, int first, int count,
+                           int slot, __global const SAMPLE *samples, __global const int *numbers,
+                           __constant const struct Extent *extent) {
+    const int brick = first + (int)get_global_id(1);
+    if (brick >= count) return;
+    const surroundings around = surroundings_of(bricks[brick], numbers, extent);
+    const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;
+    __global VALUE *value = values + start;
+#if NORMALS
+    const float smooth[] = SMOOTH, differ[] = DIFFER;
+    // Filtered along x and y: the values, and their differences along x and along y.
+    float16 plain[LAYERS][BRICK_SIDE], along_x[LAYERS][BRICK_SIDE], along_y[LAYERS][BRICK_SIDE];
+    uint16 alpha[BRICK_SIDE][BRICK_SIDE];
+    for (int layer = 0; layer < LAYERS; ++layer) {
+        float16 rows[LAYERS], rows_x[LAYERS];
+        const int z = layer - REACH;
+        for (int line = 0; line < LAYERS; ++line) {
+            const int y = line - REACH;
+            const row r = load_row(samples, &around, y, z, extent);
+            const float16 middle = row_window(&r, 0);
+            float16 sum = smooth[0] * middle, difference = (float16)(0.0f);
+            #pragma unroll
+            for (int i = 1; i <= REACH; ++i) {
+                const float16 before = row_window(&r, -i), after = row_window(&r, i);
+                if (i <= RADIUS) sum += smooth[i] * (before + after);
+                difference += differ[i - 1] * (after - before);
+            }
+            rows[line] = sum;
+            rows_x[line] = difference;
+            if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < BRICK_SIDE) {
+                alpha[z][y] = select((uint16)(0), (uint16)(255), middle >= extent->opaque);
+                store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y), middle * extent->scale);
+            }
+        }
+        for (int y = 0; y < BRICK_SIDE; ++y) {
+            const int line = y + REACH;
+            float16 sum = smooth[0] * rows[line], sum_x = smooth[0] * rows_x[line], difference = (float16)(0.0f);
+            #pragma unroll
+            for (int i = 1; i <= REACH; ++i) {
+                if (i <= RADIUS) {
+                    sum += smooth[i] * (rows[line - i] + rows[line + i]);
+                    sum_x += smooth[i] * (rows_x[line - i] + rows_x[line + i]);
+                }
+                difference += differ[i - 1] * (rows[line + i] - rows[line - i]);
+            }
+            plain[layer][y] = sum;
+            along_x[layer][y] = sum_x;
+            along_y[layer][y] = difference;
+        }
+    }
+    __global uint *normal = normals + start;
+    for (int z = 0; z < BRICK_SIDE; ++z) {
+        const int layer = z + REACH;
+        for (int y = 0; y < BRICK_SIDE; ++y) {
+            float16 gx = smooth[0] * along_x[layer][y], gy = smooth[0] * along_y[layer][y], gz = (float16)(0.0f);
+            #pragma unroll
+            for (int i = 1; i <= REACH; ++i) {
+                if (i <= RADIUS) {
+                    gx += smooth[i] * (along_x[layer - i][y] + along_x[layer + i][y]);
+                    gy += smooth[i] * (along_y[layer - i][y] + along_y[layer + i][y]);
+                }
+                gz += differ[i - 1] * (plain[layer + i][y] - plain[layer - i][y]);
+            }
+            const uint16 packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
+                                                alpha[z][y]);
+            __global uint *out = normal + BRICK_SIDE * (BRICK_SIDE * z + y);
+            vstore8(packed.lo, 0, out);
+            out[8] = packed.s8;
+        }
+    }
+    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE; ++i) normal[i] = 0x00808080u;
+#else
+    for (int z = 0; z < BRICK_SIDE; ++z) {
+        for (int y = 0; y < BRICK_SIDE; ++y) {
+            const row r = load_row(samples, &around, y, z, extent);
+            store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y), row_window(&r, 0) * extent->scale);
+        }
+    }
+#endif
+    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE; ++i) value[i] = 0;
+}

@@ -1,0 +1,133 @@
+// Rows of voxels around a brick, out of the bricks that the fill evaluated or of a slab of a whole grid, and vectors of
+// neighbouring voxels in them. Everything here is float: no formula is evaluated.
+//
+// From the build: SOURCE_BITS, SOURCE_BRICKS, SOURCE_SLAB and which of them SOURCE is; SAMPLE, what the source holds.
+// Voxels past the ends of the grid repeat the last one.
+
+#define BRICK 8
+#define BRICK_SIDE 9
+#define BRICK_SAMPLES 729
+#define BRICK_STRIDE 736
+
+#define PLACE_X(place) ((int)((place) & 0x1fffff))
+#define PLACE_Y(place) ((int)(((place) >> 21) & 0x1fffff))
+#define PLACE_Z(place) ((int)((place) >> 42))
+
+// A driver that cannot inline interprets: see lanes.h.
+#ifdef INTERPRETED
+#define INLINE static inline
+#else
+#define INLINE static inline __attribute__((always_inline))
+#endif
+
+// Where a brick's voxels are.
+typedef struct {
+    int x, y, z;   // the brick's place
+    int near[27];  // the evaluated bricks around it, x fastest; -1: outside the solid throughout, 0
+} surroundings;
+
+#if SOURCE == SOURCE_SLAB
+INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
+    surroundings around;
+    around.x = PLACE_X(place);
+    around.y = PLACE_Y(place);
+    around.z = PLACE_Z(place);
+    return around;
+}
+#else
+INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
+    surroundings around;
+    around.x = PLACE_X(place);
+    around.y = PLACE_Y(place);
+    around.z = PLACE_Z(place);
+    int next = 0;
+    for (int z = around.z - 1; z <= around.z + 1; ++z) {
+        for (int y = around.y - 1; y <= around.y + 1; ++y) {
+            for (int x = around.x - 1; x <= around.x + 1; ++x) {
+                const bool there = x >= 0 && x < extent->bricks[0] && y >= 0 && y < extent->bricks[1] && z >= 0 &&
+                                   z < extent->bricks[2];
+                const size_t place_in_table = ((size_t)z * extent->bricks[1] + y) * extent->bricks[0] + x;
+                around.near[next++] = there ? numbers[place_in_table] : -1;
+            }
+        }
+    }
+    return around;
+}
+
+// The row `y`, `z` (voxels from the brick's first, -8 to 15): the first of its three bricks in `near`, and the row within.
+INLINE int row_of(const surroundings *around, int y, int z, __constant const struct Extent *extent, int *first) {
+    const int row_y = clamp(BRICK * around->y + y, 0, BRICK * extent->bricks[1] - 1);
+    const int row_z = clamp(BRICK * around->z + z, 0, BRICK * extent->bricks[2] - 1);
+    const int brick_y = (row_y >> 3) - around->y + 1, brick_z = (row_z >> 3) - around->z + 1;
+    *first = 9 * brick_z + 3 * brick_y;
+    return BRICK * (row_z & 7) + (row_y & 7);
+}
+#endif
+
+#if SOURCE == SOURCE_BITS
+// Voxel x of the row is bit x + 8.
+typedef uint row;
+
+INLINE uint row_bits(__global const SAMPLE *samples, int number, int place) {
+    return number < 0 ? 0u : (uint)samples[(size_t)number * 64 + place];
+}
+INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
+                    __constant const struct Extent *extent) {
+    int first;
+    const int place = row_of(around, y, z, extent, &first);
+    const uint own = row_bits(samples, around->near[first + 1], place);
+    uint left = row_bits(samples, around->near[first], place), right = row_bits(samples, around->near[first + 2], place);
+    if (around->x == 0) left = (own & 1) != 0 ? 0xff : 0;
+    if (around->x == extent->bricks[0] - 1) right = (own & 0x80) != 0 ? 0xff : 0;
+    return left | own << 8 | right << 16;
+}
+// Voxels `offset` to `offset` + 15 of the row; those beyond 15 are 0.
+INLINE float16 row_window(const row *r, int offset) {
+    const uint16 shift = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) + (uint)(offset + BRICK);
+    return convert_float16(((uint16)(*r) >> shift) & 1u);
+}
+#else
+// Voxel x of the row is entry x + 8.
+typedef struct {
+    float value[40];
+} row;
+
+#if SOURCE == SOURCE_BRICKS
+INLINE void row_part(float *part, __global const SAMPLE *samples, int number, int place) {
+    for (int i = 0; i < BRICK; ++i) {
+        part[i] = number < 0 ? 0.0f : (float)samples[(size_t)number * 512 + BRICK * place + i];
+    }
+}
+INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
+                    __constant const struct Extent *extent) {
+    row r;
+    int first;
+    const int place = row_of(around, y, z, extent, &first);
+    row_part(r.value, samples, around->near[first], place);
+    row_part(r.value + 8, samples, around->near[first + 1], place);
+    row_part(r.value + 16, samples, around->near[first + 2], place);
+    for (int i = 0; i < BRICK; ++i) {
+        if (around->x == 0) r.value[i] = r.value[8];
+        if (around->x == extent->bricks[0] - 1) r.value[16 + i] = r.value[15];
+    }
+    for (int i = 24; i < 40; ++i) r.value[i] = 0.0f;
+    return r;
+}
+#else
+// The slab is some layers of a whole grid, x fastest; `first_layer` is the grid's layer that it begins with.
+INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
+                    __constant const struct Extent *extent) {
+    row r;
+    const int row_y = clamp(BRICK * around->y + y, 0, extent->last[1]);
+    const int row_z = clamp(BRICK * around->z + z, 0, extent->last[2]) - extent->first_layer;
+    const size_t start = ((size_t)row_z * (extent->last[1] + 1) + row_y) * (extent->last[0] + 1);
+    for (int i = 0; i < 24; ++i) {
+        r.value[i] = (float)samples[start + clamp(BRICK * around->x + i - BRICK, 0, extent->last[0])];
+    }
+    for (int i = 24; i < 40; ++i) r.value[i] = 0.0f;
+    return r;
+}
+#endif
+
+INLINE float16 row_window(const row *r, int offset) { return vload16(0, r->value + offset + BRICK); }
+#endif
