@@ -53,7 +53,7 @@ volumes = st.builds(
     arrays.arrays(np.float64, (3, 3), elements=st.floats(-0.3, 0.3)).map(lambda some: some + np.eye(3)),
     st.dictionaries(
         st.sampled_from((SCENE_KEY, "note", "a.b-c d")),
-        st.text(st.characters(blacklist_characters="\r", blacklist_categories=("Cs",)), max_size=60),
+        st.text(st.characters(exclude_characters="\r", exclude_categories=["Cs"]), max_size=60),
     ),
 )
 
