@@ -63,7 +63,10 @@ def finest_steps(scene: Scene, view: View) -> float:
     if isinstance(renderer, VolumeRenderer):
         return _finest_voxels(scene, renderer)
     if not isinstance(renderer, SurfaceRenderer):
-        return footprint / unit
+        # A point of a plane is rounded at its own coordinates, and its orbit at the size of the set.
+        reach = np.abs(view.side) * view.width / 2 + np.abs(view.up) * view.height / 2
+        farthest = float((np.abs(view.center) + reach).max())
+        return footprint / (max(farthest, radius) * float(np.finfo(np.float32).eps))
     # The points of a pixel lie closer, and normals that are made from their places need them exact.
     footprint /= math.sqrt(renderer.used_points.count)
     if renderer.normal != "gradient" or scene.coloring.by == "residual":

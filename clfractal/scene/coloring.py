@@ -1,5 +1,6 @@
 """Where the surface's colour comes from."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
@@ -22,6 +23,18 @@ class Stop(Section):
 
     at: Fraction = Field(description="place in the palette, 0 to 1")
     color: Color = Field(description="linear Rec. 709")
+
+
+def check_order(palette: str | Sequence[Stop]) -> None:
+    """For validators of what has a `palette`: its stops are in order."""
+    if isinstance(palette, str):
+        return
+    for index in range(1, len(palette)):
+        at, before = palette[index].at, palette[index - 1].at
+        if at < before:
+            raise problem(
+                f"must be at least {before:g}, that of the stop before, got {at:g}", f"palette.{index}.at"
+            )
 
 
 class Trap(Section):
@@ -78,14 +91,7 @@ class Coloring(Section):
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if not isinstance(self.palette, str):
-            for index in range(1, len(self.palette)):
-                at, before = self.palette[index].at, self.palette[index - 1].at
-                if at < before:
-                    raise problem(
-                        f"must be at least {before:g}, that of the stop before, got {at:g}",
-                        f"palette.{index}.at",
-                    )
+        check_order(self.palette)
         return self
 
     @property

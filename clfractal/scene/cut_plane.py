@@ -1,11 +1,11 @@
 """The cut-plane renderer's settings, and cut planes that stand in another renderer's picture."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag
+from pydantic import Field, Tag, model_validator
 
 from clfractal.scene.base import Color, Coordinate, Fraction, Section, chosen_by_word
-from clfractal.scene.coloring import Stop
+from clfractal.scene.coloring import Stop, check_order
 from clfractal.scene.plane import Plane
 from clfractal.scene.sampled import Sampled
 
@@ -31,6 +31,11 @@ class EscapeColors(Section):
     offset: Coordinate = Field(0.0, description="start in the palette")
     repeat: bool = Field(False, description="whether the palette begins again after its end")
     inside: Color = Field((0.0, 0.0, 0.0), description="of points that never escape, linear Rec. 709")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        check_order(self.palette)
+        return self
 
 
 class CutPlaneRenderer(Sampled):

@@ -12,6 +12,7 @@ from clfractal.files.document import MAX_DEPTH, read_document, read_value, write
 from clfractal.files.marks import Document, Node, node_from_plain, option
 from clfractal.files.regular import read_bytes, read_text_file
 from clfractal.scene.checks import check_parts
+from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
 
@@ -135,10 +136,7 @@ def _checked(document: Document, folder: Path) -> Scene:
         raise document.locate(error) from error
     try:
         check_parts(scene)
-        if scene.coloring.uses_palette:
-            from clfractal.scene.palette import check_palette
-
-            check_palette(scene.coloring.palette)
+        _check_palettes(scene)
         scene = scene.placed(folder)
         if scene.environment is not None:
             from clfractal.scene.environment import check_name
@@ -150,6 +148,20 @@ def _checked(document: Document, folder: Path) -> Scene:
     except (SceneError, FileError) as error:
         raise document.locate(error) from error
     return scene
+
+
+def _check_palettes(scene: Scene) -> None:
+    """Raises SceneError for a palette that is used and that nobody knows."""
+    used: list[tuple[str, Any]] = []
+    if scene.coloring.uses_palette:
+        used.append(("coloring.palette", scene.coloring.palette))
+    if isinstance(scene.renderer, CutPlaneRenderer):
+        used.append(("renderer.colors.palette", scene.renderer.colors.palette))
+    if used:
+        from clfractal.scene.palette import check_palette
+
+        for path, palette in used:
+            check_palette(palette, path)
 
 
 def _validated(document: Document) -> Scene:

@@ -1,7 +1,9 @@
 """A rectangle in space: where a cut plane lies, and how it is moved about."""
 
-from math import cos, radians, sin
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import cos, fmod, radians, sin
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
@@ -12,6 +14,8 @@ Factor = Annotated[float, Field(strict=True, gt=0, le=1e12, allow_inf_nan=False)
 Angle = Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)]
 MOVES = ("scale", "move_normal", "move_side", "move_up", "rotate_normal", "rotate_side", "rotate_up")
 TURNS = ("rotate_x", "rotate_y", "rotate_z")
+# Of a plane's size and of its middle's coordinates, scene units.
+LARGEST, SMALLEST = 1e6, 1e-18
 
 
 class Transform(Section):
@@ -56,15 +60,18 @@ class Plane(Section):
     @model_validator(mode="after")
     def _faces_somewhere(self) -> Self:
         if self.corners is not None:
-            given = sorted(self.model_fields_set - {"corners", "transform"})
-            if given and any(getattr(self, name) != type(self).model_fields[name].default for name in given):
-                raise problem(f"corners already say it; remove {given[0]} or corners", given[0])
+            fields = type(self).model_fields
+            for name in ("center", "normal", "up", "width", "height"):
+                if getattr(self, name) != fields[name].default:
+                    raise problem(f"corners already say it; remove {name} or corners", name)
             low, right, high = self.corners
-            size = max(1e-300, *(abs(x) for corner in self.corners for x in corner))
+            # Nearer to each other than the number type can tell, corners are one corner.
+            least = 1e-15 * max(abs(x) for corner in self.corners for x in corner)
             side, up = minus(right, low), minus(high, low)
-            if length(cross(side, up)) <= 1e-12 * max(length(side) * length(up), 1e-12 * size * size):
+            width, height = length(side), length(up)
+            if min(width, height) <= least or length(cross(side, up)) <= 1e-6 * width * height:
                 raise problem("must not lie on one line", "corners")
-            if abs(_dot(side, up)) > 1e-4 * length(side) * length(up):
+            if abs(_dot(side, up)) > 1e-4 * width * height:
                 raise problem("must make a right angle at the first, the lower left", "corners")
             return self
         if length(self.normal) < 1e-12:
@@ -76,94 +83,136 @@ class Plane(Section):
                 raise problem("must not be parallel to the normal", "up")
         return self
 
+    @model_validator(mode="after")
+    def _stays_near(self) -> Self:
+        for index, plane in enumerate(self._places()):
+            first = "corners" if self.corners else "width" if plane.width <= plane.height else "height"
+            path = f"transform.{index - 1}" if index else first
+            if max(plane.width, plane.height) > LARGEST:
+                raise problem(f"must leave the plane at most {LARGEST:,.0f} wide and high", path)
+            if min(plane.width, plane.height) < SMALLEST:
+                raise problem(f"must leave the plane at least {SMALLEST:g} wide and high", path)
+            if max(abs(x) for x in plane.center) > LARGEST:
+                raise problem(f"must leave the plane's coordinates below {LARGEST:,.0f}", path)
+        return self
+
     @property
     def placed(self) -> "Placed":
         """Where the plane lies, all transformations applied."""
-        plane = _placed(self)
+        *_, last = self._places()
+        return last
+
+    def _places(self) -> Iterator["Placed"]:
+        """The plane before its transformations, and after each of them."""
+        plane = _by_corners(*self.corners) if self.corners is not None else _by_normal(self)
+        yield plane
         for step in self.transform:
-            plane = _step(plane, step)
-        return plane
+            plane = _transformed(plane, step)
+            yield plane
 
 
-class Placed(Section):
+@dataclass(frozen=True, slots=True)
+class Placed:
     """A plane by its middle, its unit vectors to the right, to the top and to the viewer, and its size, scene units."""
 
-    center: Position
-    side: Position
-    up: Position
-    normal: Position
+    center: Vector
+    side: Vector
+    up: Vector
+    normal: Vector
     width: float
     height: float
+
+    def at(self, x: float, y: float) -> Vector:
+        """The point of the plane at x of its width and y of its height, from (0, 0), its lower left, to (1, 1)."""
+        across, rise = (x - 0.5) * self.width, (y - 0.5) * self.height
+        a, b, c = (m + across * s + rise * u for m, s, u in zip(self.center, self.side, self.up, strict=True))
+        return (a, b, c)
 
 
 Axis = Literal["normal", "side", "up", "x", "y", "z"]
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+SomePlane = TypeVar("SomePlane", Plane, Placed)
 
 
-def scaled(plane: Placed, factor: float) -> Placed:
-    """The plane, wider and higher by a factor, about its middle."""
-    return plane.model_copy(update={"width": plane.width * factor, "height": plane.height * factor})
+def scaled(plane: SomePlane, factor: float) -> SomePlane:
+    """The plane, wider and higher by a factor above 0, about its middle."""
+    placed = _place(plane)
+    return _like(plane, replace(placed, width=placed.width * factor, height=placed.height * factor))
 
 
-def moved(plane: Placed, *, normal: float = 0.0, side: float = 0.0, up: float = 0.0) -> Placed:
-    """The plane, moved along its own axes, scene units."""
-    center = tuple(
+def moved(plane: SomePlane, *, normal: float = 0.0, side: float = 0.0, up: float = 0.0) -> SomePlane:
+    """The plane, moved along its own axes: towards the viewer, to its right, to its top; scene units."""
+    placed = _place(plane)
+    x, y, z = (
         c + normal * n + side * s + up * u
-        for c, n, s, u in zip(plane.center, plane.normal, plane.side, plane.up, strict=True)
+        for c, n, s, u in zip(placed.center, placed.normal, placed.side, placed.up, strict=True)
     )
-    return plane.model_copy(update={"center": center})
+    return _like(plane, replace(placed, center=(x, y, z)))
 
 
-def rotated(plane: Placed, axis: Axis, degrees: float) -> Placed:
+def rotated(plane: SomePlane, axis: Axis, degrees: float) -> SomePlane:
     """The plane, turned by the right-hand rule: about its own middle for its own axes, about the origin for x, y and z."""
-    about: Vector = AXES[axis] if axis in AXES else getattr(plane, axis)
-    turned = {name: turn(getattr(plane, name), about, degrees) for name in ("side", "up", "normal")}
-    if axis in AXES:
-        turned["center"] = turn(plane.center, about, degrees)
-    return plane.model_copy(update=turned)
+    placed = _place(plane)
+    about: Vector = AXES[axis] if axis in AXES else getattr(placed, axis)
+    return _like(
+        plane,
+        replace(
+            placed,
+            center=turn(placed.center, about, degrees) if axis in AXES else placed.center,
+            side=turn(placed.side, about, degrees),
+            up=turn(placed.up, about, degrees),
+            normal=turn(placed.normal, about, degrees),
+        ),
+    )
+
+
+def _place(plane: Plane | Placed) -> Placed:
+    return plane.placed if isinstance(plane, Plane) else plane
+
+
+def _like(plane: SomePlane, placed: Placed) -> SomePlane:
+    """What was done to a plane of a scene is a plane of a scene again, with no transformations left."""
+    if isinstance(plane, Placed):
+        return placed
+    names = ("center", "normal", "up", "width", "height")
+    return Plane.model_validate({name: getattr(placed, name) for name in names})
 
 
 def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
     """A vector, turned about an axis of length 1 (Rodrigues' formula)."""
-    c, s = cos(radians(degrees)), sin(radians(degrees))
+    c, s = _cos_sin(degrees)
     across, along = cross(axis, vector), _dot(axis, vector) * (1 - c)
     x, y, z = (v * c + a * s + k * along for v, a, k in zip(vector, across, axis, strict=True))
     return (x, y, z)
 
 
-def _placed(plane: Plane) -> Placed:
-    if plane.corners is not None:
-        low, right, high = plane.corners
-        across, rise = minus(right, low), minus(high, low)
-        side = _unit(across)
-        normal = _unit(cross(across, rise))
-        center = tuple(a + (b + c) / 2 for a, b, c in zip(low, across, rise, strict=True))
-        return Placed.model_validate(
-            {
-                "center": center,
-                "side": side,
-                "up": cross(normal, side),
-                "normal": normal,
-                "width": length(across),
-                "height": length(rise),
-            }
-        )
+def _cos_sin(degrees: float) -> tuple[float, float]:
+    """Exact at quarter turns, so that a plane turned by one loses nothing."""
+    reduced = fmod(degrees, 360.0)
+    quarters = round(reduced / 90.0)
+    rest = radians(reduced - 90.0 * quarters)
+    c, s = cos(rest), sin(rest)
+    return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
+
+
+def _by_corners(low: Vector, right: Vector, high: Vector) -> Placed:
+    across, rise = minus(right, low), minus(high, low)
+    side = _unit(across)
+    normal = _unit(cross(across, rise))
+    x, y, z = (a + (b + c) / 2 for a, b, c in zip(low, across, rise, strict=True))
+    return Placed((x, y, z), side, cross(normal, side), normal, length(across), length(rise))
+
+
+def _by_normal(plane: Plane) -> Placed:
     normal = _unit(plane.normal)
     wanted = plane.up
     if wanted is None:
         wanted = AXES["y"] if abs(normal[1]) < 0.99 else AXES["z"]
     side = _unit(cross(wanted, normal))
-    return Placed(
-        center=plane.center,
-        side=side,
-        up=cross(normal, side),
-        normal=normal,
-        width=plane.width,
-        height=plane.height,
-    )
+    return Placed(plane.center, side, cross(normal, side), normal, plane.width, plane.height)
 
 
-def _step(plane: Placed, step: Transform) -> Placed:
+def _transformed(plane: Placed, step: Transform) -> Placed:
     if step.scale is not None:
         return scaled(plane, step.scale)
     for name in ("normal", "side", "up"):
@@ -171,11 +220,8 @@ def _step(plane: Placed, step: Transform) -> Placed:
         if distance is not None:
             return moved(plane, **{name: distance})
     axes: tuple[Axis, ...] = ("normal", "side", "up", "x", "y", "z")
-    for axis in axes:
-        degrees = getattr(step, f"rotate_{axis}")
-        if degrees is not None:
-            return rotated(plane, axis, degrees)
-    return plane
+    axis = next(axis for axis in axes if getattr(step, f"rotate_{axis}") is not None)
+    return rotated(plane, axis, getattr(step, f"rotate_{axis}"))
 
 
 def _dot(a: Vector, b: Vector) -> float:
@@ -183,5 +229,8 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def _unit(a: Vector) -> Vector:
+    # The largest component first: squares of small sides would vanish.
+    largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
+    a = (a[0] / largest, a[1] / largest, a[2] / largest)
     size = length(a)
     return (a[0] / size, a[1] / size, a[2] / size)
