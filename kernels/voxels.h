@@ -6,28 +6,40 @@
 
 #define BRICK 8
 #define BRICK_VOXELS 512
-// Voxels of a work-item: a packet, or a row if that is more.
-#define ITEM_VOXELS (LANES < BRICK ? BRICK : LANES)
+// Voxels are in the order of a brick's octants, 4 x 4 x 4 (x fastest, in and between them): packets that are compact end
+// together, and octants can be left out.
+#define OCTANT_VOXELS 64
+// Packets whose orbits are computed side by side, so that one goes on while another waits for a result. Where there is one
+// lane, the device has other work-items for that.
+#if LANES == 1
+#define PACKETS 1
+#else
+#define PACKETS 2
+#endif
+// Voxels of a work-item, 8 at least: of the bits that are stored for them no two work-items share a byte.
+#define ITEM_VOXELS (LANES * PACKETS < 8 ? 8 : LANES * PACKETS)
 
 #define PLACE_X(place) ((int)((place) & 0x1fffff))
 #define PLACE_Y(place) ((int)(((place) >> 21) & 0x1fffff))
 #define PLACE_Z(place) ((int)((place) >> 42))
 
-// The points of voxels `first` and those after it in a brick (x fastest): coordinates are looked up, because they are found
-// in float64 and rounded once. `axes` has x, then y, then z; each has its sub-points' coordinates one after the other.
+// The points of voxels `first` and those after it in a brick: coordinates are looked up, because they are found in float64
+// and rounded once. `axes` has x, then y, then z; each has its sub-points' coordinates one after the other.
 INLINE vec voxel_points(ulong place, int first, int3 sub_point, __global const scalar *axes,
                         __constant const struct Lattice *lattice) {
-    __global const scalar *along_x = axes + sub_point.x * lattice->padded[0] + BRICK * PLACE_X(place);
+    const int octant = first / OCTANT_VOXELS;
+    __global const scalar *along_x = axes + sub_point.x * lattice->padded[0];
     __global const scalar *along_y = axes + lattice->sub_points * lattice->padded[0];
     __global const scalar *along_z = along_y + lattice->sub_points * lattice->padded[1];
-    along_y += sub_point.y * lattice->padded[1] + BRICK * PLACE_Y(place);
-    along_z += sub_point.z * lattice->padded[2] + BRICK * PLACE_Z(place);
+    along_x += BRICK * PLACE_X(place) + 4 * (octant & 1);
+    along_y += sub_point.y * lattice->padded[1] + BRICK * PLACE_Y(place) + 4 * ((octant >> 1) & 1);
+    along_z += sub_point.z * lattice->padded[2] + BRICK * PLACE_Z(place) + 4 * (octant >> 2);
     scalar x[LANES], y[LANES], z[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
         const int at = first + lane;
-        x[lane] = along_x[at & 7];
-        y[lane] = along_y[(at >> 3) & 7];
-        z[lane] = along_z[at >> 6];
+        x[lane] = along_x[at & 3];
+        y[lane] = along_y[(at >> 2) & 3];
+        z[lane] = along_z[(at >> 4) & 3];
     }
     return vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
 }
@@ -42,53 +54,70 @@ INLINE uint lanes_bits(mask m) {
 }
 
 // Which points belong to the solid: as `orbit_inside` at the iteration limit, in fewer operations. Lanes that escaped go on
-// unheeded, and the packet is looked at every few applications. An orbit that comes back to the very same z never escapes
+// unheeded, and packets are looked at every few applications. An orbit that comes back to the very same z never escapes
 // (Brent 1980, "An improved Monte Carlo factorization algorithm", sec. 2: compare with a z that is renewed at powers of two).
-INLINE mask solid_inside(vec point, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const mask all_lanes = equal(R(0.0), R(0.0));
 #if HAS_SHAPE
-    return orbit_inside(point, all_lanes, orbit->iterations, orbit, k);
+    for (int p = 0; p < PACKETS; ++p) inside[p] = orbit_inside(points[p], all_lanes, orbit->iterations, orbit, k);
 #else
-    state c, z;
-    start(point, k, &c, &z);
     const real farthest = (real)(orbit->distance_square);
     const int limit = orbit->iterations;
-    real square = state_square(z);
-    mask alive = less_equal(square, farthest), periodic = ~all_lanes;
-    state past = z;
+    state c[PACKETS], z[PACKETS], past[PACKETS];
+    real square[PACKETS];
+    mask alive[PACKETS], periodic[PACKETS];
+    mask open = ~all_lanes;
+    #pragma unroll
+    for (int p = 0; p < PACKETS; ++p) {
+        start(points[p], k, &c[p], &z[p]);
+        past[p] = z[p];
+        square[p] = state_square(z[p]);
+        alive[p] = less_equal(square[p], farthest);
+        periodic[p] = ~all_lanes;
+        open |= alive[p];
+    }
     int n = FIRST_COUNT, renewed = 1, chunks = 0;
-    while (n + CHUNK <= limit) {
-        if (!any_lane(alive & ~periodic)) break;
+    while (n + CHUNK <= limit && any_lane(open)) {
         #pragma unroll
         for (int step = 0; step < CHUNK; ++step) {
-            z = apply(n + step, z, c, k);
-            square = state_square(z);
-            alive &= less_equal(square, farthest);
+            #pragma unroll
+            for (int p = 0; p < PACKETS; ++p) {
+                z[p] = apply(n + step, z[p], c[p], k);
+                square[p] = state_square(z[p]);
+                alive[p] &= less_equal(square[p], farthest);
+            }
         }
         n += CHUNK;
+        open = ~all_lanes;
+        ++chunks;
+        #pragma unroll
+        for (int p = 0; p < PACKETS; ++p) {
 #if LOGARITHMIC
-        state apart = z;
-        apart.s0 -= past.s0;
-        apart.s1 -= past.s1;
-        apart.s2 -= past.s2;
+            state apart = z[p];
+            apart.s0 -= past[p].s0;
+            apart.s1 -= past[p].s1;
+            apart.s2 -= past[p].s2;
 #if STATE_SIZE == 4
-        apart.s3 -= past.s3;
+            apart.s3 -= past[p].s3;
 #endif
-        periodic |= alive & equal(state_square(apart), R(0.0)) & settled(square, orbit);
-        if (++chunks == renewed) {
-            past = z;
-            renewed = 2 * chunks;
+            periodic[p] |= alive[p] & equal(state_square(apart), R(0.0)) & settled(square[p], orbit);
+            if (chunks == renewed) past[p] = z[p];
+#endif
+            open |= alive[p] & ~periodic[p];
         }
-#endif
+        if (chunks == renewed) renewed *= 2;
     }
-    const mask open = alive & ~periodic;
     if (any_lane(open)) {
         for (; n < limit; ++n) {
-            z = apply(n, z, c, k);
-            square = state_square(z);
-            alive &= less_equal(square, farthest);
+            #pragma unroll
+            for (int p = 0; p < PACKETS; ++p) {
+                z[p] = apply(n, z[p], c[p], k);
+                square[p] = state_square(z[p]);
+                alive[p] &= less_equal(square[p], farthest);
+            }
         }
     }
-    return periodic | (alive & settled(square, orbit));
+    #pragma unroll
+    for (int p = 0; p < PACKETS; ++p) inside[p] = periodic[p] | (alive[p] & settled(square[p], orbit));
 #endif
 }

@@ -8,6 +8,7 @@
 #define BRICK_SIDE 9
 #define BRICK_SAMPLES 729
 #define BRICK_STRIDE 736
+#define OCTANT_VOXELS 64
 
 #define PLACE_X(place) ((int)((place) & 0x1fffff))
 #define PLACE_Y(place) ((int)(((place) >> 21) & 0x1fffff))
@@ -54,13 +55,15 @@ INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __
     return around;
 }
 
-// The row `y`, `z` (voxels from the brick's first, -8 to 15): the first of its three bricks in `near`, and the row within.
+// The row `y`, `z` (voxels from the brick's first, -8 to 15): the first of its three bricks in `near`, and the first of the
+// row's voxels in them (bricks are kept octant by octant: see voxels.h; its second four are an octant further on).
 INLINE int row_of(const surroundings *around, int y, int z, __constant const struct Extent *extent, int *first) {
     const int row_y = clamp(BRICK * around->y + y, 0, BRICK * extent->bricks[1] - 1);
     const int row_z = clamp(BRICK * around->z + z, 0, BRICK * extent->bricks[2] - 1);
     const int brick_y = (row_y >> 3) - around->y + 1, brick_z = (row_z >> 3) - around->z + 1;
     *first = 9 * brick_z + 3 * brick_y;
-    return BRICK * (row_z & 7) + (row_y & 7);
+    const int octant = ((row_z >> 1) & 2) | ((row_y >> 2) & 1);
+    return OCTANT_VOXELS * 2 * octant + 16 * (row_z & 3) + 4 * (row_y & 3);
 }
 #endif
 
@@ -69,7 +72,11 @@ INLINE int row_of(const surroundings *around, int y, int z, __constant const str
 typedef uint row;
 
 INLINE uint row_bits(__global const SAMPLE *samples, int number, int place) {
-    return number < 0 ? 0u : (uint)samples[(size_t)number * 64 + place];
+    if (number < 0) return 0;
+    // Two rows of four share a byte.
+    __global const uchar *bytes = samples + (size_t)number * 64 + place / 8;
+    const int shift = place & 4;
+    return ((uint)(bytes[0] >> shift) & 15u) | ((uint)(bytes[OCTANT_VOXELS / 8] >> shift) & 15u) << 4;
 }
 INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
                     __constant const struct Extent *extent) {
@@ -95,7 +102,8 @@ typedef struct {
 #if SOURCE == SOURCE_BRICKS
 INLINE void row_part(float *part, __global const SAMPLE *samples, int number, int place) {
     for (int i = 0; i < BRICK; ++i) {
-        part[i] = number < 0 ? 0.0f : (float)samples[(size_t)number * 512 + BRICK * place + i];
+        const int voxel = place + (i < 4 ? i : i - 4 + OCTANT_VOXELS);
+        part[i] = number < 0 ? 0.0f : (float)samples[(size_t)number * 512 + voxel];
     }
 }
 INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,

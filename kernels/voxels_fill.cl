@@ -41,55 +41,69 @@ INLINE real solid_count(vec point, __constant const struct Orbit *orbit, __const
 }
 #endif
 
-// The values of a packet's points, 0 to 1 for a share, else as they are.
-INLINE real packet_values(ulong place, int first, __global const scalar *axes, __constant const struct Lattice *lattice,
-                          __constant const struct Orbit *orbit, __constant const scalar *k) {
-#if FILL_KIND == FILL_COVERAGE
-    const int n = lattice->sub_points;
-    real sum = R(0.0);
-    for (int sub_z = 0; sub_z < n; ++sub_z) {
-        for (int sub_y = 0; sub_y < n; ++sub_y) {
-            for (int sub_x = 0; sub_x < n; ++sub_x) {
-                const vec point = voxel_points(place, first, (int3)(sub_x, sub_y, sub_z), axes, lattice);
-                sum += pick(solid_inside(point, orbit, k), R(1.0), R(0.0));
-            }
-        }
+// The values of PACKETS packets from voxel `first` on: 0 to 1 for a share, else as they are.
+INLINE void packet_values(ulong place, int first, real *values, __global const scalar *axes,
+                          __constant const struct Lattice *lattice, __constant const struct Orbit *orbit,
+                          __constant const scalar *k) {
+#if FILL_KIND == FILL_ITERATIONS
+    for (int p = 0; p < PACKETS; ++p) {
+        values[p] = solid_count(voxel_points(place, first + p * LANES, (int3)(0), axes, lattice), orbit, k);
     }
-    return sum / (real)((scalar)(n * n * n));
-#elif FILL_KIND == FILL_ITERATIONS
-    return solid_count(voxel_points(place, first, (int3)(0), axes, lattice), orbit, k);
 #else
-    const vec point = voxel_points(place, first, (int3)(0), axes, lattice);
-    return pick(solid_inside(point, orbit, k), R(1.0), R(0.0));
+    const int n = FILL_KIND == FILL_COVERAGE ? lattice->sub_points : 1;
+    for (int p = 0; p < PACKETS; ++p) values[p] = R(0.0);
+    for (int sub = 0; sub < n * n * n; ++sub) {
+        const int3 sub_point = (int3)(sub % n, sub / n % n, sub / (n * n));
+        vec points[PACKETS];
+        mask inside[PACKETS];
+        #pragma unroll
+        for (int p = 0; p < PACKETS; ++p) points[p] = voxel_points(place, first + p * LANES, sub_point, axes, lattice);
+        solid_inside(points, inside, orbit, k);
+        #pragma unroll
+        for (int p = 0; p < PACKETS; ++p) values[p] += pick(inside[p], R(1.0), R(0.0));
+    }
+    for (int p = 0; p < PACKETS; ++p) values[p] /= (real)((scalar)(n * n * n));
 #endif
 }
 
-// samples: of each brick its voxels, x fastest; of FILL_INSIDE a bit each. `scale`: of a value that is kept in 8 bits.
-__kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks, int first, float scale,
-                          __global const scalar *axes, __constant const struct Lattice *lattice,
+// samples: of each brick its voxels; of FILL_INSIDE a bit each. `skip`: of each brick which of its octants hold nothing.
+// `scale`: of a value that is kept in 8 bits.
+__kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks, int first, __global const uchar *skip,
+                          float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
                           __constant const struct Orbit *orbit, __constant const scalar *k) {
     const size_t brick = (size_t)first + get_global_id(1);
     const int item = (int)get_global_id(0) * ITEM_VOXELS;
     const ulong place = bricks[brick];
+    const bool skipped = ((skip[brick] >> (item / OCTANT_VOXELS)) & 1) != 0;
 #if FILL_KIND == FILL_INSIDE
     uint bits = 0;
-    for (int part = 0; part < ITEM_VOXELS; part += LANES) {
-        const vec point = voxel_points(place, item + part, (int3)(0), axes, lattice);
-        bits |= lanes_bits(solid_inside(point, orbit, k)) << part;
+    for (int part = 0; part < ITEM_VOXELS && !skipped; part += LANES * PACKETS) {
+        vec points[PACKETS];
+        mask inside[PACKETS];
+        #pragma unroll
+        for (int p = 0; p < PACKETS; ++p) points[p] = voxel_points(place, item + part + p * LANES, (int3)(0), axes, lattice);
+        solid_inside(points, inside, orbit, k);
+        #pragma unroll
+        for (int p = 0; p < PACKETS; ++p) bits |= lanes_bits(inside[p]) << (part + p * LANES);
     }
-    __global uchar *rows = samples + (brick * BRICK_VOXELS + item) / 8;
-    for (int row = 0; row < ITEM_VOXELS / 8; ++row) rows[row] = (uchar)(bits >> (8 * row));
+    __global uchar *bytes = samples + (brick * BRICK_VOXELS + item) / 8;
+    for (int i = 0; i < ITEM_VOXELS / 8; ++i) bytes[i] = (uchar)(bits >> (8 * i));
 #else
     __global SAMPLE *values = samples + brick * BRICK_VOXELS + item;
-    for (int part = 0; part < ITEM_VOXELS; part += LANES) {
-        scalar each[LANES];
-        lanes_store(packet_values(place, item + part, axes, lattice, orbit, k), each);
-        for (int lane = 0; lane < LANES; ++lane) {
+    for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {
+        real found[PACKETS];
+        for (int p = 0; p < PACKETS; ++p) found[p] = R(0.0);
+        if (!skipped) packet_values(place, item + part, found, axes, lattice, orbit, k);
+        for (int p = 0; p < PACKETS; ++p) {
+            scalar each[LANES];
+            lanes_store(found[p], each);
+            for (int lane = 0; lane < LANES; ++lane) {
 #if SAMPLE_BYTES == 1
-            values[part + lane] = convert_uchar_sat_rte((float)each[lane] * scale);
+                values[part + p * LANES + lane] = convert_uchar_sat_rte((float)each[lane] * scale);
 #else
-            values[part + lane] = (float)each[lane];
+                values[part + p * LANES + lane] = (float)each[lane];
 #endif
+            }
         }
     }
 #endif

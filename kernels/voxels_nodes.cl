@@ -8,37 +8,51 @@
 #include "orbit.h"
 #include "voxels.h"
 
-// Middle of voxels `first` to `last` along an axis, and half their distance.
+#define OCTANT 4  // its voxels a side
+
+// Middle of a node's first and last voxel along an axis, and half their distance. An octant of a brick ends before its
+// neighbour's first voxel; larger nodes share that one.
 INLINE void middle_of(__global const scalar *along, int cells, int node, int last, scalar *middle, scalar *half_side) {
-    const int low = cells * node, high = min(low + cells, last);
+    const int low = min(cells * node, last), high = min(low + (cells == OCTANT ? cells - 1 : cells), last);
     *middle = S(0.5) * (along[low] + along[high]);
     *half_side = S(0.5) * (along[high] - along[low]);
 }
 
-// A node of `cells` voxels a side, with the layer after them that it shares with the next: empty if the ball around its
-// middle that the distance proves to be outside holds all its points.
+// A node is empty if the ball around its middle that the distance proves to be outside holds all its points. `nodes` are
+// places of nodes of `cells` voxels a side; for octants they are those of bricks, each of which stands for its eight.
 __kernel void empty_nodes(__global uchar *empty, __global const ulong *nodes, int first, int count,
                           int cells, __global const scalar *axes, __constant const struct Lattice *lattice,
                           __constant const struct Orbit *orbit, __constant const scalar *k) {
     const size_t item = (size_t)first + get_global_id(1);
     if (item >= count) return;
-    __global const ulong *place = nodes + item * LANES;
     // Of a voxel's sub-points the middle lies in the middle: the mean of the first and the last.
     __global const scalar *along_y = axes + lattice->sub_points * lattice->padded[0];
     __global const scalar *along_z = along_y + lattice->sub_points * lattice->padded[1];
     const int last_sub = lattice->sub_points - 1;
     scalar x[LANES], y[LANES], z[LANES], reach[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
+        const size_t node = item * LANES + lane;
+        int at_x, at_y, at_z;
+        if (cells == OCTANT) {
+            const ulong brick = nodes[node >> 3];
+            at_x = 2 * PLACE_X(brick) + (int)(node & 1);
+            at_y = 2 * PLACE_Y(brick) + (int)((node >> 1) & 1);
+            at_z = 2 * PLACE_Z(brick) + (int)((node >> 2) & 1);
+        } else {
+            at_x = PLACE_X(nodes[node]);
+            at_y = PLACE_Y(nodes[node]);
+            at_z = PLACE_Z(nodes[node]);
+        }
         scalar side_x, side_y, side_z, other, ignored;
-        middle_of(axes, cells, PLACE_X(place[lane]), lattice->last[0], x + lane, &side_x);
-        middle_of(along_y, cells, PLACE_Y(place[lane]), lattice->last[1], y + lane, &side_y);
-        middle_of(along_z, cells, PLACE_Z(place[lane]), lattice->last[2], z + lane, &side_z);
+        middle_of(axes, cells, at_x, lattice->last[0], x + lane, &side_x);
+        middle_of(along_y, cells, at_y, lattice->last[1], y + lane, &side_y);
+        middle_of(along_z, cells, at_z, lattice->last[2], z + lane, &side_z);
         if (last_sub > 0) {
-            middle_of(axes + last_sub * lattice->padded[0], cells, PLACE_X(place[lane]), lattice->last[0], &other, &ignored);
+            middle_of(axes + last_sub * lattice->padded[0], cells, at_x, lattice->last[0], &other, &ignored);
             x[lane] = S(0.5) * (x[lane] + other);
-            middle_of(along_y + last_sub * lattice->padded[1], cells, PLACE_Y(place[lane]), lattice->last[1], &other, &ignored);
+            middle_of(along_y + last_sub * lattice->padded[1], cells, at_y, lattice->last[1], &other, &ignored);
             y[lane] = S(0.5) * (y[lane] + other);
-            middle_of(along_z + last_sub * lattice->padded[2], cells, PLACE_Z(place[lane]), lattice->last[2], &other, &ignored);
+            middle_of(along_z + last_sub * lattice->padded[2], cells, at_z, lattice->last[2], &other, &ignored);
             z[lane] = S(0.5) * (z[lane] + other);
         }
         side_x += lattice->margin[0];

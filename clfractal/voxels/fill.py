@@ -27,6 +27,8 @@ from clfractal.voxels.store import Evaluated, store
 
 # Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
 SLOW_APPLICATIONS = 1e7
+# Voxels a side of an octant of a brick.
+OCTANT = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +138,7 @@ class _Filler:
         self._upload()
         every = self.lattice.evaluated_bricks
         places = self._descend(kernels["empty_nodes"]) if octree else all_places(every)
-        evaluated = self._fill(kernels["fill_bricks"], places, source, sample)
+        evaluated = self._fill(kernels["fill_bricks"], kernels.get("empty_nodes"), places, source, sample)
         grid = store(
             self.device,
             self.lattice,
@@ -171,43 +173,64 @@ class _Filler:
         self.first_part = int(np.clip(bricks, units, 2048))
 
     def _descend(self, empty_nodes: programs.Built) -> Places:
-        device, kernel = self.device, empty_nodes.kernel
-        milliseconds = 0.0
-
         def empty(nodes: Places, cells: int) -> npt.NDArray[np.bool_]:
-            nonlocal milliseconds
             packets = -(-len(nodes) // self.lanes)
             padded = np.zeros(packets * self.lanes, np.uint64)
             padded[: len(nodes)] = nodes
             result = np.empty(len(padded), np.uint8)
             if packets:
-                places, flags = upload(device, padded), device.buffer(len(padded), "nodes")
-                with device.failures("looking at nodes"):
-                    kernel.set_args(flags, places, *map(np.int32, (0, packets, cells)), *self.constants)
-                milliseconds += run_in_parts(
-                    device,
-                    kernel,
-                    2,
-                    packets,
-                    doing="looking at nodes",
-                    group=empty_nodes.group,
-                    first_part=64 * self.first_part,
-                )
-                cl.enqueue_copy(device.queue, result, flags)
+                flags = self._look(empty_nodes, upload(self.device, padded), packets, cells)
+                cl.enqueue_copy(self.device.queue, result, flags)
             self._tell("octree", len(nodes), len(nodes))
             return result[: len(nodes)].astype(np.bool_)
 
         places, looked = descend(self.lattice, empty)
-        self.stats = replace(self.stats, nodes=looked, octree_ms=milliseconds)
+        self.stats = replace(self.stats, nodes=looked)
         return places
 
+    def _look(self, empty_nodes: programs.Built, nodes: cl.Buffer, packets: int, cells: int) -> cl.Buffer:
+        """Which nodes hold nothing: a byte of 0 or 1 of each, on the device."""
+        device, kernel = self.device, empty_nodes.kernel
+        flags = device.buffer(packets * self.lanes, "nodes")
+        with device.failures("looking at nodes"):
+            kernel.set_args(flags, nodes, *map(np.int32, (0, packets, cells)), *self.constants)
+        milliseconds = run_in_parts(
+            device,
+            kernel,
+            2,
+            packets,
+            doing="looking at nodes",
+            group=empty_nodes.group,
+            first_part=64 * self.first_part,
+        )
+        self.stats = replace(self.stats, octree_ms=self.stats.octree_ms + milliseconds)
+        return flags
+
+    def _skipped(self, empty_nodes: programs.Built | None, places: Places, bricks: cl.Buffer) -> cl.Buffer:
+        """Of each brick a byte, on the device: which of its octants hold nothing."""
+        packets = -(-8 * len(places) // self.lanes)
+        if empty_nodes is None or not packets:
+            return upload(self.device, np.zeros(max(len(places), 1), np.uint8))
+        flags = np.empty(packets * self.lanes, np.uint8)
+        cl.enqueue_copy(self.device.queue, flags, self._look(empty_nodes, bricks, packets, OCTANT))
+        self.stats = replace(self.stats, nodes=self.stats.nodes + 8 * len(places))
+        return upload(self.device, np.packbits(flags[: 8 * len(places)], bitorder="little"))
+
     def _fill(
-        self, fill_bricks: programs.Built, places: Places, source: programs.Source, sample: Kind
+        self,
+        fill_bricks: programs.Built,
+        empty_nodes: programs.Built | None,
+        places: Places,
+        source: programs.Source,
+        sample: Kind,
     ) -> Evaluated:
         device, kernel = self.device, fill_bricks.kernel
         brick_bytes = 64 if source == "bits" else 512 * SAMPLE_BYTES[sample]
         samples = device.buffer(max(len(places), 1) * brick_bytes, "the voxels' values")
-        bricks = upload(device, places)
+        bricks = upload(
+            device, np.append(places, np.uint64(0))
+        )  # the last packet of octants may go past the end
+        skip = self._skipped(empty_nodes, places, bricks)
         x, y, z = self.lattice.evaluated_bricks
         numbers = np.full(x * y * z, -1, np.int32)
         at = unpack_places(places)
@@ -217,7 +240,7 @@ class _Filler:
             limit = self.scene.formula.iterations if self.renderer.value == "iterations" else 1
             scale = 255.0 / max(limit, 1)
         with device.failures("filling the grid"):
-            kernel.set_args(samples, bricks, np.int32(0), np.float32(scale), *self.constants)
+            kernel.set_args(samples, bricks, np.int32(0), skip, np.float32(scale), *self.constants)
         milliseconds = run_in_parts(
             device,
             kernel,

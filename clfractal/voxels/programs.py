@@ -31,6 +31,8 @@ BRICK_GROUP = (1, 16)
 NODE_POINTS = 64
 # Applications between two looks at a packet.
 CHUNK = 4
+# Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
+PACKETS = 2
 
 _BUFFER = Argument("buffer", 8192)
 _INT = Argument("scalar", dtype="int32")
@@ -111,7 +113,7 @@ def nodes_recipe(chain: Chain, lanes: int, precision: Precision) -> Recipe:
 def fill_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
     """`fill_bricks`: the values of bricks' voxels."""
     sample: Kind = "byte" if renderer.value == "inside" else renderer.store
-    items = BRICK**3 // max(lanes, BRICK)
+    items = BRICK**3 // max(lanes * (1 if lanes == 1 else PACKETS), 8)
     return Recipe(
         "voxels_fill.cl",
         "fill_bricks",
@@ -125,7 +127,7 @@ def fill_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: P
         chain,
         items,
         (items, 1),
-        (_BUFFER, _BUFFER, _INT, _FLOAT, *[_BUFFER] * 4),
+        (_BUFFER, _BUFFER, _INT, _BUFFER, _FLOAT, *[_BUFFER] * 4),
     )
 
 
