@@ -10,6 +10,12 @@
 
 #define OCTANT 4  // its voxels a side
 
+#if STATE_SIZE == 4
+#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b + z.s3.a * z.s3.b)
+#else
+#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b)
+#endif
+
 // Middle of a node's first and last voxel along an axis, and half their distance. An octant of a brick ends before its
 // neighbour's first voxel; larger nodes share that one.
 INLINE void middle_of(__global const scalar *along, int cells, int node, int last, scalar *middle, scalar *half_side) {
@@ -17,6 +23,46 @@ INLINE void middle_of(__global const scalar *along, int cells, int node, int las
     *middle = S(0.5) * (along[low] + along[high]);
     *half_side = S(0.5) * (along[high] - along[low]);
 }
+
+#if HAS_DERIVATIVE || HAS_SHAPE
+INLINE real node_distance(vec point, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    return orbit_distance(point, equal(R(0.0), R(0.0)), orbit, k).step;
+}
+#else
+// The most that |z| can grow per scene unit: the root of the largest sum of a row of |J^T J|, which is no less than J's
+// largest singular value, and equal to it where the map is conformal.
+INLINE real largest_growth(dual_state z) {
+    const real xx = STATE_DOT(dx, dx), yy = STATE_DOT(dy, dy), zz = STATE_DOT(dz, dz);
+    const real xy = fabs(STATE_DOT(dx, dy)), yz = fabs(STATE_DOT(dy, dz)), zx = fabs(STATE_DOT(dz, dx));
+    return sqrt(fmax(fmax(xx + xy + zx, yy + xy + yz), zz + yz + zx));
+}
+
+// The distance as `orbit_dual_distance` finds it, with the largest growth in any direction in place of that of |z| alone,
+// which may vanish by chance: a ray that steps too far is told by its next step, a node by nothing.
+INLINE real node_distance(vec point, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    dual_state c, z;
+    dual_start(point, k, &c, &z);
+    real square = dual_state_square(z);
+    real count = (real)((scalar)FIRST_COUNT);
+    mask alive = less_equal(square, (real)(orbit->distance_square));
+    mask inside = alive & ~alive;
+    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
+        if (n == orbit->iterations) {
+            inside = alive & settled(square, orbit);
+            alive &= ~inside;
+        }
+        if (!any_lane(alive)) break;
+        const dual_state next = dual_apply(n, z, c, k);
+        z = dual_state_pick(alive, next, z);
+        square = pick(alive, dual_state_square(next), square);
+        count = pick(alive, (real)((scalar)(n + 1)), count);
+        alive &= less_equal(square, (real)(orbit->distance_square));
+    }
+    if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
+    const real distance = distance_from_growth(square, sqrt(square) / largest_growth(z), count, orbit);
+    return pick(inside, R(0.0), distance);
+}
+#endif
 
 // A node is empty if the ball around its middle that the distance proves to be outside holds all its points. `nodes` are
 // places of nodes of `cells` voxels a side; for octants they are those of bricks, each of which stands for its eight.
@@ -61,8 +107,7 @@ __kernel void empty_nodes(__global uchar *empty, __global const ulong *nodes, in
         reach[lane] = sqrt(side_x * side_x + side_y * side_y + side_z * side_z);
     }
     const vec middle = vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
-    const sphere end = orbit_distance(middle, equal(R(0.0), R(0.0)), orbit, k);
-    const real safe = end.step * (real)(lattice->step_scale);
+    const real safe = node_distance(middle, orbit, k) * (real)(lattice->step_scale);
     lanes_store(pick(less(lanes_load(reach), safe), R(1.0), R(0.0)), x);
     for (int lane = 0; lane < LANES; ++lane) empty[item * LANES + lane] = x[lane] != 0;
 }

@@ -27,6 +27,9 @@ from clfractal.voxels.store import Evaluated, store
 
 # Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
 SLOW_APPLICATIONS = 1e7
+# Part of a distance that is safe to march by which is safe to leave out a node by. Chosen so that of 20 grids of formulas
+# and zooms none differs from its brute fill in a voxel of a million (1: four of them do).
+NODE_SAFETY = 0.75
 # Voxels a side of an octant of a brick.
 OCTANT = 4
 
@@ -162,7 +165,7 @@ class _Filler:
         iterations = self.scene.formula.iterations
         records: list[npt.NDArray[Any]] = [
             self.lattice.axes(precision, self.sub_points),
-            self.lattice.record(precision, self.sub_points, chain.step_scale).reshape(1),
+            self.lattice.record(precision, self.sub_points, NODE_SAFETY * chain.step_scale).reshape(1),
             orbit_record(chain, iterations, precision).reshape(1),
             np.array(write_formula(chain).constants, precision),
         ]
