@@ -37,7 +37,7 @@ __kernel void cut_plane(__global float *film, __global uint *statistics, __globa
         const vec right = vec_splat(view->right), down = vec_splat(view->down);
         shot s;
         s.point = vec_along(vec_along(vec_splat(view->center), from_center_x + across, right), from_center_y + below, down);
-        const escaped e = plane_escape(s.point, active, SMOOTH, orbit, k);
+        const escaped e = plane_escape(s.point, active, SMOOTH, settings->periodicity, orbit, k);
         s.radiance = escape_color(e, colors, palette);
         s.hit = active;
         s.coverage = R(1.0);

@@ -1,7 +1,6 @@
 // Escape of points of a plane: exact counts with no distances, and orbits that come back found early.
 //
-// From the build: PERIODICITY (0 or 1) and PERIOD_CHECK, applications between two looks for an orbit that came back, a
-// multiple of the chain's cycle.
+// From the build: PERIOD_CHECK, applications between two looks for an orbit that came back, a multiple of the chain's cycle.
 
 // The bits of two numbers are the same: unlike `equal`, for zeros of either sign it tells them apart.
 #if REAL_IS_DOUBLE
@@ -28,8 +27,9 @@ typedef struct {
 // A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
-// will do: an orbit that comes near itself may still escape.
-INLINE escaped plane_escape(vec point, mask active, int smooth, __constant const struct Orbit *orbit, __constant const scalar *k) {
+// will do: an orbit that comes near itself may still escape. `periodicity` 0 leaves it, for comparison.
+INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, __constant const struct Orbit *orbit,
+                            __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     const real radius_square = (real)(smooth ? orbit->distance_square : orbit->bailout_square);
@@ -38,7 +38,7 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, __constant const
     real count = (real)((scalar)min(FIRST_COUNT, orbit->iterations));
     mask alive = active & less_equal(square, radius_square);
     mask inside = active & ~active;
-#if PERIODICITY && !HAS_SHAPE
+#if !HAS_SHAPE
     state kept = z;
     real highest = square;  // |z|^2 since then
     int next_keep = FIRST_COUNT + PERIOD_CHECK;
@@ -57,23 +57,25 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, __constant const
                 square = state_square(z);
                 count += pick(alive, R(1.0), R(0.0));
                 alive &= less_equal(square, radius_square);
-#if PERIODICITY && !HAS_SHAPE
+#if !HAS_SHAPE
                 if (smooth) highest = fmax(highest, square);
 #endif
             }
-#if PERIODICITY && !HAS_SHAPE
-            mask back = alive & same_bits(z.s0, kept.s0) & same_bits(z.s1, kept.s1) & same_bits(z.s2, kept.s2);
+#if !HAS_SHAPE
+            if (periodicity) {
+                mask back = alive & same_bits(z.s0, kept.s0) & same_bits(z.s1, kept.s1) & same_bits(z.s2, kept.s2);
 #if STATE_SIZE > 3
-            back &= same_bits(z.s3, kept.s3);
+                back &= same_bits(z.s3, kept.s3);
 #endif
-            // An orbit that comes and goes between the two radii is inside or not by the last application.
-            if (smooth) back &= less_equal(highest, (real)(orbit->bailout_square));
-            inside |= back;
-            alive &= ~back;
-            if (n >= next_keep) {
-                kept = z;
-                highest = square;
-                next_keep = 2 * n;
+                // An orbit that comes and goes between the two radii is inside or not by the last application.
+                if (smooth) back &= less_equal(highest, (real)(orbit->bailout_square));
+                inside |= back;
+                alive &= ~back;
+                if (n >= next_keep) {
+                    kept = z;
+                    highest = square;
+                    next_keep = 2 * n;
+                }
             }
 #endif
         }

@@ -31,6 +31,7 @@ PLANE_SAMPLES = Struct(
         Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
         Field("filter_width", "real", 0, "its width, pixels"),
         Field("seed", "uint", 0, "chooses the places of the samples"),
+        Field("periodicity", "int", 0, "1: orbits that come back are found early"),
     ],
 )
 
@@ -48,7 +49,7 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
     structs = "".join(struct.c_text() for struct in (VIEW, ORBIT, PLANE_SAMPLES, ESCAPE_COLORS))
     defines = {
         **tile_defines(plan),
-        **escape_defines(scene.chain, periodicity=renderer.periodicity),
+        **escape_defines(scene.chain),
         "PALETTE_SIZE": PALETTE_SIZE,
         "SMOOTH": int(renderer.colors.mode == "smooth"),
         "ADAPTIVE": int(renderer.noise is not None),
@@ -67,6 +68,7 @@ def samples_record(renderer: CutPlaneRenderer, samples: int, precision: Precisio
         "filter": FILTERS.index(renderer.filter),
         "filter_width": width if width is not None else FILTER_WIDTHS[renderer.filter],
         "seed": renderer.seed,
+        "periodicity": int(renderer.periodicity),
     }
     return PLANE_SAMPLES.value(precision, values)
 

@@ -54,7 +54,7 @@ def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:
     return np.ascontiguousarray(named_table(colors.palette), np.float32)
 
 
-def escape_defines(chain: Chain, *, periodicity: bool) -> dict[str, object]:
+def escape_defines(chain: Chain) -> dict[str, object]:
     """What the text of `kernels/escape.h` depends on."""
     cycle = chain.cycle_length
-    return {"PERIODICITY": int(periodicity), "PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle)}
+    return {"PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle)}
