@@ -65,7 +65,13 @@ def extract(
         A mesh in scene units: triangles counter-clockwise seen from outside, normals by the values' gradient. It has no
         triangle if no two neighbours differ.
     """
-    job = _Extraction(values, float(level), 1 if close else 0)
+    job = _Extraction(
+        values,
+        float(level),
+        1 if close else 0,
+        np.asarray(origin, np.float64),
+        np.asarray(directions, np.float64),
+    )
     sides = job.cells
     starts = [range(0, side, brick) for side in sides]
     count = int(np.prod([len(start) for start in starts])) or 1
@@ -73,7 +79,7 @@ def extract(
         job.add((place[0], place[1], place[2]), brick)
         if progress is not None:
             progress(done / count)
-    return job.mesh(np.asarray(origin, np.float64), np.asarray(directions, np.float64))
+    return job.mesh()
 
 
 def value_range(values: Values) -> tuple[float, float]:
@@ -106,9 +112,11 @@ class _Extraction:
     values: Values
     level: float
     padding: int
+    origin: Doubles
+    directions: Doubles
     count: int = 0
     points: list[npt.NDArray[np.float64]] = field(default_factory=list)
-    slopes: list[npt.NDArray[np.float32]] = field(default_factory=list)
+    normals: list[npt.NDArray[np.float32]] = field(default_factory=list)
     triangles: list[npt.NDArray[np.int32]] = field(default_factory=list)
     faces: dict[tuple[int, int, int, int], _Face] = field(default_factory=dict)
 
@@ -143,9 +151,12 @@ class _Extraction:
         new = numbers < 0
         numbers[new] = self.count + np.arange(np.count_nonzero(new))
         self.count += int(np.count_nonzero(new))
-        self.points.append(points[new])
-        self.slopes.append(slopes[new])
-        self.triangles.append(numbers[triangles].astype(np.int32))
+        self.points.append(self.origin + (points[new] - self.padding) @ self.directions)
+        # In scene units a slope is the inverse of the steps times that along the axes (transposed for rows).
+        self.normals.append(_unit(slopes[new] @ (-np.linalg.inv(self.directions).T)))
+        # A left-handed grid is seen in a mirror, where triangles turn around.
+        turn = 1 if np.linalg.det(self.directions) > 0 else -1
+        self.triangles.append(numbers[triangles[:, ::turn]].astype(np.int32))
         for along in range(3):
             if stop[along] < self.cells[along]:
                 on = (base[:, along] == stop[along]) & (axis != 2 - along) & (axis != _CENTER)
@@ -157,41 +168,50 @@ class _Extraction:
                         keys[on][order], numbers[on][order]
                     )
 
-    def mesh(self, origin: Doubles, directions: Doubles) -> Mesh:
-        """All of it, in scene units."""
-        points = np.concatenate([np.zeros((0, 3)), *self.points])
-        self.points.clear()
-        points -= self.padding
-        points = points @ directions
-        points += origin
-        triangles = np.concatenate([np.zeros((0, 3), np.int32), *self.triangles])
-        self.triangles.clear()
-        # A left-handed grid is seen in a mirror: triangles turn around, slopes do not.
-        if np.linalg.det(directions) < 0:
-            triangles = np.ascontiguousarray(triangles[:, ::-1])
-        slopes = np.concatenate([np.zeros((0, 3), np.float32), *self.slopes])
-        self.slopes.clear()
-        normals = (slopes @ (-np.linalg.inv(directions).T)).astype(np.float32)
-        return Mesh(points, triangles, unit(normals, points, triangles))
+    def mesh(self) -> Mesh:
+        """All of it."""
+        points = _joined(self.points, np.float64)
+        triangles = _joined(self.triangles, np.int32)
+        normals = _joined(self.normals, np.float32)
+        _fill_in(normals, points, triangles)
+        return Mesh(points, triangles, normals)
 
 
-def unit(normals: npt.NDArray[np.float32], points: Doubles, triangles: npt.NDArray[np.int32]) -> Values:
-    """Normals of length 1, float32; zero or endless ones are replaced by those of the triangles around."""
-    lengths = np.linalg.norm(normals.astype(np.float64), axis=1)
-    bad = ~(lengths > 1e-30) | ~np.isfinite(lengths)
-    lengths[bad] = 1.0
-    result = (normals / lengths[:, None]).astype(np.float32)
-    if bad.any():
-        some = triangles[bad[triangles].any(axis=1)]
-        corners = points[some]
-        flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        sums = np.zeros((len(points), 3))
-        for corner in range(3):
-            for axis in range(3):
-                sums[:, axis] += np.bincount(some[:, corner], flat[:, axis], len(points))
-        sums[bad] /= np.maximum(np.linalg.norm(sums[bad], axis=1), 1e-300)[:, None]
-        result[bad] = sums[bad]
+def _joined(parts: list[npt.NDArray[Any]], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """Arrays (n, 3) one after another; each is let go as soon as it is copied."""
+    result = np.empty((sum(len(part) for part in parts), 3), dtype)
+    end = len(result)
+    while parts:
+        part = parts.pop()
+        result[end - len(part) : end] = part
+        end -= len(part)
     return result
+
+
+def _unit(vectors: Doubles) -> npt.NDArray[np.float32]:
+    """Vectors of length 1; zero where there is no direction."""
+    with np.errstate(all="ignore"):
+        scaled = vectors / np.abs(vectors).max(axis=1, keepdims=True, initial=0)
+        scaled /= np.linalg.norm(scaled, axis=1, keepdims=True)
+    scaled[~np.isfinite(scaled).all(axis=1)] = 0
+    result: npt.NDArray[np.float32] = scaled.astype(np.float32)
+    return result
+
+
+def _fill_in(normals: npt.NDArray[np.float32], points: Doubles, triangles: npt.NDArray[np.int32]) -> None:
+    """Gives the vertices without a normal the mean of the triangles around, by area."""
+    missing = np.asarray(~np.any(normals, axis=1), np.bool_)
+    if not missing.any():
+        return
+    some = triangles[missing[triangles].any(axis=1)]
+    corners = points[some]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    numbers, places = np.unique(some.reshape(-1), return_inverse=True)
+    sums = np.zeros((len(numbers), 3))
+    for axis in range(3):
+        sums[:, axis] = np.bincount(places.reshape(-1), np.repeat(flat[:, axis], 3), len(numbers))
+    asked = missing[numbers]
+    normals[numbers[asked]] = _unit(sums[asked])
 
 
 def _edges(places: Values, start: Cells, samples: Cells) -> tuple[Keys, Keys, Keys]:
@@ -238,8 +258,8 @@ class _Block:
             inner.append(slice(1, 1 + high - low))
         part = np.asarray(values[around[0], around[1], around[2]])
         small = part.dtype.itemsize <= 2 or part.dtype == np.float32
-        differences = part.astype(np.float32 if small else np.float64)
-        differences -= differences.dtype.type(level)
+        differences: Values = part.astype(np.float32 if small else np.float64)
+        differences -= level
         own_part = tuple(slice(o.start - a.start, o.stop - a.start) for o, a in zip(own, around, strict=True))
         is_inside = differences[own_part] >= 0
         whole = is_inside.size == np.prod([s.stop - s.start for s in inner])
@@ -262,40 +282,40 @@ class _Block:
         tall[is_inside] *= _INSIDE_MORE
         tall[self.outside[self.inner]] = _TALL
         np.negative(tall, out=tall, where=~is_inside)
-        places, triangles, _, _ = marching_cubes(tall, 0.0, gradient_direction="descent")
-        # (z, y, x) is a left-handed order of the axes.
-        return places, triangles[:, ::-1]
+        marching: Any = marching_cubes  # without types
+        places, triangles, _, _ = marching(tall, 0.0, gradient_direction="descent")
+        return places, triangles
 
-    def vertices(self, base: Keys, axis: Keys) -> tuple[Doubles, npt.NDArray[np.float32]]:
+    def vertices(self, base: Keys, axis: Keys) -> tuple[Doubles, Doubles]:
         """Places (x, y, z) of samples, and slopes of the values along x, y, z there."""
         points = np.empty((len(base), 3))
-        slopes = np.empty((len(base), 3), np.float32)
+        slopes = np.empty((len(base), 3))
         local = base - self.start
         on_edge = axis != _CENTER
-        points[on_edge], slopes[on_edge] = self._on_edges(local[on_edge], axis[on_edge])
-        if not on_edge.all():
-            points[~on_edge], slopes[~on_edge] = self._in_cells(local[~on_edge])
-        points += self.start[::-1]
+        with np.errstate(all="ignore"):  # values may be infinite, or none
+            points[on_edge], slopes[on_edge] = self._on_edges(local[on_edge], axis[on_edge])
+            if not on_edge.all():
+                points[~on_edge], slopes[~on_edge] = self._in_cells(local[~on_edge])
         return points, slopes
 
-    def _on_edges(self, local: Keys, axis: Keys) -> tuple[Doubles, npt.NDArray[np.float32]]:
+    def _on_edges(self, local: Keys, axis: Keys) -> tuple[Doubles, Doubles]:
         step = np.eye(3, dtype=np.int64)[2 - axis]
         ends = [local, local + step]
         d = [self.differences[tuple(end.T)].astype(np.float64) for end in ends]
-        with np.errstate(all="ignore"):  # infinite values, or none
-            t = d[0] / (d[0] - d[1])
+        t = d[0] / (d[0] - d[1])
         t[~np.isfinite(t)] = 0.5
         np.clip(t, _FROM_END, 1 - _FROM_END, out=t)
         beyond = [self.outside[tuple(end.T)] for end in ends]
         cut = beyond[0] | beyond[1]
         t[cut] = 0.5
-        points = (local + t[:, None] * step)[:, ::-1]
+        # Whole numbers of the whole grid first: rounded the same in every brick.
+        points = (local + self.start + t[:, None] * step)[:, ::-1]
         slopes = (1 - t)[:, None] * self._slopes(local) + t[:, None] * self._slopes(ends[1])
         # A cut face looks out of the box.
         slopes[cut] = (step * (beyond[0].astype(np.int64) - beyond[1])[:, None])[cut][:, ::-1]
-        return points, slopes.astype(np.float32)
+        return points, slopes
 
-    def _in_cells(self, local: Keys) -> tuple[Doubles, npt.NDArray[np.float32]]:
+    def _in_cells(self, local: Keys) -> tuple[Doubles, Doubles]:
         """The middle of the places where the surface crosses the edges of a cell."""
         sums, slopes, counts = np.zeros((len(local), 3)), np.zeros((len(local), 3)), np.zeros(len(local))
         for axis in range(3):
@@ -310,7 +330,7 @@ class _Block:
                 sums[crosses] += place
                 slopes[crosses] += slope
                 counts[crosses] += 1
-        return sums / counts[:, None], (slopes / counts[:, None]).astype(np.float32)
+        return sums / counts[:, None], slopes / counts[:, None]
 
     def _is_inside(self, at: Keys) -> npt.NDArray[np.bool_]:
         index = tuple(at.T)
