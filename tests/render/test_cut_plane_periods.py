@@ -62,7 +62,7 @@ def test_an_orbit_that_leaves_and_comes_back_is_inside_by_its_last_application(d
     distance bailout: that it comes back must not hide where it is in the end."""
     formula = {
         "variables": ["x", "y", "z"],
-        "let": {"r": "sqrt(x*x + y*y + z*z)", "f": "where(r < 1.125, 4, 0.0625)"},
+        "let": {"r": "sqrt(x*x + y*y + z*z)", "f": "where(r < 2.5, 4, 0.0625)"},
         "map": ["f*x", "f*y", "f*z"],
         "add": "none",
         "degree": 1,
@@ -77,7 +77,7 @@ def test_an_orbit_that_leaves_and_comes_back_is_inside_by_its_last_application(d
         radius = np.hypot(x, y)
         # Powers of two change nothing but the exponent: the orbits are exact.
         for _ in range(iterations):
-            radius = radius * np.where(radius < 1.125, 4, 0.0625)
+            radius = radius * np.where(radius < 2.5, 4, 0.0625)
         sure = np.abs(radius - 2) > 1e-5
         inside = (picture_of(film) == 0).all(axis=-1)
         np.testing.assert_array_equal(inside[sure], (radius <= 2)[sure])
