@@ -10,12 +10,6 @@
 
 #define OCTANT 4  // its voxels a side
 
-#if STATE_SIZE == 4
-#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b + z.s3.a * z.s3.b)
-#else
-#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b)
-#endif
-
 // Middle of a node's first and last voxel along an axis, and half their distance. An octant of a brick ends before its
 // neighbour's first voxel; larger nodes share that one.
 INLINE void middle_of(__global const scalar *along, int cells, int node, int last, scalar *middle, scalar *half_side) {
@@ -24,43 +18,76 @@ INLINE void middle_of(__global const scalar *along, int cells, int node, int las
     *half_side = S(0.5) * (along[high] - along[low]);
 }
 
-#if HAS_DERIVATIVE || HAS_SHAPE
-INLINE real node_distance(vec point, __constant const struct Orbit *orbit, __constant const scalar *k) {
+// A node whose image, of radius r, comes near 0 in z: there a map of a degree above 1 has hardly any slope, as its middle
+// tells, but it has elsewhere in the node, and the distance would be too large.
+INLINE mask doubtful(real square, real radius_square) {
+#if LOGARITHMIC
+    return less(R(0.25) * square, radius_square) & less(square, R(4.0));
+#else
+    return less(R(1.0), R(0.0));
+#endif
+}
+
+#if HAS_SHAPE
+INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
     return orbit_distance(point, equal(R(0.0), R(0.0)), orbit, k).step;
 }
 #else
-// The most that |z| can grow per scene unit: the root of the largest sum of a row of |J^T J|, which is no less than J's
-// largest singular value, and equal to it where the map is conformal.
-INLINE real largest_growth(dual_state z) {
-    const real xx = STATE_DOT(dx, dx), yy = STATE_DOT(dy, dy), zz = STATE_DOT(dz, dz);
-    const real xy = fabs(STATE_DOT(dx, dy)), yz = fabs(STATE_DOT(dy, dz)), zx = fabs(STATE_DOT(dz, dx));
-    return sqrt(fmax(fmax(xx + xy + zx, yy + xy + yz), zz + yz + zx));
-}
 
-// The distance as `orbit_dual_distance` finds it, with the largest growth in any direction in place of that of |z| alone,
-// which may vanish by chance: a ray that steps too far is told by its next step, a node by nothing.
-INLINE real node_distance(vec point, __constant const struct Orbit *orbit, __constant const scalar *k) {
+#if STATE_SIZE == 4
+#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b + z.s3.a * z.s3.b)
+#else
+#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b)
+#endif
+
+// The distance as `orbit_distance` finds it, but the growth is that in any direction. The growth of |z| alone may vanish by
+// chance: a ray that steps too far is told so by its next step, a node by nothing.
+INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
+#if HAS_DERIVATIVE
+    state c, z;
+    start(point, k, &c, &z);
+    real growth = R(1.0), square = state_square(z);
+#else
     dual_state c, z;
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
+#endif
     real count = (real)((scalar)FIRST_COUNT);
     mask alive = less_equal(square, (real)(orbit->distance_square));
-    mask inside = alive & ~alive;
+    mask near = alive & ~alive;
     for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
-        if (n == orbit->iterations) {
-            inside = alive & settled(square, orbit);
-            alive &= ~inside;
-        }
+        if (n == orbit->iterations) near |= alive & settled(square, orbit);
+#if HAS_DERIVATIVE
+        near |= alive & doubtful(square, (reach * growth) * (reach * growth));
+#else
+        near |= alive & doubtful(square, reach * reach * (STATE_DOT(dx, dx) + STATE_DOT(dy, dy) + STATE_DOT(dz, dz)));
+#endif
+        alive &= ~near;
         if (!any_lane(alive)) break;
+#if HAS_DERIVATIVE
+        real next_growth = growth;
+        const state next = apply_derivative(n, z, c, &next_growth, k);
+        z = state_pick(alive, next, z);
+        growth = pick(alive, next_growth, growth);
+        square = pick(alive, state_square(next), square);
+#else
         const dual_state next = dual_apply(n, z, c, k);
         z = dual_state_pick(alive, next, z);
         square = pick(alive, dual_state_square(next), square);
+#endif
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
-    if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
-    const real distance = distance_from_growth(square, sqrt(square) / largest_growth(z), count, orbit);
-    return pick(inside, R(0.0), distance);
+    if (orbit->longest <= orbit->iterations) near |= alive & settled(square, orbit);
+#if !HAS_DERIVATIVE
+    // The root of the largest sum of a row of |J^T J| is no less than J's largest singular value, and equal to it where the
+    // map is conformal.
+    const real xx = STATE_DOT(dx, dx), yy = STATE_DOT(dy, dy), zz = STATE_DOT(dz, dz);
+    const real xy = fabs(STATE_DOT(dx, dy)), yz = fabs(STATE_DOT(dy, dz)), zx = fabs(STATE_DOT(dz, dx));
+    const real growth = sqrt(fmax(fmax(xx + xy + zx, yy + xy + yz), zz + yz + zx));
+#endif
+    const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
+    return pick(near, R(0.0), distance);
 }
 #endif
 
@@ -107,7 +134,7 @@ __kernel void empty_nodes(__global uchar *empty, __global const ulong *nodes, in
         reach[lane] = sqrt(side_x * side_x + side_y * side_y + side_z * side_z);
     }
     const vec middle = vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
-    const real safe = node_distance(middle, orbit, k) * (real)(lattice->step_scale);
+    const real safe = node_distance(middle, lanes_load(reach), orbit, k) * (real)(lattice->step_scale);
     lanes_store(pick(less(lanes_load(reach), safe), R(1.0), R(0.0)), x);
     for (int lane = 0; lane < LANES; ++lane) empty[item * LANES + lane] = x[lane] != 0;
 }

@@ -28,7 +28,7 @@ from clfractal.voxels.store import Evaluated, store
 # Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
 SLOW_APPLICATIONS = 1e7
 # Part of a distance that is safe to march by which is safe to leave out a node by. Chosen so that of 20 grids of formulas
-# and zooms none differs from its brute fill in a voxel of a million (1: four of them do).
+# and zooms none differs from its brute fill in a voxel of a million.
 NODE_SAFETY = 0.75
 # Voxels a side of an octant of a brick.
 OCTANT = 4
@@ -213,11 +213,14 @@ class _Filler:
         """Of each brick a byte, on the device: which of its octants hold nothing."""
         packets = -(-8 * len(places) // self.lanes)
         if empty_nodes is None or not packets:
+            self.skipped = 0
             return upload(self.device, np.zeros(max(len(places), 1), np.uint8))
         flags = np.empty(packets * self.lanes, np.uint8)
         cl.enqueue_copy(self.device.queue, flags, self._look(empty_nodes, bricks, packets, OCTANT))
         self.stats = replace(self.stats, nodes=self.stats.nodes + 8 * len(places))
-        return upload(self.device, np.packbits(flags[: 8 * len(places)], bitorder="little"))
+        of_bricks = flags[: 8 * len(places)]
+        self.skipped = int(np.count_nonzero(of_bricks))
+        return upload(self.device, np.packbits(of_bricks, bitorder="little"))
 
     def _fill(
         self,
@@ -255,7 +258,7 @@ class _Filler:
             first_part=self.first_part,
             done=lambda done: self._tell("fill", done, len(places)),
         )
-        points = len(places) * 512 * self.sub_points**3
+        points = (8 * len(places) - self.skipped) * OCTANT**3 * self.sub_points**3
         self.stats = replace(self.stats, evaluated_voxels=points, fill_ms=milliseconds)
         # What 1 is to the source: a bit, 255 of a byte, or 1 of a share.
         unit = 255.0 if source == "bricks" and sample == "byte" else 1.0

@@ -1,0 +1,188 @@
+"""A grid out of a whole array of values, from wherever it comes: the bricks that can be seen, with gradient normals."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.launch import run_in_parts
+from clfractal.device.select import Device
+from clfractal.scene.base import Vector
+from clfractal.voxels import programs
+from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
+from clfractal.voxels.lattice import BRICK, Lattice, pack_places
+from clfractal.voxels.octree import levels
+from clfractal.voxels.pool import allocate, plan_pools
+from clfractal.voxels.store import extent_buffer
+
+# Bytes of the array that are on the device at a time, beside the grid.
+SLAB_BYTES = 1 << 28
+
+
+def grid_from_dense(
+    array: npt.ArrayLike,
+    device: Device,
+    *,
+    corner: Vector,
+    spacing: Vector,
+    threshold: float | None = None,
+    opaque: float | None = None,
+    normal_radius: int = 1,
+    on_compile: Callable[[str], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Grid:
+    """A grid of values that are given.
+
+    Args:
+        array: real numbers of shape (nz, ny, nx), at least one along each axis; uint8 is kept as it is, any other type
+            becomes float32.
+        device: where the grid shall be.
+        corner: the least corner of the box: voxel (0, 0, 0) has its middle half a voxel from it, scene units.
+        spacing: sides of a voxel, scene units.
+        threshold: bricks whose values are all at or below it cannot be seen and are not stored; None stores all.
+        opaque: least value that counts as inside (a normal's fourth byte); None: what is above `threshold`, or all.
+        normal_radius: of the low-pass filter before normals, voxels, 0 to 4.
+        on_compile: told a line if the program has to be compiled first.
+        progress: told how many bricks are stored, of how many.
+
+    Raises:
+        ValueError: an array of another shape or type.
+        DeviceError: status 2, told before anything is uploaded, if the grid does not fit; status 3, the device failed.
+    """
+    values = np.asarray(array)
+    if values.ndim != 3 or 0 in values.shape:
+        raise ValueError(f"values must have shape (nz, ny, nx), got {values.shape}")
+    if values.dtype.kind not in "buif":
+        raise ValueError(f"values must be real numbers, got {values.dtype}")
+    kind: Kind = "byte" if values.dtype in (np.uint8, np.bool_) else "float"
+    values = values.astype(np.uint8 if kind == "byte" else np.float32, copy=False)
+    nz, ny, nx = values.shape
+    lattice = Lattice(corner, spacing, (nx, ny, nz))
+    visible = np.ones(lattice.bricks[::-1], np.bool_)
+    if threshold is not None:
+        # NaN is above nothing: it cannot be seen.
+        visible = _brick_maximum(values) > threshold
+    least = (
+        float(np.nextafter(np.float32(threshold), np.float32(np.inf))) if threshold is not None else -np.inf
+    )
+    build, start = _Slabs.recipe(kind, normal_radius), time.perf_counter()
+    entries = np.full(visible.shape, -1, np.int32)
+    stored = int(visible.sum())
+    entries[visible] = np.arange(stored, dtype=np.int32)
+    sizes = (SAMPLE_BYTES[kind], 4)
+    layer = nx * ny * sizes[0]
+    others = 4 * entries.size + min(values.nbytes, max(SLAB_BYTES, 24 * layer))
+    layout = plan_pools(device, stored, sizes, others, f"a grid of {nx} x {ny} x {nz} voxels")
+    built = programs.build_all(device, [build], on_compile)[0]
+    pools = [allocate(device, layout, size, "the grid") for size in sizes]
+    slabs = _Slabs(device, lattice, values, built, opaque if opaque is not None else least, normal_radius)
+    milliseconds = 0.0
+    z, y, x = np.nonzero(visible)
+    for (first, after), value_part, normal_part in zip(layout.ranges(), *pools, strict=True):
+        milliseconds += slabs.store(value_part, normal_part, x[first:after], y[first:after], z[first:after])
+        if progress is not None:
+            progress(after, stored)
+    entries = levels(entries)
+    table = device.buffer(entries.nbytes, "the grid's table", read_only=True)
+    with device.failures("storing the grid"):
+        cl.enqueue_copy(device.queue, table, entries.reshape(-1))
+    stats = GridStats(
+        stored_bricks=stored,
+        pool_bytes=sum(buffer.size for buffer in (*pools[0], *pools[1], table)),
+        build_ms=built.build_ms,
+        store_ms=milliseconds,
+        wall_ms=1e3 * (time.perf_counter() - start),
+    )
+    background = float(min(threshold, float(np.nanmin(values)))) if threshold is not None else 0.0
+    return Grid(
+        lattice,
+        kind,
+        (0.0, 255.0) if kind == "byte" else (0.0, 1.0),
+        device,
+        layout,
+        entries,
+        table,
+        pools[0],
+        pools[1],
+        None,
+        background=background,
+        stats=stats,
+    )
+
+
+class _Slabs:
+    """Stores bricks out of slabs of the array, whole layers of bricks with the voxels around that normals depend on."""
+
+    def __init__(
+        self,
+        device: Device,
+        lattice: Lattice,
+        values: npt.NDArray[Any],
+        built: programs.Built,
+        opaque: float,
+        normal_radius: int,
+    ) -> None:
+        self.device, self.lattice, self.values = device, lattice, values
+        self.built, self.opaque, self.reach = built, opaque, normal_radius + 1
+        self.layers = max(SLAB_BYTES // (BRICK * values[0].nbytes) - 2, 1)
+
+    @staticmethod
+    def recipe(kind: Kind, normal_radius: int) -> programs.Recipe:
+        return programs.store_recipe("slab", kind, kind, normal_radius)
+
+    def store(
+        self,
+        values: cl.Buffer,
+        normals: cl.Buffer,
+        x: npt.NDArray[np.int64],
+        y: npt.NDArray[np.int64],
+        z: npt.NDArray[np.int64],
+    ) -> float:
+        """Stores bricks, in order of z, in the slots of one part of the pools; gives milliseconds on the device."""
+        milliseconds, place = 0.0, 0
+        while place < len(z):
+            first = int(z[place])
+            after = int(np.searchsorted(z, first + self.layers))
+            bottom = max(BRICK * first - self.reach, 0)
+            top = BRICK * (first + self.layers) + 1 + self.reach
+            part = np.ascontiguousarray(self.values[bottom:top])
+            slab = self.device.buffer(part.nbytes, "a slab of the grid", read_only=True)
+            places = pack_places(x[place:after], y[place:after], z[place:after])
+            bricks = self.device.buffer(places.nbytes, "places", read_only=True)
+            extent = extent_buffer(self.device, self.lattice, 1.0, np.inf, self.opaque, bottom)
+            with self.device.failures("storing the grid"):
+                cl.enqueue_copy(self.device.queue, slab, part.reshape(-1))
+                cl.enqueue_copy(self.device.queue, bricks, places)
+                counts = map(np.int32, (0, len(places), place))
+                self.built.kernel.set_args(values, normals, bricks, *counts, slab, slab, extent)
+            milliseconds += run_in_parts(
+                self.device,
+                self.built.kernel,
+                3,
+                len(places),
+                doing="storing the grid",
+                group=self.built.group,
+                first_part=1024,
+            )
+            place = after
+        return milliseconds
+
+
+def _brick_maximum(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """The largest value of each brick's samples, shape (bz, by, bx); NaN counts as the least number."""
+    result = values
+    if values.dtype.kind == "f":
+        result = np.where(np.isnan(values), -np.inf, values)
+    for axis in range(3):
+        n = result.shape[axis]
+        bricks = max((n + BRICK - 2) // BRICK, 1)
+        starts = BRICK * np.arange(bricks)
+        own = np.maximum.reduceat(result, starts, axis=axis)
+        after = np.take(result, np.minimum(starts + BRICK, n - 1), axis=axis)
+        result = np.maximum(own, after)
+    return result
