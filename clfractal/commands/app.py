@@ -141,6 +141,57 @@ def render(
 
 
 @app.command()
+def slices(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="slice.png becomes slice_0001.png, ...; .png or .exr; repeatable.  [default: slice.png]",
+        ),
+    ] = None,
+    count: Annotated[int, typer.Option("--count", help="Number of slices.")] = 10,
+    spacing: Annotated[
+        float | None,
+        typer.Option(
+            "--spacing", help="Scene units between two slices.  [default: through the formula's bounds]"
+        ),
+    ] = None,
+    start: Annotated[int, typer.Option("--start", metavar="N", help="First slice to make.")] = 1,
+    device: DeviceOption = None,
+    precision: Annotated[
+        str | None,
+        typer.Option("--precision", help="auto, float32 or float64.  [default: the scene's, auto]"),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option("--size", metavar="WxH", help="Pixels; the plane stays.")
+    ] = None,
+    overrides: Overrides = None,
+    samples: Annotated[int | None, typer.Option("--samples", help="Samples per pixel, in total.")] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Render a stack of parallel cut planes to numbered picture files."""
+    from clfractal.commands.render import Order
+    from clfractal.commands.slices import Stack, render_slices
+
+    order = Order(
+        scene=scene,
+        outputs=tuple(output or ()),
+        device=device,
+        precision=precision,
+        size=size,
+        overrides=tuple(overrides or ()),
+        samples=samples,
+    )
+    stack = Stack(count, spacing, start)
+    shell = _shell(context, quiet=quiet, verbose=verbose)
+    return lambda: render_slices(order, stack, shell)
+
+
+@app.command()
 def check(
     context: typer.Context, scene: Scene, overrides: Overrides = None, verbose: Verbose = False
 ) -> Work:

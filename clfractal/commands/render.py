@@ -49,7 +49,7 @@ def render_scene(order: Order, shell: Shell) -> None:
     start = time.perf_counter()
     region = _region(order.region)
     shell.mute_drivers()
-    scene = _scene(order)
+    scene = ordered_scene(order)
     outputs = _outputs(order, scene)
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
     from clfractal import job as jobs
@@ -96,7 +96,7 @@ def render_scene(order: Order, shell: Shell) -> None:
         shell.say(stats.sentence(values))
 
 
-def _scene(order: Order) -> Scene:
+def ordered_scene(order: Order) -> Scene:
     """The scene with the options folded in; errors name the option that was given."""
     given: dict[str, tuple[str, str]] = {}  # key -> option, value
     if order.size is not None:

@@ -1,0 +1,174 @@
+"""`clfractal slices`: a stack of parallel cut planes as numbered pictures."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from clfractal.commands.render import PARTIAL, Order, ordered_scene
+from clfractal.errors import FileError, SceneError, Where
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.model import Scene
+from clfractal.scene.plane import moved
+from clfractal.shell import Shell
+
+if TYPE_CHECKING:
+    from clfractal.device.select import Device
+    from clfractal.job import Job
+    from clfractal.render.film import Film
+    from clfractal.render.store import JournalFilm
+
+MOST_SLICES = 100_000
+# Pictures beyond this are kept on disk until they are whole, bytes.
+_IN_MEMORY = 1 << 28
+_LINE_SECONDS = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """Which planes to show: `count` of them, `spacing` scene units apart, the scene's own in the middle.
+
+    `spacing` None: so that they reach through the formula's bounds. `start` is the number of the first one to make, from 1.
+    """
+
+    count: int = 10
+    spacing: float | None = None
+    start: int = 1
+
+
+def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
+    """Renders the planes of a scene's stack, each to its own files.
+
+    The planes follow each other along the normal, towards the viewer; `slice.png` becomes slice_0001.png, slice_0002.png
+    and so on. A slice's files appear whole or not at all, and those that are there stay, whatever happens to a later one.
+
+    Raises:
+        ClfractalError: anything wrong with the input, the files or the device.
+    """
+    begun = time.perf_counter()
+    shell.mute_drivers()
+    _check(stack)
+    scene = ordered_scene(order)
+    if not isinstance(scene.renderer, CutPlaneRenderer):
+        where = Where(order.scene, path="renderer.type")
+        raise SceneError(f"must be cut_plane for slices, got {scene.renderer.type}", where)
+    numbers = range(stack.start, stack.count + 1)
+    files = [_numbered(order.outputs, number, stack.count) for number in numbers]
+    _check_files(order, scene, files)
+    scenes = [slice_scene(scene, stack, number) for number in numbers]
+    # Imported only now: a mistake in the input is told without waiting for OpenCL.
+    from clfractal.device.select import choose
+
+    device = choose(order.device)
+    precision = _precision(scenes, device)
+    told, rays, number = begun, 0, stack.start
+    shell.state = lambda: (
+        f"{files[number - stack.start][0]}: interrupted with {number - 1} of {stack.count} slices done;"
+        f" --start {number} continues"
+    )
+    for number, each, paths in zip(numbers, scenes, files, strict=True):
+        rays += _render(each, device, precision, paths, shell)
+        now = time.perf_counter()
+        if now - told > _LINE_SECONDS and number < stack.count:
+            told = now
+            left = (now - begun) / (number + 1 - stack.start) * (stack.count - number)
+            shell.say(f"slices: {number} of {stack.count}, {left:.0f} s left")
+    shell.state = lambda: "clfractal: interrupted"
+    seconds = time.perf_counter() - begun
+    first, last = files[0][0], files[-1][0]
+    shell.say(f"{first} to {last.name}: {seconds:.2f} s, {rays / 1e6 / seconds:.2f} Mrays/s")
+
+
+def slice_scene(scene: Scene, stack: Stack, number: int) -> Scene:
+    """The scene of one plane of a stack, `number` from 1; it renders that slice alone.
+
+    Raises:
+        SceneError: the plane is too far off.
+    """
+    assert isinstance(scene.renderer, CutPlaneRenderer)
+    spacing = stack.spacing if stack.spacing is not None else 2 * scene.chain.radius / stack.count
+    offset = (number - (stack.count + 1) / 2) * spacing
+    try:
+        plane = moved(scene.renderer.plane, normal=offset)
+    except ValidationError as error:
+        raise SceneError(f"leads slice {number} beyond all coordinates", Where("--spacing")) from error
+    return scene.model_copy(update={"renderer": scene.renderer.model_copy(update={"plane": plane})})
+
+
+def _check(stack: Stack) -> None:
+    if not 1 <= stack.count <= MOST_SLICES:
+        raise SceneError(f"must be from 1 to {MOST_SLICES:,}, got {stack.count}", Where("--count"))
+    if not 1 <= stack.start <= stack.count:
+        raise SceneError(f"must be from 1 to the count, {stack.count}, got {stack.start}", Where("--start"))
+    if stack.spacing is not None and not (math.isfinite(stack.spacing) and stack.spacing > 0):
+        raise SceneError(f"must be a number above 0, got {stack.spacing:g}", Where("--spacing"))
+
+
+def _numbered(outputs: tuple[Path, ...], number: int, count: int) -> tuple[Path, ...]:
+    digits = max(4, len(str(count)))
+    paths = outputs or (Path("slice.png"),)
+    return tuple(path.with_name(f"{path.stem}_{number:0{digits}d}{path.suffix}") for path in paths)
+
+
+def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> None:
+    """All files, before anything is rendered."""
+    from clfractal.render.outputs import check_output
+
+    source = os.path.realpath(order.scene)
+    for path in files[0]:
+        check_output(path, scene.output.channels)
+    for paths in files:
+        for path in paths:
+            if os.path.realpath(path) == source:
+                raise FileError(
+                    "would be replaced by its own slice; name another output with -o", Where(order.scene)
+                )
+            if path.exists():
+                check_output(path)
+
+
+def _precision(scenes: list[Scene], device: Device) -> str:
+    """One number type for the whole stack: the finest that any of its ends needs."""
+    from clfractal.device.select import has_float64
+    from clfractal.render.plan import choose_precision
+
+    wanted = scenes[0].renderer.precision
+    able = has_float64(device.info)
+    found = {choose_precision(end, wanted, has_float64=able)[0] for end in (scenes[0], scenes[-1])}
+    return max(found)
+
+
+def _render(scene: Scene, device: Device, precision: str, paths: tuple[Path, ...], shell: Shell) -> int:
+    """One slice; gives the number of its samples."""
+    from clfractal import job as jobs
+    from clfractal.render import engine
+
+    job = jobs.prepare(scene, device, precision=precision, on_start=shell.say)
+    film, discard = _film(job, paths[0].with_name(paths[0].name + PARTIAL))
+    try:
+        state = engine.render(scene, job.plan, device, film, on_compile=shell.say)
+        film.header["seconds"] = state.seconds
+        job.save(film, paths)
+    finally:
+        discard()
+    return state.rays
+
+
+def _film(job: Job, partial: Path) -> tuple[Film | JournalFilm, Callable[[], None]]:
+    """Where a slice's tiles go, and how to be rid of it."""
+    from clfractal.render.film import Film
+    from clfractal.render.store import JournalFilm
+
+    plan, image = job.plan, job.scene.image
+    size = (image.width, image.height)
+    if 4 * plan.region.pixels * len(plan.channels) <= _IN_MEMORY:
+        return Film(plan.channels, size, plan.region, job.header()), lambda: None
+    film = JournalFilm(partial, job.identity(), plan.channels, size, plan.region, job.header())
+    return film, film.discard
