@@ -296,6 +296,7 @@ class _Block:
             points[on_edge], slopes[on_edge] = self._on_edges(local[on_edge], axis[on_edge])
             if not on_edge.all():
                 points[~on_edge], slopes[~on_edge] = self._in_cells(local[~on_edge])
+        slopes[~np.isfinite(slopes)] = 0
         return points, slopes
 
     def _on_edges(self, local: Keys, axis: Keys) -> tuple[Doubles, Doubles]:
