@@ -135,6 +135,8 @@ class _Filler:
             recipes.append(programs.nodes_recipe(chain, self.lanes, self.precision))
         if not whole:
             recipes.append(programs.classify_recipe(source, sample))
+        if renderer.normals != "gradient":
+            recipes.append(programs.normals_recipe(chain, renderer, self.lanes, self.precision))
         built = programs.build_all(self.device, recipes, on_compile)
         kernels = {recipe.kernel: each for recipe, each in zip(recipes, built, strict=True)}
         start = time.perf_counter()
@@ -152,6 +154,8 @@ class _Filler:
             keep=kernels["store_bricks"],
             stats=self.stats,
             tell=self._tell,
+            refine=kernels.get("refine_normals"),
+            constants=self.constants,
         )
         stats = replace(
             grid.stats,

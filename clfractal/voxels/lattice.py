@@ -27,6 +27,8 @@ LATTICE = Struct(
         Field("padded", "int", 3, "coordinates along x, y and z, the last repeated to whole bricks"),
         Field("sub_points", "int", 0, "points along the side of a voxel"),
         Field("margin", "real", 3, "how far a voxel's points are from its middle, scene units"),
+        Field("middle_offset", "real", 3, "from a voxel's first sub-point to its middle, scene units"),
+        Field("side", "real", 0, "the least side of a voxel, scene units"),
         Field("step_scale", "real", 0, "part of a distance that is safe"),
     ],
 )
@@ -94,6 +96,8 @@ class Lattice:
             "padded": [BRICK * n for n in self.evaluated_bricks],
             "sub_points": sub_points,
             "margin": [reach * spacing for spacing in self.spacing],
+            "middle_offset": [reach * spacing for spacing in self.spacing],
+            "side": min(self.spacing),
             "step_scale": step_scale,
         }
         return LATTICE.value(precision, values)

@@ -24,6 +24,7 @@ from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
 Source = Literal["bits", "bricks", "slab"]
 
 FILL_KINDS = ("inside", "coverage", "iterations")
+NORMALS = ("gradient", "least_squares", "exact")
 SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
 C_TYPES: dict[Kind, str] = {"byte": "uchar", "float": "float"}
 # Work-items of a group that take a brick each, or a packet of nodes.
@@ -156,6 +157,24 @@ def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int) -> Recip
     }
     arguments = (*[_BUFFER] * 3, _INT, _INT, _INT, *[_BUFFER] * 3)
     return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, 1, BRICK_GROUP, arguments)
+
+
+def normals_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
+    """`refine_normals`: normals of samples at the surface by `least_squares` or `exact`."""
+    return Recipe(
+        "voxels_normals.cl",
+        "refine_normals",
+        {
+            **_formula_defines(chain, lanes, precision),
+            **{f"NORMALS_{name.upper()}": number for number, name in enumerate(NORMALS)},
+            "NORMALS": NORMALS.index(renderer.normals),
+        },
+        precision,
+        chain,
+        1,
+        (1, 1),
+        (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
+    )
 
 
 def _formula_defines(chain: Chain, lanes: int, precision: Precision) -> dict[str, object]:

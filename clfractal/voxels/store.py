@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -56,17 +56,20 @@ def store(
     keep: Built,
     stats: GridStats,
     tell: Callable[[str, int, int], None],
+    refine: Built | None = None,
+    constants: Sequence[cl.Buffer] = (),
 ) -> Grid:
     """The grid of evaluated bricks. Those outside as a whole are left out, those inside as a whole share a slot.
 
-    `classify` finds them; without it every brick is kept.
+    `classify` finds them; without it every brick is kept. `refine` replaces normals at the surface, with the formula's
+    `constants`.
 
     Raises:
         DeviceError: status 2 if what is kept does not fit.
     """
     extent = extent_buffer(device, lattice, evaluated.scale, evaluated.whole, evaluated.opaque)
     count = len(evaluated.places)
-    milliseconds = 0.0
+    milliseconds = refining = 0.0
     within = (evaluated.at < np.array(lattice.bricks)).all(axis=1)
     classes = np.full(count, MIXED, np.uint8)
     if classify is not None and count:
@@ -142,22 +145,38 @@ def store(
             doing="storing the grid",
             group=keep.group,
             first_part=1024,
-            done=partial(_tell_from, tell, low, len(mixed)),
+            done=partial(_tell_from, tell, "store", low, len(mixed)),
         )
+        if refine is not None:
+            with device.failures("finding normals"):
+                refine.kernel.set_args(
+                    normal_part, part, np.int32(0), np.int32(high - low), np.int32(slot), *constants
+                )
+            refining += run_in_parts(
+                device,
+                refine.kernel,
+                2,
+                high - low,
+                doing="finding normals",
+                group=refine.group,
+                first_part=16,
+                done=partial(_tell_from, tell, "normals", low, len(mixed)),
+            )
     stats = replace(
         stats,
         stored_bricks=len(mixed),
         solid_bricks=len(solid),
         pool_bytes=sum(buffer.size for buffer in (*values, *normals, table)),
         store_ms=milliseconds,
+        normals_ms=refining,
     )
     return Grid(
         lattice, kept, range, device, layout, entries, table, values, normals, solid_slot, stats=stats
     )
 
 
-def _tell_from(tell: Callable[[str, int, int], None], before: int, total: int, done: int) -> None:
-    tell("store", before + done, total)
+def _tell_from(tell: Callable[[str, int, int], None], stage: str, before: int, total: int, done: int) -> None:
+    tell(stage, before + done, total)
 
 
 def extent_buffer(

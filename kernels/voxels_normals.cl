@@ -1,0 +1,202 @@
+// Normals of the samples that a ray meets the surface between, from the formula itself. One work-item takes a brick.
+//
+// From the build: NORMALS_LEAST_SQUARES, NORMALS_EXACT and which of them NORMALS is.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "numbers/dual.h"
+#include "vectors.h"
+#include "structs.h"
+#include "formula.h"
+#include "orbit.h"
+#include "normals.h"
+#include "voxels.h"
+
+#define BRICK_SIDE 9
+#define BRICK_SAMPLES 729
+#define BRICK_STRIDE 736
+// How far from a sample the surface is looked for, to each side, and the tests that narrow it down: in sides of a voxel. A
+// cell's diagonal is 1.7 of them.
+#define SEARCH S(2.0)
+#define SEARCH_STEPS 4
+#define HALVINGS 8
+// Lines through a voxel along -G, and how far they are apart.
+#define LINES 9
+#define LINE_STEP S(0.4)
+
+// The samples of a brick that belong to a cell with samples inside and outside, in order; gives how many there are.
+INLINE int surface_samples(__global const uint *normals, ushort *list) {
+    uchar mixed[BRICK * BRICK * BRICK];
+    for (int cell = 0; cell < BRICK * BRICK * BRICK; ++cell) {
+        const int corner = (cell & 7) + BRICK_SIDE * ((cell >> 3) & 7) + BRICK_SIDE * BRICK_SIDE * (cell >> 6);
+        int sum = 0;
+        for (int i = 0; i < 8; ++i) {
+            const int at = corner + (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
+            sum += (int)(normals[at] >> 31);
+        }
+        mixed[cell] = sum != 0 && sum != 8;
+    }
+    int count = 0;
+    for (int sample = 0; sample < BRICK_SAMPLES; ++sample) {
+        const int x = sample % BRICK_SIDE, y = sample / BRICK_SIDE % BRICK_SIDE, z = sample / (BRICK_SIDE * BRICK_SIDE);
+        bool wanted = false;
+        for (int i = 0; i < 8; ++i) {
+            const int cell_x = x - (i & 1), cell_y = y - ((i >> 1) & 1), cell_z = z - (i >> 2);
+            const bool within = min(min(cell_x, cell_y), cell_z) >= 0 && max(max(cell_x, cell_y), cell_z) < BRICK;
+            wanted |= within && mixed[within ? cell_x + BRICK * (cell_y + BRICK * cell_z) : 0];
+        }
+        // Without a direction to look along there is nothing to find.
+        if (wanted && (normals[sample] & 0xffffff) != 0x808080) list[count++] = (ushort)sample;
+    }
+    return count;
+}
+
+// Lines of PACKETS packets, one a lane: through `from`, along `out`, which points out of the solid.
+typedef struct {
+    vec from[PACKETS], out[PACKETS];
+} lines;
+
+// The places along lines, in scene units from their middles, where they go from inside to outside: the outer end of a
+// bracket that is narrowed down. Not found: none, or not within reach.
+INLINE void find_surface(const lines *l, real side, real *place, mask *found, __constant const struct Orbit *orbit,
+                         __constant const scalar *k) {
+    real inner[PACKETS], outer[PACKETS];
+    mask before[PACKETS], here[PACKETS];
+    vec points[PACKETS];
+    const real step = side * R(2.0) * (real)(SEARCH) / (real)((scalar)SEARCH_STEPS);
+    for (int p = 0; p < PACKETS; ++p) {
+        found[p] = less(R(1.0), R(0.0));
+        before[p] = found[p];
+        inner[p] = outer[p] = R(0.0);
+    }
+    // Of several places the nearest to the middle.
+    for (int i = 0; i <= SEARCH_STEPS; ++i) {
+        const real at = (real)((scalar)i) * step - side * (real)(SEARCH);
+        for (int p = 0; p < PACKETS; ++p) points[p] = vec_along(l->from[p], at, l->out[p]);
+        solid_inside(points, here, orbit, k);
+        for (int p = 0; p < PACKETS; ++p) {
+            const mask crossed = before[p] & ~here[p];
+            const real middle = at - R(0.5) * step;
+            const mask nearer = crossed & (~found[p] | less(fabs(middle), fabs(R(0.5) * (inner[p] + outer[p]))));
+            inner[p] = pick(nearer, at - step, inner[p]);
+            outer[p] = pick(nearer, at, outer[p]);
+            found[p] |= crossed;
+            before[p] = here[p];
+        }
+    }
+    for (int i = 0; i < HALVINGS; ++i) {
+        for (int p = 0; p < PACKETS; ++p) {
+            points[p] = vec_along(l->from[p], R(0.5) * (inner[p] + outer[p]), l->out[p]);
+        }
+        solid_inside(points, here, orbit, k);
+        for (int p = 0; p < PACKETS; ++p) {
+            const real middle = R(0.5) * (inner[p] + outer[p]);
+            inner[p] = pick(here[p], middle, inner[p]);
+            outer[p] = pick(here[p], outer[p], middle);
+        }
+    }
+    for (int p = 0; p < PACKETS; ++p) place[p] = outer[p];
+}
+
+#if NORMALS == NORMALS_EXACT
+// From the Jacobian just outside the surface.
+INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, __constant const struct Orbit *orbit,
+                            __constant const scalar *k) {
+    real place[PACKETS];
+    find_surface(l, side, place, usable, orbit, k);
+    for (int p = 0; p < PACKETS; ++p) {
+        surface_point surface;
+        orbit_dual_distance(vec_along(l->from[p], place[p], l->out[p]), usable[p], orbit, k, &surface);
+        normal[p] = vec_normalize(surface.gradient);
+        usable[p] &= less(R(0.5), vec_dot(normal[p], normal[p]));
+    }
+}
+#else
+// Eq. 7-10: the plane through points of the surface on lines along -G, in a frame with that as its third axis, so that steep
+// faces work.
+INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, __constant const struct Orbit *orbit,
+                            __constant const scalar *k) {
+    vec across[PACKETS], up[PACKETS];
+    plane_sums sums[PACKETS];
+    lines line = *l;
+    for (int p = 0; p < PACKETS; ++p) {
+        const vec n = l->out[p];
+        const mask steep = less(fabs(n.x), R(0.6));
+        const vec aside = vec_pick(steep, vec_of(R(1.0), R(0.0), R(0.0)), vec_of(R(0.0), R(1.0), R(0.0)));
+        across[p] = vec_normalize(vec_cross(aside, n));
+        up[p] = vec_cross(n, across[p]);
+        sums[p] = plane_none();
+    }
+    #pragma unroll 1
+    for (int i = 0; i < LINES; ++i) {
+        const real x = side * (real)(LINE_STEP) * (real)((scalar)(i % 3 - 1));
+        const real y = side * (real)(LINE_STEP) * (real)((scalar)(i / 3 - 1));
+        real place[PACKETS];
+        mask found[PACKETS];
+        for (int p = 0; p < PACKETS; ++p) line.from[p] = vec_along(vec_along(l->from[p], x, across[p]), y, up[p]);
+        find_surface(&line, side, place, found, orbit, k);
+        for (int p = 0; p < PACKETS; ++p) sums[p] = plane_add(sums[p], found[p], vec_of(x, y, place[p]));
+    }
+    for (int p = 0; p < PACKETS; ++p) {
+        real residual;
+        const vec plane = plane_normal(sums[p], &residual, &usable[p]);
+        normal[p] = vec_along(vec_along(vec_scale(l->out[p], plane.z), plane.x, across[p]), plane.y, up[p]);
+    }
+}
+#endif
+
+// Normals of the bricks from `first` on, in slots from `slot` on: those by differences are where the search begins, and stay
+// where it finds nothing.
+__kernel void refine_normals(__global uint *normals, __global const ulong *bricks, int first, int count, int slot,
+                             __global const scalar *axes, __constant const struct Lattice *lattice,
+                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const int brick = first + (int)get_global_id(1);
+    if (brick >= count) return;
+    __global uint *normal = normals + (size_t)(slot + brick) * BRICK_STRIDE;
+    __global const scalar *along_y = axes + lattice->sub_points * lattice->padded[0];
+    __global const scalar *along_z = along_y + lattice->sub_points * lattice->padded[1];
+    const ulong place = bricks[brick];
+    const real side = (real)(lattice->side);
+    ushort list[BRICK_SAMPLES];
+    const int wanted = surface_samples(normal, list);
+    for (int start_at = 0; start_at < wanted; start_at += LANES * PACKETS) {
+        lines l;
+        for (int p = 0; p < PACKETS; ++p) {
+            scalar x[LANES], y[LANES], z[LANES], nx[LANES], ny[LANES], nz[LANES];
+            for (int lane = 0; lane < LANES; ++lane) {
+                // The last lanes repeat the last sample.
+                const int sample = list[min(start_at + p * LANES + lane, wanted - 1)];
+                const uint color = normal[sample];
+                const int voxel_x = BRICK * PLACE_X(place) + sample % BRICK_SIDE;
+                const int voxel_y = BRICK * PLACE_Y(place) + sample / BRICK_SIDE % BRICK_SIDE;
+                const int voxel_z = BRICK * PLACE_Z(place) + sample / (BRICK_SIDE * BRICK_SIDE);
+                x[lane] = lattice->middle_offset[0] + axes[min(voxel_x, lattice->last[0])];
+                y[lane] = lattice->middle_offset[1] + along_y[min(voxel_y, lattice->last[1])];
+                z[lane] = lattice->middle_offset[2] + along_z[min(voxel_z, lattice->last[2])];
+                nx[lane] = (scalar)(color & 255) - S(127.5);
+                ny[lane] = (scalar)((color >> 8) & 255) - S(127.5);
+                nz[lane] = (scalar)((color >> 16) & 255) - S(127.5);
+            }
+            l.from[p] = vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
+            l.out[p] = vec_normalize(vec_of(lanes_load(nx), lanes_load(ny), lanes_load(nz)));
+        }
+        vec found[PACKETS];
+        mask usable[PACKETS];
+        surface_normals(&l, side, found, usable, orbit, k);
+        for (int p = 0; p < PACKETS; ++p) {
+            scalar nx[LANES], ny[LANES], nz[LANES], good[LANES];
+            lanes_store(found[p].x, nx);
+            lanes_store(found[p].y, ny);
+            lanes_store(found[p].z, nz);
+            lanes_store(pick(usable[p], R(1.0), R(0.0)), good);
+            for (int lane = 0; lane < LANES; ++lane) {
+                const int at = start_at + p * LANES + lane;
+                if (at >= wanted || good[lane] == 0) continue;
+                const uint red = convert_uchar_sat((float)nx[lane] * 127.5f + 128.0f);
+                const uint green = convert_uchar_sat((float)ny[lane] * 127.5f + 128.0f);
+                const uint blue = convert_uchar_sat((float)nz[lane] * 127.5f + 128.0f);
+                const int sample = list[at];
+                normal[sample] = red | green << 8 | blue << 16 | (normal[sample] & 0xff000000u);
+            }
+        }
+    }
+}

@@ -1,0 +1,78 @@
+"""Scenes with a volume, and their grids as NumPy computes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.select import Device, choose
+from clfractal.device.structs import Precision
+from clfractal.device.tune import best_lanes
+from clfractal.formulas import reference
+from clfractal.formulas.chain import Chain
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.fill import fill_grid
+from clfractal.voxels.grid import Grid
+from clfractal.voxels.lattice import Lattice
+
+Floats = npt.NDArray[np.float64]
+
+CAMERA = {"position": [0, -4, 0], "target": [0, 0, 0], "fov": 45}
+
+
+@lru_cache
+def device() -> Device:
+    return choose()
+
+
+def volume_scene(formula: str | Mapping[str, Any], iterations: int, **renderer: Any) -> Scene:
+    """A scene of a formula by name or inline, with a volume renderer."""
+    section: dict[str, Any] = {"name": formula} if isinstance(formula, str) else {"inline": dict(formula)}
+    section["iterations"] = iterations
+    return load_scene(
+        {
+            "version": 1,
+            "formula": section,
+            "camera": CAMERA,
+            "renderer": {"type": "volume", **renderer},
+        }
+    )
+
+
+def filled(
+    scene: Scene, *, lanes: int | None = None, precision: Precision = "float32", **options: Any
+) -> Grid:
+    """The scene's grid."""
+    assert isinstance(scene.renderer, VolumeRenderer)
+    used = lanes if lanes is not None else best_lanes(device(), precision)
+    return fill_grid(scene, scene.renderer, device(), lanes=used, precision=precision, **options)
+
+
+def voxel_points(lattice: Lattice, offset: tuple[float, float, float] = (0.5, 0.5, 0.5)) -> Floats:
+    """Points of voxels, shape (nz, ny, nx, 3), written down from the definition."""
+    nx, ny, nz = lattice.shape
+    z, y, x = np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")
+    index = np.stack([x, y, z], axis=-1)
+    return np.array(lattice.corner) + (index + np.array(offset)) * np.array(lattice.spacing)
+
+
+def inside(chain: Chain, points: Floats, iterations: int) -> npt.NDArray[np.bool_]:
+    """Which points of shape (..., 3) belong to the solid."""
+    flat = points.reshape(-1, 3)
+    found = reference.escape(chain, flat, iterations)[1]
+    if chain.links[-1].bound.formula.shape is not None:
+        found &= reference.distance(chain, flat, iterations)[0] == 0
+    result: npt.NDArray[np.bool_] = found.reshape(points.shape[:-1])
+    return result
+
+
+def decoded(normals: npt.NDArray[np.uint8]) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Normals of bytes of shape (..., 4), and where there is one."""
+    vectors = normals[..., :3] / 127.5 - 1
+    return vectors, (normals[..., :3] != 128).any(axis=-1)
