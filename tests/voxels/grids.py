@@ -59,7 +59,8 @@ def voxel_points(lattice: Lattice, offset: tuple[float, float, float] = (0.5, 0.
     nx, ny, nz = lattice.shape
     z, y, x = np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")
     index = np.stack([x, y, z], axis=-1)
-    return np.array(lattice.corner) + (index + np.array(offset)) * np.array(lattice.spacing)
+    points: Floats = np.array(lattice.corner) + (index + np.array(offset)) * np.array(lattice.spacing)
+    return points
 
 
 def inside(chain: Chain, points: Floats, iterations: int) -> npt.NDArray[np.bool_]:

@@ -25,14 +25,14 @@ def test_voxels_of_a_cube() -> None:
 
 
 def test_cubic_voxels_cover_the_shorter_sides() -> None:
-    lattice = lattice_of(Box(size=(4.0, 1.1, 0.001)), 40)
+    lattice = lattice_of(Box(center=(0.0, 0.0, 0.0), size=(4.0, 1.1, 0.001)), 40)
     assert lattice.spacing == (0.1, 0.1, 0.1)
     assert lattice.shape == (40, 11, 2)  # 1.1 / 0.1 is above 11 in rounding alone
     np.testing.assert_allclose(np.array(lattice.corner), [-2, -0.55, -0.1])
 
 
 def test_three_resolutions_stretch_voxels() -> None:
-    lattice = lattice_of(Box(size=(4.0, 2.0, 1.0)), (8, 2, 5))
+    lattice = lattice_of(Box(center=(0.0, 0.0, 0.0), size=(4.0, 2.0, 1.0)), (8, 2, 5))
     assert lattice.shape == (8, 2, 5)
     assert lattice.spacing == (0.5, 1.0, 0.2)
 
