@@ -68,8 +68,8 @@ INLINE real leave(grid_ray r, cell c, ints level) {
 }
 
 // The number of the first place at or past `t`, but at least the next.
-INLINE real next_place(real t, real near, real step, real number) {
-    return fmax(ceil((t - near) / step), number + R(1.0));
+INLINE real next_place(real t, real near, real steps, real number) {
+    return fmax(ceil((t - near) * steps), number + R(1.0));
 }
 
 // What a value looks like: the opacity of a step, and a colour.
@@ -95,7 +95,7 @@ INLINE real light_through(vec point, vec normal, vec toward, real distance, mask
     r.far = distance;
     grid_ray g;
     active &= enter(r, about, &g);
-    const real step = (real)(w.settings->step);
+    const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
     real number = R(0.0), through = R(1.0);
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;
@@ -107,7 +107,7 @@ INLINE real light_through(vec point, vec normal, vec toward, real distance, mask
         *steps += pick(active, R(1.0), R(0.0));
         real onward = number + R(1.0);
         if (any_lane(active & ~stored)) {
-            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, step, number));
+            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, steps_per_unit, number));
         }
         if (any_lane(stored)) {
             const real value = grid_value(c, entry, stored, w.grid);
@@ -158,7 +158,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     const vec to_viewer = vec_scale(r.direction, R(-1.0));
     grid_ray g;
     mask active = wanted & enter(r, about, &g);
-    const real step = (real)(w.settings->step);
+    const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
     const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
     color seen = color_of(R(0.0), R(0.0), R(0.0));
     real through = R(1.0), number = R(0.0), seen_t = R(0.0), seen_value = R(0.0), looked = R(0.0);
@@ -175,7 +175,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
         real onward = number + R(1.0);
         real value = R(0.0);
         if (any_lane(active & ~stored)) {
-            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, step, number));
+            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, steps_per_unit, number));
         }
         if (any_lane(stored)) {
             value = grid_value(c, entry, stored, w.grid);
@@ -261,7 +261,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     s.point = vec_along(r.origin, seen_t, r.direction);
     s.depth = vec_dot(vec_sub(s.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
     s.normal = seen_normal;
-    s.smooth = seen_value * (real)(w.settings->value_scale);
+    s.smooth = seen_value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset);
     s.steps = looked;
     *steps += looked;
     return s;

@@ -44,7 +44,8 @@ VOLUME = Struct(
         Field("level", "real", 0, "value of the surface, as it is kept"),
         Field("low", "real", 0, "first value of the transfer table, as it is kept"),
         Field("range", "real", 0, "one over the width of its values"),
-        Field("value_scale", "real", 0, "a kept value's worth"),
+        Field("value_scale", "real", 0, "a kept value's worth ..."),
+        Field("value_offset", "real", 0, "... and what the kept value 0 stands for"),
         Field("opacity_limit", "real", 0, "a ray ends once it is that opaque"),
         Field("shadow_lift", "real", 0, "where shadow rays start above the surface, scene units"),
         Field("max_steps", "int", 0, "most places of a ray"),
@@ -79,7 +80,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
         "TRANSFER_SIZE": TRANSFER_SIZE,
         "SURFACE": int(settings.transfer.opacity is None),
-        "VALUE_IS_FLOAT": int(grid.is_float),
+        "VALUE_IS_FLOAT": int(grid.kind == "float"),
         "NEAREST": int(settings.interpolation == "nearest"),
         "POOLS": len(grid.values),
         "HAS_SHADOWS": int(settings.shadows and any(light.shadow for light in scene.lights)),
@@ -141,7 +142,7 @@ def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
         "scale": np.array(grid.shape) / size,
         "sides": grid.shape,
         "bricks": grid.bricks,
-        "pool_bricks": grid.pool_bricks,
+        "pool_bricks": grid.layout.part_slots,
     }
     return GRID.value("float32", values)
 
@@ -152,14 +153,16 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
     voxel = float(min(grid.spacing)) * _zoom(scene)
     step = settings.step * voxel
     longest = float(np.linalg.norm(np.array(grid.spacing) * np.array(grid.shape))) * _zoom(scene)
-    low, high = value_range(scene, grid)
+    per_sample = (grid.range[1] - grid.range[0]) / full_sample(grid)
+    low, high = ((value - grid.range[0]) / per_sample for value in value_range(scene, grid))
     width = settings.filter_width
     values = {
         "step": step,
         "level": (low + high) / 2,
         "low": low,
         "range": 1 / (high - low),
-        "value_scale": grid.value_scale,
+        "value_scale": per_sample,
+        "value_offset": grid.range[0],
         "opacity_limit": settings.opacity_limit,
         "shadow_lift": SHADOW_LIFT * voxel,
         "max_steps": int(np.ceil(longest / step)) + 2,
@@ -174,14 +177,16 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
     return VOLUME.value("float32", values)
 
 
+def full_sample(grid: Grid) -> float:
+    """The sample that stands for `grid.range[1]`."""
+    return 255.0 if grid.kind == "byte" else 1.0
+
+
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
-    """The values between which the transfer table lies, as they are kept."""
+    """The values between which the transfer table lies: those of its stops, or of the grid."""
     transfer = settings_of(scene).transfer
-    stops = [stop.at for stop in (*(transfer.opacity or ()), *(transfer.color or ()))]
-    if not stops:
-        return grid.low, grid.high
-    kept = [at / grid.value_scale for at in stops]
-    low, high = min(kept), max(kept)
+    stops = [stop.at for stop in (*(transfer.opacity or ()), *(transfer.color or ()))] or list(grid.range)
+    low, high = min(stops), max(stops)
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
@@ -190,7 +195,7 @@ def transfer_table(scene: Scene, grid: Grid) -> Floats:
     settings = settings_of(scene)
     transfer = settings.transfer
     low, high = value_range(scene, grid)
-    values = np.linspace(low, high, TRANSFER_SIZE) * grid.value_scale
+    values = np.linspace(low, high, TRANSFER_SIZE)
     table = np.empty((TRANSFER_SIZE, 4))
     if transfer.opacity is None:
         table[:, 0] = 1.0

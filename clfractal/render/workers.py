@@ -8,10 +8,15 @@ from clfractal.device.select import Device
 from clfractal.render.cut_plane import CutPlaneWorker
 from clfractal.render.plan import Plan
 from clfractal.render.surface import SurfaceWorker
+from clfractal.render.volume import VolumeWorker
 from clfractal.render.worker import TileWorker
 from clfractal.scene.model import Scene
 
-WORKERS: dict[str, type[TileWorker]] = {"surface": SurfaceWorker, "cut_plane": CutPlaneWorker}
+WORKERS: dict[str, type[TileWorker]] = {
+    "surface": SurfaceWorker,
+    "cut_plane": CutPlaneWorker,
+    "volume": VolumeWorker,
+}
 
 
 def make_worker(
