@@ -34,6 +34,17 @@ DeviceOption = Annotated[
     str | None,
     typer.Option("--device", help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]"),
 ]
+Resolution = Annotated[
+    str | None,
+    typer.Option(
+        "--resolution",
+        metavar="N",
+        help="Voxels along the longest side; or NX,NY,NZ.  [default: the scene's, 512]",
+    ),
+]
+Precision = Annotated[
+    str | None, typer.Option("--precision", help="auto, float32 or float64.  [default: the scene's, auto]")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Show excerpts, causes and drivers' messages.")
@@ -189,6 +200,58 @@ def slices(
     stack = Stack(count, spacing, start)
     shell = _shell(context, quiet=quiet, verbose=verbose)
     return lambda: render_slices(order, stack, shell)
+
+
+@app.command()
+def voxelize(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[Path, typer.Option("-o", "--output", help="An .nrrd or .npy file.")],
+    resolution: Resolution = None,
+    device: DeviceOption = None,
+    precision: Precision = None,
+    overrides: Overrides = None,
+    compress: Annotated[bool, typer.Option("--gzip", help="Compress; NRRD only.")] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Fill a scene's grid of voxels and write it to a file."""
+    from clfractal.commands.voxelize import Order
+    from clfractal.commands.voxelize import voxelize as work
+
+    order = Order(scene, output, resolution, device, precision, tuple(overrides or ()))
+    shell = _shell(context, quiet=quiet, verbose=verbose)
+    return lambda: work(order, shell, compress=compress)
+
+
+@app.command()
+def mesh(
+    context: typer.Context,
+    source: Annotated[
+        str, typer.Argument(metavar="SOURCE", help="A scene, or a volume: an .nrrd, .nhdr or .npy file.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A .ply, .stl, .obj or .glb file.")],
+    resolution: Resolution = None,
+    level: Annotated[
+        float | None,
+        typer.Option("--level", help="Value at the surface.  [default: half way between the ends]"),
+    ] = None,
+    close: Annotated[
+        bool, typer.Option("--close/--no-close", help="Close the surface where the box cuts it.")
+    ] = True,
+    device: DeviceOption = None,
+    precision: Precision = None,
+    overrides: Overrides = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Write the surface in a scene's grid, or in a volume file, as triangles."""
+    from clfractal.commands.mesh import make_mesh
+    from clfractal.commands.voxelize import Order
+
+    order = Order(source, output, resolution, device, precision, tuple(overrides or ()))
+    shell = _shell(context, quiet=quiet, verbose=verbose)
+    return lambda: make_mesh(order, shell, level=level, close=close)
 
 
 @app.command()

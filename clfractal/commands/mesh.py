@@ -1,0 +1,196 @@
+"""`clfractal mesh`: the surface in a scene's grid, or in a volume file, as triangles in a file."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clfractal.commands.voxelize import Order, Teller, fill, grid_volume, volume_scene
+from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.files import memory
+from clfractal.files.atomic import check_output
+from clfractal.files.mesh import EXTENSIONS, SINGLE_PRECISION, TOO_FINE, Mesh, is_too_fine, write_mesh
+from clfractal.files.nrrd import MAGIC
+from clfractal.files.regular import read_bytes
+from clfractal.files.volume import SCENE_KEY, Volume, read_volume
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.shell import Shell
+
+if TYPE_CHECKING:
+    from clfractal.job import Job
+
+_NPY = b"\x93NUMPY"
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """A grid to take the surface of, and what made it: None for volumes of others."""
+
+    volume: Volume
+    level: float
+    job: Job | None
+    is_file: bool
+
+
+def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: bool = True) -> None:
+    """Extracts the surface of a scene's grid or of a volume file, and writes it.
+
+    Raises:
+        ClfractalError: anything wrong with the input, the files or the device; an earlier file stays as it was.
+    """
+    start = time.perf_counter()
+    shell.mute_drivers()
+    check_output(order.output, EXTENSIONS)
+    _check_library()
+    if level is not None and not math.isfinite(level):
+        raise SceneError(f"must be a number, got {level}", Where("--level"))
+    shell.state = lambda: f"{order.output}: interrupted, nothing was written"
+    read = read_bytes(Path(order.source), prefix=8)
+    is_volume = read.startswith((MAGIC, _NPY))
+    found = _of_file(order, level, shell) if is_volume else _of_scene(order, level, shell)
+    _check_fine(order, found.volume)
+    from clfractal.voxels.mesh import extract
+
+    tell = Teller(shell)
+    volume = found.volume
+    mesh = extract(
+        volume.values,
+        found.level,
+        origin=volume.origin,
+        directions=volume.directions,
+        close=close,
+        progress=tell.of("triangles"),
+    )
+    if not len(mesh.triangles):
+        raise _nothing(order, found, close)
+    if found.job is not None:
+        mesh = _dressed(mesh, found.job, volume, tell, shell)
+    write_mesh(order.output, mesh, text=volume.texts.get(SCENE_KEY, ""))
+    shell.state = lambda: "clfractal: interrupted"
+    size = memory.shown(order.output.stat().st_size)
+    shell.say(
+        f"{order.output}: {len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles, {size},"
+        f" {time.perf_counter() - start:.2f} s"
+    )
+
+
+def _check_library() -> None:
+    if importlib.util.find_spec("skimage") is None:
+        raise FileError("needs scikit-image: pip install 'clfractal[mesh]'", Where("clfractal mesh"))
+
+
+def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
+    """The scene's grid, filled; a level is in the value's own numbers, and in the middle if not given."""
+    scene = volume_scene(order)
+    grid, job = fill(order, scene, shell)
+    low, high = grid.range
+    wanted = (low + high) / 2 if level is None else level
+    share = (wanted - low) / (high - low)
+    if not 0 < share <= 1:
+        raise SceneError(f"must be above {low:g} and at most {high:g}, got {wanted:g}", Where("--level"))
+    volume = grid_volume(grid, job)
+    return _Found(volume, 255 * share if grid.kind == "byte" else share, job, False)
+
+
+def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
+    """A volume of a file; a level is in the file's numbers, half way from the least to the largest if not given."""
+    for option, value in (("--set", order.overrides), ("--resolution", order.resolution)):
+        if value:
+            raise SceneError("is for scenes; the source is a volume", Where(option))
+    from clfractal.voxels.mesh import value_range
+
+    volume = read_volume(order.source)
+    if level is None:
+        low, high = value_range(volume.values)
+        if low == high:
+            raise SceneError(f"has no surface: all its values are {low:g}", Where(order.source))
+        level = (low + high) / 2
+    z, y, x = volume.values.shape
+    shell.say(
+        f"{order.source}: {x} x {y} x {z} voxels, {memory.shown(volume.values.nbytes)}, level {level:g}"
+    )
+    return _Found(volume, level, _job_of(order, volume, shell), True)
+
+
+def _job_of(order: Order, volume: Volume, shell: Shell) -> Job | None:
+    """The scene that made a volume, if it says so: it knows normals and colours."""
+    text = volume.texts.get(SCENE_KEY)
+    if not text or "\n" not in text:
+        return None
+    from clfractal import job as jobs
+    from clfractal.device.select import choose
+
+    try:
+        overrides = [f"renderer.precision={order.precision}"] if order.precision else []
+        scene = load_scene(text, overrides=overrides, folder=Path(order.source).parent)
+    except ClfractalError as error:
+        shell.say(f"{order.source}: its scene is of no use, normals are those of the values: {error}")
+        return None
+    if not isinstance(scene.renderer, VolumeRenderer) or not _is_along_axes(volume):
+        return None
+    return jobs.prepare(scene, choose(order.device), on_start=shell.say)
+
+
+def _is_along_axes(volume: Volume) -> bool:
+    return bool(np.array_equal(volume.directions, np.diag(np.diag(volume.directions))))
+
+
+def _check_fine(order: Order, volume: Volume) -> None:
+    """Before the work, not after it."""
+    shape = np.array(volume.values.shape[::-1])
+    reach = float(np.abs([volume.origin, volume.origin + (shape - 1) @ volume.directions]).max())
+    if order.output.suffix.lower() in SINGLE_PRECISION and is_too_fine(float(volume.spacing.min()), reach):
+        raise FileError(f"cannot be written: {TOO_FINE}", Where(str(order.output)))
+
+
+def _nothing(order: Order, found: _Found, close: bool) -> ClfractalError:
+    """Why there is no triangle."""
+    z, y, x = found.volume.values.shape
+    if not close and bool((np.asarray(found.volume.values[0, 0, 0]) >= found.level).all()):
+        return SceneError(
+            "the whole box is inside; its faces are the surface without --no-close", Where(order.source)
+        )
+    if found.is_file:
+        from clfractal.voxels.mesh import value_range
+
+        low, high = value_range(found.volume.values)
+        text = f"has no surface at the level {found.level:g}: its values are from {low:g} to {high:g}"
+        return SceneError(text, Where(order.source))
+    size = " x ".join(f"{side:.4g}" for side in found.volume.spacing * (x, y, z))
+    middle = found.volume.origin + (np.array((x, y, z)) - 1) / 2 @ found.volume.directions
+    place = ", ".join(f"{number:.6g}" for number in middle)
+    return SceneError(
+        f"nothing of the set lies in the box of {size} around [{place}], at {x} x {y} x {z} voxels",
+        Where(order.source),
+    )
+
+
+def _dressed(mesh: Mesh, job: Job, volume: Volume, tell: Teller, shell: Shell) -> Mesh:
+    """With the formula's normals and the scene's colours."""
+    from clfractal.render.vertices import COLORED_BY, dress, on_faces
+
+    scene: Scene = job.scene
+    if scene.coloring.by not in COLORED_BY:
+        shell.say(
+            f"coloring.by: {scene.coloring.by} is not known of vertices; they get the material's colour"
+        )
+    spacing = np.diag(volume.directions)
+    z, y, x = volume.values.shape
+    return dress(
+        mesh,
+        scene,
+        job.device,
+        lanes=job.plan.lanes,
+        precision=job.plan.precision,
+        voxel=float(volume.spacing.min()),
+        flat=on_faces(mesh.vertices, volume.origin - spacing / 2, spacing, (x, y, z)),
+        progress=tell.of("normals"),
+    )

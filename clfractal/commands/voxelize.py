@@ -1,0 +1,183 @@
+"""`clfractal voxelize`: a scene's formula as a grid of voxels in a file."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from clfractal.commands.progress import LINE_EVERY_SECONDS
+from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.files import memory
+from clfractal.files.atomic import check_output
+from clfractal.files.volume import BESIDE, EXTENSIONS, SCENE_KEY, Volume, write_volume
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.shell import Shell
+
+if TYPE_CHECKING:
+    from clfractal.job import Job
+    from clfractal.voxels.grid import Grid
+
+_AS_VOLUME = "renderer={type: volume}"
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """The options of `clfractal voxelize` and `clfractal mesh`, as they were given."""
+
+    source: str
+    output: Path
+    resolution: str | None = None
+    device: str | None = None
+    precision: str | None = None
+    overrides: tuple[str, ...] = ()
+
+
+class Teller:
+    """Says now and then how far a stage is."""
+
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self._next = time.monotonic() + LINE_EVERY_SECONDS
+
+    def __call__(self, stage: str, part: float) -> None:
+        now = time.monotonic()
+        if now >= self._next and part < 1:
+            self._next = now + LINE_EVERY_SECONDS
+            self._shell.say(f"{stage}: {part:4.0%}")
+
+    def of(self, stage: str) -> Callable[[float], None]:
+        """For work that tells of its part only."""
+        return lambda part: self(stage, part)
+
+
+def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
+    """Fills the grid of a scene and writes it.
+
+    Raises:
+        ClfractalError: anything wrong with the input, the files or the device; an earlier file stays as it was.
+    """
+    start = time.perf_counter()
+    shell.mute_drivers()
+    check_output(order.output, EXTENSIONS)
+    if order.output.suffix.lower() == ".npy":
+        if compress:
+            raise FileError("is not compressed: NPY has no way for it; .nrrd has", Where(str(order.output)))
+        check_output(f"{order.output}{BESIDE}", (BESIDE,))
+    scene = volume_scene(order)
+    shell.state = lambda: f"{order.output}: interrupted, nothing was written"
+    grid, job = fill(order, scene, shell)
+    volume = grid_volume(grid, job)
+    write_volume(order.output, volume, compress=compress)
+    shell.state = lambda: "clfractal: interrupted"
+    size = memory.shown(order.output.stat().st_size)
+    shell.say(f"{order.output}: {sides(grid)} voxels, {size}, {time.perf_counter() - start:.2f} s")
+
+
+def volume_scene(order: Order) -> Scene:
+    """The scene with the options folded in; its renderer is the volume renderer, with defaults if it was another.
+
+    Raises:
+        ClfractalError: errors name the option that was given.
+    """
+    given: dict[str, tuple[str, str]] = {}  # key -> option, value
+    if order.resolution is not None:
+        given["renderer.resolution"] = ("--resolution", _resolution(order.resolution))
+    if order.precision is not None:
+        given["renderer.precision"] = ("--precision", json.dumps(order.precision))
+    before = [] if isinstance(load_scene(Path(order.source)).renderer, VolumeRenderer) else [_AS_VOLUME]
+    overrides = [*before, *order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
+    try:
+        scene = load_scene(Path(order.source), overrides=overrides)
+    except ClfractalError as error:
+        key = (error.where.file or "").removeprefix("--set ")
+        if key not in given:
+            raise
+        raise type(error)(error.message, replace(error.where, file=given[key][0])) from error
+    if not isinstance(scene.renderer, VolumeRenderer):
+        where = Where(order.source, path="renderer.type")
+        raise SceneError(f"must be volume here, got {scene.renderer.type}", where)
+    if scene.renderer.file is not None:
+        where = Where(order.source, path="renderer.file")
+        raise SceneError("the scene shows a grid that is in a file already", where)
+    return scene
+
+
+def _resolution(text: str) -> str:
+    """As a value of the scene: voxels along the longest side, or along x, y and z."""
+    if not re.fullmatch(r"-?\d{1,9}(,-?\d{1,9}){0,2}", text, re.ASCII) or text.count(",") == 1:
+        raise SceneError(f"must be N or NX,NY,NZ, such as 256; got {text[:60]!r}", Where("--resolution"))
+    return f"[{text}]" if "," in text else text
+
+
+def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
+    """The scene's grid on a device; the need of memory is told first.
+
+    Raises:
+        ClfractalError: it does not fit; the device failed.
+    """
+    assert isinstance(scene.renderer, VolumeRenderer)
+    # Imported only now: a mistake in the input is told without waiting for OpenCL.
+    from clfractal import job as jobs
+    from clfractal.device.select import choose
+    from clfractal.scene.checks import used_boxes
+    from clfractal.voxels.fill import FillProgress, fill_grid
+    from clfractal.voxels.lattice import lattice_of
+
+    settings = scene.renderer
+    lattice = lattice_of(used_boxes(scene, settings)[1], settings.resolution)
+    x, y, z = lattice.shape
+    need = x * y * z * (1 if settings.store == "byte" else 4)
+    have = memory.available()
+    told = f"{x} x {y} x {z} voxels need {memory.shown(need)} of memory"
+    if need > have:
+        where = Where("--resolution") if order.resolution else Where(order.source, path="renderer.resolution")
+        raise SceneError(f"{told}, {memory.shown(have)} are left", where)
+    shell.say(f"{order.source}: {told}, {memory.shown(have)} are left")
+    job = jobs.prepare(scene, choose(order.device), on_start=shell.say)
+    if job.remark:
+        shell.say(f"{order.source}: {job.remark}")
+    tell = Teller(shell)
+
+    def progress(state: FillProgress) -> None:
+        tell(f"voxels, {state.stage}", state.done / max(state.total, 1))
+
+    grid = fill_grid(
+        scene,
+        settings,
+        job.device,
+        lanes=job.plan.lanes,
+        precision=job.plan.precision,
+        on_compile=shell.say,
+        progress=progress,
+    )
+    return grid, job
+
+
+def grid_volume(grid: Grid, job: Job) -> Volume:
+    """The grid's values as they are stored, with where they are and the scene that made them."""
+    from clfractal.files.document import write_document
+
+    settings = job.scene.renderer
+    assert isinstance(settings, VolumeRenderer)
+    corner, spacing = np.array(grid.corner), np.array(grid.spacing)
+    texts = {
+        SCENE_KEY: write_document(job.resolved()),
+        "value": settings.value,
+        # What the stored numbers 0 and 255 (bytes) or 0 and 1 (floats) stand for.
+        "range": f"{grid.range[0]:g} {grid.range[1]:g}",
+    }
+    return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts)
+
+
+def sides(grid: Grid) -> str:
+    """The grid's size in words."""
+    return " x ".join(map(str, grid.shape))

@@ -1,0 +1,112 @@
+"""What a formula knows of a mesh's vertices: their normals, exactly, and their colours."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.files.mesh import Mesh
+from clfractal.render.points import distances
+from clfractal.scene.coloring import Coloring
+from clfractal.scene.model import Scene
+from clfractal.scene.palette import SIZE, palette_table
+
+Doubles = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+AT_ONCE = 1 << 20
+# A vertex lies between a voxel inside and one outside, and inside a set the distance has no slope: such vertices are
+# looked at from further out, voxels along the normal of the grid.
+PUSHES = (0.0, 0.5, 1.0, 2.0)
+COLORED_BY = ("solid", "normal", "iterations")
+"""Ways of coloring that vertices can have; the others need a ray, or are too costly here."""
+
+
+def dress(
+    mesh: Mesh,
+    scene: Scene,
+    device: Device,
+    *,
+    lanes: int,
+    precision: Precision,
+    voxel: float,
+    flat: Flags | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Mesh:
+    """The mesh with normals from the formula's Jacobian, and the colours of the scene.
+
+    A normal stays as it is where the formula has none nearby, or one on the other side: the detail there is finer than
+    the grid. Colours are the material's where `coloring.by` is none of COLORED_BY.
+
+    Args:
+        voxel: the side of a voxel, scene units.
+        flat: (n,), vertices that keep their normal: those of faces that the box cuts.
+        progress: told the part that is done, 0 to 1.
+
+    Raises:
+        DeviceError, KernelBuildError: the device failed.
+    """
+    assert mesh.normals is not None
+    count = len(mesh.vertices)
+    normals = np.array(mesh.normals, np.float32)
+    smooth = np.full(count, float(scene.formula.iterations), np.float32)
+    for start in range(0, count, AT_ONCE):
+        part = np.arange(start, min(start + AT_ONCE, count))
+        left = part if flat is None else part[~flat[part]]
+        for push in PUSHES:
+            if not len(left):
+                break
+            outward = np.asarray(mesh.normals[left], np.float64)
+            found = distances(
+                scene.chain,
+                mesh.vertices[left] + push * voxel * outward,
+                scene.formula.iterations,
+                device=device,
+                lanes=lanes,
+                precision=precision,
+            )
+            length = np.linalg.norm(found.normal, axis=1)
+            good = (np.abs(length - 1) < 0.01) & (np.sum(found.normal * outward, axis=1) > 0)
+            normals[left[good]] = found.normal[good]
+            smooth[left[good]] = found.smooth[good]
+            left = left[~good]
+        if progress is not None:
+            progress((part[-1] + 1) / count)
+    return replace(mesh, normals=normals, colors=_colors(scene, normals, smooth))
+
+
+def on_faces(vertices: Doubles, corner: Doubles, spacing: Doubles, shape: tuple[int, int, int]) -> Flags:
+    """Which vertices lie on the faces of a grid's box; `shape` is of voxels along x, y and z."""
+    far = corner + spacing * shape
+    near = np.abs(vertices - corner) < 1e-3 * spacing
+    return np.asarray((near | (np.abs(vertices - far) < 1e-3 * spacing)).any(axis=1))
+
+
+def _colors(
+    scene: Scene, normals: npt.NDArray[np.float32], smooth: npt.NDArray[np.float32]
+) -> npt.NDArray[np.float32]:
+    """Linear colours, (n, 3), as rays find them (kernels/color.h)."""
+    coloring = scene.coloring
+    if coloring.by == "normal":
+        return np.float32(0.5) + np.float32(0.5) * normals
+    if coloring.by == "iterations":
+        return _from_palette(coloring, smooth)
+    return np.broadcast_to(np.array(scene.material.color, np.float32), normals.shape)
+
+
+def _from_palette(coloring: Coloring, quantity: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Blended between neighbours; one that repeats is squeezed by a 256th, where its end blends into its start."""
+    table = palette_table(coloring)
+    where = quantity.astype(np.float64) * coloring.scale + coloring.offset
+    place = where - np.floor(where) if coloring.repeat else np.clip(where, 0, 1)
+    intervals = SIZE if coloring.repeat else SIZE - 1
+    at = np.nan_to_num(place) * intervals
+    first = np.clip(at.astype(np.int64), 0, intervals - 1)
+    share = (at - first).astype(np.float32)[:, None]
+    result: npt.NDArray[np.float32] = table[first] * (1 - share) + table[(first + 1) % SIZE] * share
+    return result
