@@ -42,7 +42,7 @@ bench: $(VENV)/.installed
 	$(BIN)/clfractal bench
 
 portability: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && $(CURDIR)/$(BIN)/python -m tests.portability
+	cd $(STAGE) && $(CURDIR)/$(BIN)/python -m tests.portability $(ARGUMENTS)
 
 # A system without ensurepip (Debian's python3 without python3-venv) may still have pip.
 $(VENV)/bin/python:

@@ -1,13 +1,13 @@
 """Builds a program in this process, and the tiny first launch that makes a driver finish its work.
 
 PoCL generates machine code only when a kernel is first enqueued, once per kernel and local size. A `Warm`
-recipe lets that happen before the binary is taken from the driver, so that the binary holds the machine code
-too.
+recipe lets that happen at once, in the child, so that what is kept of the program holds the machine code too.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,9 +17,11 @@ from typing import Any, Literal
 import numpy as np
 import pyopencl as cl
 
-from clfractal.device.select import Device, by_key
+from clfractal.device.select import Device, by_key, is_pocl
 
 BINARY = "binary"  # the file that `compile_job` leaves
+# In the place of a binary: the driver keeps the machine code, and finds it again by the program's text.
+KEPT_BY_DRIVER = b"kept by the driver"
 
 ArgumentKind = Literal["buffer", "scalar", "bytes", "local"]
 
@@ -99,8 +101,24 @@ def load_binary(device: Device, binary: bytes, flags: Sequence[str]) -> Any | No
         return None
 
 
-def binary_of(program: Any) -> bytes:
-    """The driver's binary of a program built for one device; empty if the driver has none."""
+def load_kept(device: Device, binary: bytes, text: str, flags: Sequence[str]) -> Any | None:
+    """The program from what `binary_of` gave; None if the driver refuses it."""
+    if binary != KEPT_BY_DRIVER:
+        return load_binary(device, binary, flags)
+    try:
+        return compile_source(device, text, flags)
+    except BuildFailureError:
+        return None
+
+
+def binary_of(device: Device, program: Any) -> bytes:
+    """The driver's binary of a program built for one device; empty if the driver has none.
+
+    PoCL has a cache of its own, which holds what a first launch made. For a binary it compiles every kernel once more,
+    for any size of work-group: a renderer would take twice as long to build.
+    """
+    if is_pocl(device.info) and os.environ.get("POCL_KERNEL_CACHE", "1") != "0":
+        return KEPT_BY_DRIVER
     try:
         binaries = program.get_info(cl.program_info.BINARIES)
     except cl.Error:
@@ -131,7 +149,7 @@ def compile_job(request: Mapping[str, Any]) -> str | None:
         return str(failure)
     if request["warm"] is not None:
         warm_up(device, program, Warm.from_data(request["warm"]))
-    (Path(request["folder"]) / BINARY).write_bytes(binary_of(program))
+    (Path(request["folder"]) / BINARY).write_bytes(binary_of(device, program))
     return None
 
 

@@ -22,7 +22,7 @@ from clfractal.device.structs import Precision
 BUILD_TIMEOUT_S = 600.0
 
 _REMARK_SECONDS = 1.5  # longer than a refusal takes: an error stays alone on its line
-_FORMAT = 1  # of what is kept under a key
+_FORMAT = 2  # of what is kept under a key
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def build(
     key = _key(device, text, flags, warm)
     binary = cache.load_blob(key)
     if binary is not None:
-        program = compiler.load_binary(device, binary, flags)
+        program = compiler.load_kept(device, binary, text, flags)
         if program is not None:
             return Program(device, program, _milliseconds(start), cached=True)
         cache.drop_blob(key)
@@ -118,14 +118,14 @@ def _compile(
     """The program and its binary, which may be empty."""
     if isolated:
         binary = _compile_in_child(device, text, flags, warm)
-        program = compiler.load_binary(device, binary, flags) if binary else None
+        program = compiler.load_kept(device, binary, text, flags) if binary else None
         if program is not None:
             return program, binary
         # A driver without binaries (or that cannot read its own): the child has shown that compiling is safe.
     program = compiler.compile_source(device, text, flags)
     if warm is not None:
         compiler.warm_up(device, program, warm)
-    return program, compiler.binary_of(program)
+    return program, compiler.binary_of(device, program)
 
 
 def _compile_in_child(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> bytes:

@@ -49,18 +49,32 @@ def test_built_then_found(device: Device, empty_cache: Path, isolated: bool, war
     assert second.build_ms >= 0
 
 
-def test_a_first_launch_puts_machine_code_into_the_binary(device: Device, empty_cache: Path) -> None:
-    """PoCL generates it for a local size; other drivers have it from the start."""
-    text = f"__constant long unique = {time.time_ns()};\n" + _TRIPLE  # new to PoCL's own cache too
-    cold = compiler.binary_of(build(device, text, flags=_FLAGS, isolated=False).cl_program)
+def test_a_first_launch_makes_machine_code_once(
+    device: Device, empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """PoCL generates it for a local size, and keeps it itself; other drivers have it from the start, in the binary."""
+    monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))  # of the child: this process has opened its own
+    text = f"__constant long unique = {time.time_ns()};\n" + _TRIPLE
     program = build(device, text, flags=_FLAGS, warm=_WARM)
-    warm = compiler.binary_of(program.cl_program)
-    if not is_pocl(device.info):
-        assert len(warm) >= len(cold) > 0
-        return
-    assert len(warm) > len(cold) > 0
+    (entry,) = empty_cache.rglob("*.bin")
+    if is_pocl(device.info):
+        assert entry.read_bytes().endswith(compiler.KEPT_BY_DRIVER)
+        (code,) = tmp_path.rglob("triple.so")
+        assert code.parent.name.startswith("1-1-1")
+    else:
+        assert len(compiler.binary_of(device, program.cl_program)) > 0
     assert _triples(program)
-    assert len(compiler.binary_of(program.cl_program)) == len(warm), "a launch like the first adds none"
+
+
+def test_a_driver_without_a_cache_gives_binaries(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("POCL_KERNEL_CACHE", "0")
+    first = build(device, _TRIPLE, flags=_FLAGS, warm=_WARM, isolated=False)
+    binary = compiler.binary_of(device, first.cl_program)
+    assert len(binary) > 1000
+    assert compiler.load_kept(device, binary, "not OpenCL", _FLAGS) is not None
+    assert _triples(build(device, _TRIPLE, flags=_FLAGS, warm=_WARM, isolated=False))
 
 
 def test_text_flags_and_launch_are_the_key(device: Device, empty_cache: Path) -> None:
@@ -87,7 +101,7 @@ def test_a_binary_that_the_driver_refuses_is_built_again(
     again = build(device, _TRIPLE, flags=_FLAGS, isolated=False)
     assert not again.cached
     assert _triples(again)
-    monkeypatch.setattr(compiler, "load_binary", lambda *_: None)
+    monkeypatch.setattr(compiler, "load_kept", lambda *_: None)
     assert _triples(build(device, _TRIPLE, flags=_FLAGS, isolated=False))
 
 

@@ -1,4 +1,6 @@
-"""`python -m tests.portability [NAME ...]`: the same tests and pictures on every OpenCL implementation.
+"""`python -m tests.portability [--tested] [NAME ...]`: the same tests and pictures on every OpenCL implementation.
+
+With `--tested` the first, which every installation has, gets no tests: `make test` has run them all on it.
 
 Each implementation runs alone, in processes of its own: first the tests marked `conformance`, then the
 pictures of `pictures.py`; Oclgrind renders tiny ones and checks every access to memory. All pictures are then
@@ -11,7 +13,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -25,7 +27,8 @@ _TIMEOUT_S = 1800
 
 def main() -> int:
     """The exit status: 0 if every implementation is there and passes."""
-    wanted = sys.argv[1:]
+    wanted = [argument for argument in sys.argv[1:] if argument != "--tested"]
+    tested = IMPLEMENTATIONS[0] if "--tested" in sys.argv else None
     unknown = set(wanted) - {each.name for each in IMPLEMENTATIONS}
     if unknown:
         known = ", ".join(each.name for each in IMPLEMENTATIONS)
@@ -36,7 +39,7 @@ def main() -> int:
     faults: dict[str, list[str]] = {}
     for implementation in chosen:
         start = time.monotonic()
-        faults[implementation.name] = list(_examine(implementation))
+        faults[implementation.name] = list(_examine(implementation, PARTS[implementation is tested :]))
         print(f"{implementation.name}: {time.monotonic() - start:.0f} s", flush=True)
     for name, fault in _compare(chosen):
         faults[name].append(fault)
@@ -46,7 +49,7 @@ def main() -> int:
     return 1 if any(faults.values()) else 0
 
 
-def _examine(implementation: Implementation) -> list[str]:
+def _examine(implementation: Implementation, wanted: Sequence[Part]) -> list[str]:
     """What is wrong with one implementation by itself."""
     print(f"\n=== {implementation.name}", flush=True)
     try:
@@ -57,7 +60,9 @@ def _examine(implementation: Implementation) -> list[str]:
     environment.update(_oclgrind_checks(implementation))
     # Most of the time goes into compiling, one core each. (The simulator's processes share a log.)
     with ThreadPoolExecutor(1 if implementation.simulator else 2) as both:
-        parts = [part.result() for part in [both.submit(part, implementation, environment) for part in PARTS]]
+        parts = [
+            part.result() for part in [both.submit(part, implementation, environment) for part in wanted]
+        ]
     found = [fault for part in parts for fault in part]
     if implementation.simulator:
         found += _memory_faults(environment)
@@ -79,7 +84,8 @@ def _picture_faults(implementation: Implementation, environment: Mapping[str, st
     return found
 
 
-PARTS = (_conformance_faults, _picture_faults)
+Part = Callable[[Implementation, Mapping[str, str]], list[str]]
+PARTS: tuple[Part, ...] = (_conformance_faults, _picture_faults)
 
 
 def _tests(implementation: Implementation) -> list[str]:
