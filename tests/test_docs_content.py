@@ -88,6 +88,14 @@ SECTIONS = {
     "output": "Output",
 }
 
+# The same of the pages of other renderers.
+CUT_PLANES = {
+    "renderer, cut_plane": "CutPlaneRenderer",
+    "renderer.colors": "EscapeColors",
+    "renderer.plane": "Plane",
+    "renderer.plane.transform": "Transform",
+}
+
 
 def number(value: float) -> str:
     """As the pages write numbers: whole ones in full, in groups of three digits."""
@@ -107,9 +115,11 @@ def allowed(entry: dict[str, Any]) -> str:
         return "a mapping"
     kind = entry.get("type")
     if kind == "array":
+        if entry.get("prefixItems", [{}])[0].get("type") == "array":
+            return f"{len(entry['prefixItems'])} positions"
         if "prefixItems" in entry:
             return f"{len(entry['prefixItems'])} numbers, {interval(entry['prefixItems'][0])}"
-        return f"a list of {entry['minItems']} to {entry['maxItems']}"
+        return f"a list of {entry.get('minItems', 0)} to {entry['maxItems']}"
     if kind in ("integer", "number"):
         return ("whole, " if kind == "integer" else "") + interval(entry)
     return {"boolean": "`true`, `false`", "string": "text", "object": "a mapping"}[str(kind)]
@@ -149,7 +159,7 @@ def expected_rows(name: str) -> list[list[str]]:
 
 
 def test_every_part_of_a_scene_is_described() -> None:
-    assert set(SECTIONS.values()) == set(load.schema()["$defs"])
+    assert {*SECTIONS.values(), *CUT_PLANES.values()} == set(load.schema()["$defs"])
     keys = {code(row[0]) for row in table("scenes.md", "The top level")}
     assert keys == set(load.schema()["properties"])
     required = {code(row[0]) for row in table("scenes.md", "The top level") if row[1] == "required"}
@@ -160,6 +170,12 @@ def test_every_part_of_a_scene_is_described() -> None:
 def test_keys_defaults_and_ranges_of_a_scene(heading: str) -> None:
     told = [row[:3] for row in table("scenes.md", heading)]
     assert sorted(told) == sorted(expected_rows(SECTIONS[heading]))
+
+
+@pytest.mark.parametrize("heading", CUT_PLANES)
+def test_keys_defaults_and_ranges_of_cut_planes(heading: str) -> None:
+    told = [row[:3] for row in table("cut_planes.md", heading)]
+    assert sorted(told) == sorted(expected_rows(CUT_PLANES[heading]))
 
 
 def test_limits_of_scene_files() -> None:
