@@ -12,12 +12,28 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
     const size_t brick = (size_t)first + get_global_id(1);
     if (brick >= count) return;
     const surroundings around = surroundings_of(bricks[brick], numbers, extent);
+#if SOURCE == SOURCE_BITS
+    // Most are told by the voxels that are their own.
+    __global const uchar *bytes = samples + brick * 64;
+    uchar16 least = vload16(0, bytes), most = least;
+    for (int i = 1; i < 4; ++i) {
+        const uchar16 more = vload16(i, bytes);
+        least &= more;
+        most |= more;
+    }
+    if (any(most != (uchar)0) && any(least != (uchar)255)) {
+        classes[brick] = 2;
+        return;
+    }
+#endif
+    neighbourhood n;
+    load_neighbourhood(&n, samples, &around, extent);
     bool some = false, all = true;
     for (int z = 0; z < BRICK_SIDE; ++z) {
         for (int y = 0; y < BRICK_SIDE; ++y) {
-            const row r = load_row(samples, &around, y, z, extent);
+            const row r = row_at(&n, y, z);
 #if SOURCE == SOURCE_BITS
-            const uint own = (r >> BRICK) & 0x1ff;
+            const uint own = (r >> VOXELS_BEFORE) & 0x1ff;
             some |= own != 0;
             all &= own == 0x1ff;
 #else
@@ -98,6 +114,8 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
     const int brick = first + (int)get_global_id(1);
     if (brick >= count) return;
     const surroundings around = surroundings_of(bricks[brick], numbers, extent);
+    neighbourhood n;
+    load_neighbourhood(&n, samples, &around, extent);
     const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;
     __global VALUE *value = values + start;
 #if NORMALS
@@ -110,7 +128,7 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
         const int z = layer - REACH;
         for (int line = 0; line < LAYERS; ++line) {
             const int y = line - REACH;
-            const row r = load_row(samples, &around, y, z, extent);
+            const row r = row_at(&n, y, z);
             const float16 middle = row_window(&r, 0);
             float16 sum = smooth[0] * middle, difference = (float16)(0.0f);
             #pragma unroll
@@ -166,7 +184,7 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
 #else
     for (int z = 0; z < BRICK_SIDE; ++z) {
         for (int y = 0; y < BRICK_SIDE; ++y) {
-            const row r = load_row(samples, &around, y, z, extent);
+            const row r = row_at(&n, y, z);
             store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y), row_window(&r, 0) * extent->scale);
         }
     }

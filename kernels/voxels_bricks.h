@@ -55,6 +55,102 @@ INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __
     return around;
 }
 
+#endif
+
+#if SOURCE == SOURCE_BITS
+// The voxels around a brick: whole octants, so far that normals find theirs.
+#if RADIUS <= 2
+#define OCTANTS_BEFORE 1
+#else
+#define OCTANTS_BEFORE 2
+#endif
+#define OCTANTS (2 + 2 * OCTANTS_BEFORE)
+#define VOXELS_BEFORE (4 * OCTANTS_BEFORE)
+#define SPAN (4 * OCTANTS)
+// Voxel x of the row is bit x + VOXELS_BEFORE.
+typedef uint row;
+typedef struct {
+    uint rows[SPAN * SPAN];  // y fastest
+} neighbourhood;
+
+// An octant's bits: the two least bytes are the layer z = 0 of it, the least four bits its row y = 0.
+INLINE uint2 octant_bits(__global const SAMPLE *samples, int number, int octant) {
+    if (number < 0) return (uint2)(0, 0);
+    return as_uint2(vload8(0, samples + (size_t)number * 64 + 8 * octant));
+}
+
+INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const surroundings *around,
+                               __constant const struct Extent *extent) {
+    for (int z = 0; z < OCTANTS; ++z) {
+        for (int y = 0; y < OCTANTS; ++y) {
+            uint8 low = (uint8)(0), high = (uint8)(0);
+            for (int x = 0; x < OCTANTS; ++x) {
+                // Places of octants from the brick's first; an even number of bricks before makes shifts round down.
+                const int at_x = x - OCTANTS_BEFORE + 2, at_y = y - OCTANTS_BEFORE + 2, at_z = z - OCTANTS_BEFORE + 2;
+                const int brick = (at_x >> 1) + 3 * (at_y >> 1) + 9 * (at_z >> 1);
+                const uint2 bits = octant_bits(samples, around->near[brick], (at_x & 1) | (at_y & 1) << 1 | (at_z & 1) << 2);
+                const uint8 rows = (uint8)(0, 4, 8, 12, 16, 20, 24, 28);
+                low |= (((uint8)(bits.s0) >> rows) & 15u) << (uint)(4 * x);
+                high |= (((uint8)(bits.s1) >> rows) & 15u) << (uint)(4 * x);
+            }
+            uint *first = n->rows + 4 * z * SPAN + 4 * y;
+            vstore4(low.lo, 0, first);
+            vstore4(low.hi, 0, first + SPAN);
+            vstore4(high.lo, 0, first + 2 * SPAN);
+            vstore4(high.hi, 0, first + 3 * SPAN);
+        }
+    }
+    // Past the grid's ends the last voxel repeats.
+    const uint before = (1u << VOXELS_BEFORE) - 1u, own = 0xffu << VOXELS_BEFORE;
+    if (around->x == 0 || around->x == extent->bricks[0] - 1) {
+        for (int i = 0; i < SPAN * SPAN; ++i) {
+            uint r = n->rows[i];
+            if (around->x == 0) r = (r & ~before) | ((r >> VOXELS_BEFORE & 1u) != 0 ? before : 0u);
+            if (around->x == extent->bricks[0] - 1) {
+                r = (r & (before | own)) | ((r >> (VOXELS_BEFORE + 7) & 1u) != 0 ? ~(before | own) : 0u);
+            }
+            n->rows[i] = r;
+        }
+    }
+    const bool ends_y = around->y == 0 || around->y == extent->bricks[1] - 1;
+    const bool ends_z = around->z == 0 || around->z == extent->bricks[2] - 1;
+    if (ends_y || ends_z) {
+        const int first_y = around->y == 0 ? VOXELS_BEFORE : 0, first_z = around->z == 0 ? VOXELS_BEFORE : 0;
+        const int last_y = around->y == extent->bricks[1] - 1 ? VOXELS_BEFORE + 7 : SPAN - 1;
+        const int last_z = around->z == extent->bricks[2] - 1 ? VOXELS_BEFORE + 7 : SPAN - 1;
+        // Within the grid's rows nothing is overwritten before it is read.
+        for (int i = 0; i < SPAN * SPAN; ++i) {
+            n->rows[i] = n->rows[clamp(i / SPAN, first_z, last_z) * SPAN + clamp(i % SPAN, first_y, last_y)];
+        }
+    }
+}
+INLINE row row_at(const neighbourhood *n, int y, int z) { return n->rows[(z + VOXELS_BEFORE) * SPAN + y + VOXELS_BEFORE]; }
+
+// Voxels `offset` to `offset` + 15 of the row; those past the neighbourhood are 0.
+INLINE float16 row_window(const row *r, int offset) {
+    const uint16 shift = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) + (uint)(offset + VOXELS_BEFORE);
+    return convert_float16(convert_int16(((uint16)(*r) >> shift) & 1u));
+}
+#else
+// Voxel x of the row is entry x + 8.
+typedef struct {
+    float value[40];
+} row;
+// Rows are loaded one by one.
+typedef struct {
+    __global const SAMPLE *samples;
+    const surroundings *around;
+    __constant const struct Extent *extent;
+} neighbourhood;
+
+INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const surroundings *around,
+                               __constant const struct Extent *extent) {
+    n->samples = samples;
+    n->around = around;
+    n->extent = extent;
+}
+
+#if SOURCE == SOURCE_BRICKS
 // The row `y`, `z` (voxels from the brick's first, -8 to 15): the first of its three bricks in `near`, and the first of the
 // row's voxels in them (bricks are kept octant by octant: see voxels.h; its second four are an octant further on).
 INLINE int row_of(const surroundings *around, int y, int z, __constant const struct Extent *extent, int *first) {
@@ -65,41 +161,6 @@ INLINE int row_of(const surroundings *around, int y, int z, __constant const str
     const int octant = ((row_z >> 1) & 2) | ((row_y >> 2) & 1);
     return OCTANT_VOXELS * 2 * octant + 16 * (row_z & 3) + 4 * (row_y & 3);
 }
-#endif
-
-#if SOURCE == SOURCE_BITS
-// Voxel x of the row is bit x + 8.
-typedef uint row;
-
-INLINE uint row_bits(__global const SAMPLE *samples, int number, int place) {
-    if (number < 0) return 0;
-    // Two rows of four share a byte.
-    __global const uchar *bytes = samples + (size_t)number * 64 + place / 8;
-    const int shift = place & 4;
-    return ((uint)(bytes[0] >> shift) & 15u) | ((uint)(bytes[OCTANT_VOXELS / 8] >> shift) & 15u) << 4;
-}
-INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
-                    __constant const struct Extent *extent) {
-    int first;
-    const int place = row_of(around, y, z, extent, &first);
-    const uint own = row_bits(samples, around->near[first + 1], place);
-    uint left = row_bits(samples, around->near[first], place), right = row_bits(samples, around->near[first + 2], place);
-    if (around->x == 0) left = (own & 1) != 0 ? 0xff : 0;
-    if (around->x == extent->bricks[0] - 1) right = (own & 0x80) != 0 ? 0xff : 0;
-    return left | own << 8 | right << 16;
-}
-// Voxels `offset` to `offset` + 15 of the row; those beyond 15 are 0.
-INLINE float16 row_window(const row *r, int offset) {
-    const uint16 shift = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) + (uint)(offset + BRICK);
-    return convert_float16(((uint16)(*r) >> shift) & 1u);
-}
-#else
-// Voxel x of the row is entry x + 8.
-typedef struct {
-    float value[40];
-} row;
-
-#if SOURCE == SOURCE_BRICKS
 INLINE void row_part(float *part, __global const SAMPLE *samples, int number, int place) {
     for (int i = 0; i < BRICK; ++i) {
         const int voxel = place + (i < 4 ? i : i - 4 + OCTANT_VOXELS);
@@ -136,6 +197,8 @@ INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, 
     return r;
 }
 #endif
+
+INLINE row row_at(const neighbourhood *n, int y, int z) { return load_row(n->samples, n->around, y, z, n->extent); }
 
 INLINE float16 row_window(const row *r, int offset) { return vload16(0, r->value + offset + BRICK); }
 #endif

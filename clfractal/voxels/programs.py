@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
+from weakref import WeakKeyDictionary
 
 import pyopencl as cl
 
@@ -34,6 +35,10 @@ NODE_POINTS = 64
 CHUNK = 4
 # Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
 PACKETS = 2
+
+# Programs of a device that are kept loaded: a box that is moved is filled again and again.
+MOST_LOADED = 64
+_loaded: WeakKeyDictionary[Device, dict[tuple[str, str], program.Program]] = WeakKeyDictionary()
 
 _BUFFER = Argument("buffer", 8192)
 _INT = Argument("scalar", dtype="int32")
@@ -74,6 +79,7 @@ def build_all(
         DeviceError: the driver failed.
     """
     told: list[str] = []
+    loaded = _loaded.setdefault(device, {})
 
     def tell(line: str) -> None:
         if not told and on_compile is not None:
@@ -86,11 +92,17 @@ def build_all(
         if recipe.chain is not None:
             generated["formula.h"] = write_formula(recipe.chain).text
         text = flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
+        key = (recipe.kernel, text.text)
+        if key in loaded:
+            return Built(loaded[key].kernel(recipe.kernel), recipe.items, recipe.group, 0.0)
         warm = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
         flags = program.math_flags(recipe.precision)
         built = program.build(
             device, text.text, flags=flags, sources=text.sources, warm=warm, on_compile=tell
         )
+        if len(loaded) >= MOST_LOADED:
+            loaded.clear()
+        loaded[key] = built
         return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
 
     with ThreadPoolExecutor(max(len(recipes), 1)) as pool:
