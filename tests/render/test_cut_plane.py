@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clfractal
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.formulas import reference
@@ -76,6 +77,16 @@ class TestMandelbrot:
         np.testing.assert_allclose(film["iterations"][certain], expected[certain], atol=1e-2)
         assert certain.sum() > 5000
         assert (film["iterations"][count == 110] == 100).mean() > 0.99
+
+    def test_whole_counts_are_those_of_escape(self, device: Device) -> None:
+        scene = plane_scene(size=(128, 128), iterations=200, plane=WHOLE, colors=STEPPED)
+        film = shoot(scene, device)
+        points = stacked(film, ("P.X", "P.Y", "P.Z")).reshape(-1, 3)
+        count, _ = clfractal.escape("hast", points, iterations=200)
+        same = count.reshape(128, 128) == film["iterations"]
+        certain = sure(film["P.X"].astype(float), film["P.Y"].astype(float), 200, NUDGE["float32"])
+        assert same[certain].all()
+        assert same.mean() > 0.999
 
 
 class TestChannels:
