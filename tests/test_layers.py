@@ -23,6 +23,7 @@ OWNERS = {
     "rich": {"commands/progress.py"},
     "typer": {"commands/app.py"},
     "cmap": {"scene/palette.py"},
+    "skimage": {"voxels/mesh.py"},
 }
 
 

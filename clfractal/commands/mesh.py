@@ -93,11 +93,11 @@ def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
     grid, job = fill(order, scene, shell)
     low, high = grid.range
     wanted = (low + high) / 2 if level is None else level
-    share = (wanted - low) / (high - low)
-    if not 0 < share <= 1:
+    if not low < wanted <= high:
         raise SceneError(f"must be above {low:g} and at most {high:g}, got {wanted:g}", Where("--level"))
-    volume = grid_volume(grid, job)
-    return _Found(volume, 255 * share if grid.kind == "byte" else share, job, False)
+    # Floats are a value's own numbers, bytes are spread over its range.
+    stored = 255 * (wanted - low) / (high - low) if grid.kind == "byte" else wanted
+    return _Found(grid_volume(grid, job), stored, job, False)
 
 
 def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:

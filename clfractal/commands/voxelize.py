@@ -172,7 +172,7 @@ def grid_volume(grid: Grid, job: Job) -> Volume:
     texts = {
         SCENE_KEY: write_document(job.resolved()),
         "value": settings.value,
-        # What the stored numbers 0 and 255 (bytes) or 0 and 1 (floats) stand for.
+        # What the bytes 0 and 255 stand for; floats are the value's own numbers.
         "range": f"{grid.range[0]:g} {grid.range[1]:g}",
     }
     return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts)

@@ -20,9 +20,13 @@ Doubles = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 AT_ONCE = 1 << 20
-# A vertex lies between a voxel inside and one outside, and inside a set the distance has no slope: such vertices are
-# looked at from further out, voxels along the normal of the grid.
-PUSHES = (0.0, 0.5, 1.0, 2.0)
+# Voxels along the normal of the grid, from where a vertex is looked at: first a voxel out, in a narrow gap half of one.
+# A vertex itself lies within detail that the grid does not show, or inside, where the distance has no slope; and along
+# its normal a distance keeps its slope, so that on smooth surfaces nothing is lost.
+PUSHES = (1.0, 0.5)
+# Least cosine between the formula's normal and the grid's: what is further apart belongs to detail finer than the grid,
+# and would be seen as dark speckles on a surface that does not have it.
+LEAST_COSINE = 0.5
 COLORED_BY = ("solid", "normal", "iterations")
 """Ways of coloring that vertices can have; the others need a ray, or are too costly here."""
 
@@ -40,7 +44,7 @@ def dress(
 ) -> Mesh:
     """The mesh with normals from the formula's Jacobian, and the colours of the scene.
 
-    A normal stays as it is where the formula has none nearby, or one on the other side: the detail there is finer than
+    A normal stays as it is where the formula has none nearby, or one that is far from it: the detail there is finer than
     the grid. Colours are the material's where `coloring.by` is none of COLORED_BY.
 
     Args:
@@ -54,7 +58,8 @@ def dress(
     assert mesh.normals is not None
     count = len(mesh.vertices)
     normals = np.array(mesh.normals, np.float32)
-    smooth = np.full(count, float(scene.formula.iterations), np.float32)
+    limit = np.float32(scene.formula.iterations)
+    smooth = np.full(count, limit)
     for start in range(0, count, AT_ONCE):
         part = np.arange(start, min(start + AT_ONCE, count))
         left = part if flat is None else part[~flat[part]]
@@ -70,10 +75,11 @@ def dress(
                 lanes=lanes,
                 precision=precision,
             )
-            length = np.linalg.norm(found.normal, axis=1)
-            good = (np.abs(length - 1) < 0.01) & (np.sum(found.normal * outward, axis=1) > 0)
+            seen = ~found.inside & (np.abs(np.linalg.norm(found.normal, axis=1) - 1) < 0.01)
+            good = seen & (np.sum(found.normal * outward, axis=1) > LEAST_COSINE)
             normals[left[good]] = found.normal[good]
-            smooth[left[good]] = found.smooth[good]
+            first = seen & (smooth[left] == limit)
+            smooth[left[first]] = found.smooth[first]
             left = left[~good]
         if progress is not None:
             progress((part[-1] + 1) / count)
