@@ -3,7 +3,12 @@
 #define CURVE_ROOT 1
 #define CURVE_LOG 2
 
-INLINE color escape_color(escaped e, __constant const struct EscapeColors *colors, __global const float *palette) {
+// (Planes in another renderer's picture have their colours beside their places.)
+#ifndef ESCAPE_COLORS
+#define ESCAPE_COLORS EscapeColors
+#endif
+
+INLINE color escape_color(escaped e, __constant const struct ESCAPE_COLORS *colors, __global const float *palette) {
     real quantity;
     if (colors->curve == CURVE_LOG) {
         quantity = log(fmax(e.count, R(1.0))) * (real)(colors->inverse_limit);

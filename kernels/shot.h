@@ -55,6 +55,16 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
     real open = R(1.0);
     ray path = eye_ray;
     mask on_path = wanted;
+#if PLANES > 0
+    // Where a cutting plane lays the set bare, its face is what is seen.
+    real face, face_count = R(0.0);
+    color face_tint = seen;
+    vec face_normal = none;
+    on_path &= planes_cut(&path, &face, w.planes);
+    const real face_t = path.near;
+    const mask bare = planes_face(path, face, on_path, w.planes, &face_tint, &face_normal, &face_count);
+    on_path &= ~bare;
+#endif
     spot here;
     here.point = none;
     here.normal = none;
@@ -115,6 +125,10 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
                 leg.footprint = here.cone * (real)(w.settings->shadow_detail);
                 leg.spread = R(0.0);
             }
+#if PLANES > 0
+            real side;
+            active &= planes_cut(&leg, &side, w.planes);
+#endif
             active &= ray_clip(&leg, w.settings->bounds_center, w.settings->bounds_radius);
             batch_add(&rays, legs, leg, strength, active);
             turn = next_turn(stage, turn, w);
@@ -241,6 +255,18 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
         ++bounce;
     }
     color background = sky(eye_ray.direction, y, 0, w);
+#if PLANES > 0
+    seen = color_pick(bare, face_tint, seen);
+    result.hit |= bare;
+    result.coverage = pick(bare, R(1.0), result.coverage);
+    result.point = vec_pick(bare, vec_along(eye_ray.origin, face_t, eye_ray.direction), result.point);
+    result.normal = vec_pick(bare, face_normal, result.normal);
+    result.smooth = pick(bare, face_count, result.smooth);
+    result.depth = pick(bare, vec_dot(vec_sub(result.point, vec_splat(w.view->eye)), vec_splat(w.view->axis)), result.depth);
+#if HAS_FOG
+    fog = pick(bare, R(1.0) - exp(-(real)(w.material->fog_density) * face_t), fog);
+#endif
+#endif
 #if HAS_FOG
     const color mist = color_splat(w.material->fog_color);
     seen = color_mix(seen, mist, fog);
@@ -249,6 +275,12 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
     seen = color_pick(result.hit, seen, background);
+#if PLANES > 0
+    const real way_to_it = vec_dot(vec_sub(result.point, eye_ray.origin), eye_ray.direction);
+    const real object = pick(result.hit, way_to_it, (real)(REAL_LARGEST));
+    return planes_into(result, seen, background, planes_seen(eye_ray, object, wanted, w.planes), w.view);
+#else
     result.radiance = color_mix(background, seen, result.coverage);
     return result;
+#endif
 }

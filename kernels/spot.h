@@ -17,6 +17,9 @@ typedef struct {
     __constant const struct Light *lights;
     __global const float *palette;
     __global const float *environment;
+#if PLANES > 0
+    plane_set planes;
+#endif
 } world;
 
 // A place on the surface, and how it looks.

@@ -23,6 +23,11 @@
 #if HAS_ENVIRONMENT
 #include "environment.h"
 #endif
+#if PLANES > 0
+#include "escape.h"
+#include "escape_colors.h"
+#include "planes.h"
+#endif
 #include "spot.h"
 #include "pixel_points.h"
 #include "secondary.h"
@@ -32,11 +37,18 @@ __kernel void surface(__global float *film, __global uint *statistics, __global 
                       __constant const struct View *view, __constant const struct March *settings,
                       __constant const struct Orbit *orbit, __constant const scalar *k,
                       __constant const struct Material *material, __constant const struct Light *lights,
-                      __global const float *palette, __global const float *environment, __constant const int *slots,
-                      int channel_count, int first_packet) {
+                      __global const float *palette, __global const float *environment,
+#if PLANES > 0
+                      __constant const struct CutPlane *planes, __global const float *plane_palettes,
+#endif
+                      __constant const int *slots, int channel_count, int first_packet) {
     const int packet = (int)get_global_id(0) + first_packet;
     const int tile = (int)get_global_id(1);
+#if PLANES > 0
+    const world w = {view, settings, orbit, k, material, lights, palette, environment, {planes, orbit, k, plane_palettes}};
+#else
     const world w = {view, settings, orbit, k, material, lights, palette, environment};
+#endif
     const packet_pixels at = packet_at(packet, corners[tile], view);
     pixel p = pixel_start();
     tally cost = {R(0.0), R(0.0), R(0.0)};

@@ -30,11 +30,11 @@ CURVES = ("linear", "root", "log")
 PERIOD_CHECK = 8
 
 
-def escape_colors_record(colors: EscapeColors, iterations: int, precision: Precision) -> Record:
-    """The colours of counts up to `iterations`."""
+def escape_colors_values(colors: EscapeColors, iterations: int) -> dict[str, object]:
+    """The fields of the colours of counts up to `iterations`."""
     # With a limit of 1 every count is 1, whose logarithm is 0.
     divisor = math.log(max(iterations, 2)) if colors.curve == "log" else iterations
-    values = {
+    return {
         "inverse_limit": 1 / divisor,
         "scale": colors.scale,
         "offset": colors.offset,
@@ -42,7 +42,11 @@ def escape_colors_record(colors: EscapeColors, iterations: int, precision: Preci
         "repeat": int(colors.repeat),
         "curve": CURVES.index(colors.curve),
     }
-    return ESCAPE_COLORS.value(precision, values)
+
+
+def escape_colors_record(colors: EscapeColors, iterations: int, precision: Precision) -> Record:
+    """The colours of counts up to `iterations`."""
+    return ESCAPE_COLORS.value(precision, escape_colors_values(colors, iterations))
 
 
 def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:

@@ -12,6 +12,7 @@ from clfractal.formulas.opencl import write_formula
 from clfractal.render import layout
 from clfractal.render.environment import pack_environment
 from clfractal.render.plan import Plan
+from clfractal.render.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
 from clfractal.render.view import scene_view
 from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.coloring import Coloring
@@ -42,6 +43,7 @@ def defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
         **feature_defines(scene),
         **coloring_defines(scene.coloring),
+        **plane_defines(scene),
     }
 
 
@@ -91,7 +93,7 @@ def coloring_defines(coloring: Coloring) -> dict[str, object]:
 def program_text(scene: Scene, plan: Plan) -> FlatText:
     """The whole text of the scene's program."""
     formula = write_formula(scene.chain)
-    generated = {"formula.h": formula.text, "structs.h": layout.struct_text()}
+    generated = {"formula.h": formula.text, "structs.h": layout.struct_text() + CUT_PLANE.c_text()}
     return flatten("surface.cl", generated=generated, defines=defines(scene, plan), user=["formula.h"])
 
 
@@ -113,12 +115,18 @@ class SurfaceWorker(TileWorker):
         return [
             layout.view_record(scene_view(scene), width, height, plan.region, plan.precision),
             layout.march_record(scene, plan.samples, plan.precision),
-            layout.orbit_record(scene.chain, scene.formula.iterations, plan.precision),
+            np.stack(
+                [
+                    layout.orbit_record(scene.chain, scene.formula.iterations, plan.precision),
+                    *plane_orbits(scene, plan.precision),
+                ]
+            ),
             np.array(formula.constants, plan.precision),
             layout.material_record(scene, plan.precision, packed),
             layout.light_records(scene, plan.precision),
             self._palette(),
             packed.data if packed is not None else np.zeros(4, np.float32),
+            *([plane_records(scene, plan.precision), plane_palettes(scene)] if scene.cut_planes else []),
             channel_slots(plan),
         ]
 

@@ -185,7 +185,8 @@ def full_sample(grid: Grid) -> float:
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
     """The values between which the transfer table lies: those of its stops, or of the grid."""
     transfer = settings_of(scene).transfer
-    stops = [stop.at for stop in (*(transfer.opacity or ()), *(transfer.color or ()))] or list(grid.range)
+    stops = [stop.at for stop in transfer.opacity or ()] + [stop.at for stop in transfer.color or ()]
+    stops = stops or list(grid.range)
     low, high = min(stops), max(stops)
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 

@@ -5,12 +5,14 @@ from math import dist
 
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
+from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
 
 MAX_STEPS_THROUGH = 1_000_000
+MAX_PLANES = 64
 # A point that has not escaped after so many applications is inside for every practical purpose: it bounds the time
 # that a light deep in a set of a million iterations takes.
 _MOST_APPLICATIONS = 2_000
@@ -25,6 +27,7 @@ def check_parts(scene: Scene) -> None:
         _check_residual(scene, scene.renderer)
     if isinstance(scene.renderer, VolumeRenderer):
         used_boxes(scene, scene.renderer)
+    _check_planes(scene)
     _check_lights(scene)
 
 
@@ -72,6 +75,17 @@ def _check_step(step: float | None, radius: float, path: str) -> None:
             f" got {step:g}",
             Where(path=path),
         )
+
+
+def _check_planes(scene: Scene) -> None:
+    """Every plane of a picture is evaluated for every pixel."""
+    count = sum(plane.count for plane in scene.cut_planes)
+    if count > MAX_PLANES:
+        raise SceneError(
+            f"must be at most {MAX_PLANES} planes together, got {count}", Where(path="cut_planes")
+        )
+    if count and isinstance(scene.renderer, CutPlaneRenderer):
+        raise SceneError("are for surface and volume renderers; remove them", Where(path="cut_planes"))
 
 
 def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:

@@ -62,3 +62,6 @@ class CutPlane(Section):
     )
     count: int = Field(1, ge=1, le=256, description="parallel planes")
     spacing: Coordinate = Field(0.1, description="from one to the next along the normal, scene units")
+
+
+CutPlanes = Annotated[tuple[CutPlane, ...], Field(strict=False, max_length=64)]

@@ -157,6 +157,8 @@ def _check_palettes(scene: Scene) -> None:
         used.append(("coloring.palette", scene.coloring.palette))
     if isinstance(scene.renderer, CutPlaneRenderer):
         used.append(("renderer.colors.palette", scene.renderer.colors.palette))
+    for index, plane in enumerate(scene.cut_planes):
+        used.append((f"cut_planes.{index}.colors.palette", plane.colors.palette))
     if used:
         from clfractal.scene.palette import check_palette
 

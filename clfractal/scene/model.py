@@ -13,6 +13,7 @@ from pydantic import Field
 
 from clfractal.scene.base import Section
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.cut_plane import CutPlanes
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Image, Material, Output
@@ -39,6 +40,7 @@ class Scene(Section):
     background: Background = Field(default_factory=dict, validate_default=True)
     environment: Environment | None = None
     fog: Fog | None = None
+    cut_planes: CutPlanes = Field((), description="planes that stand in the picture, or cut the object open")
     output: Output = Field(default_factory=dict, validate_default=True)
 
     @cached_property

@@ -1,0 +1,103 @@
+"""Cut planes that stand in the picture of an object, as `kernels/planes.h` reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.orbit import Record, orbit_record
+from clfractal.device.structs import Field, Precision, Struct
+from clfractal.render.escape_colors import (
+    ESCAPE_COLORS,
+    escape_colors_values,
+    escape_defines,
+    escape_palette,
+)
+from clfractal.scene.checks import used_boxes
+from clfractal.scene.cut_plane import CutPlane
+from clfractal.scene.model import Scene
+from clfractal.scene.plane import Placed, moved
+from clfractal.scene.volume import VolumeRenderer
+
+CUT_PLANE = Struct(
+    "CutPlane",
+    [
+        Field("center", "real", 3, "its middle, scene units"),
+        Field("normal", "real", 3, "length 1; what lies on this side is in front"),
+        Field("side", "real", 3, "to its right, length 1"),
+        Field("up", "real", 3, "to its top, length 1"),
+        Field("half_width", "real", 0, "scene units"),
+        Field("half_height", "real", 0, "scene units"),
+        Field("opacity", "real", 0, "outside the set"),
+        Field("zoom", "real", 0, "the formula is evaluated at zoom_origin + zoom * point"),
+        Field("zoom_origin", "real", 3, "scene units"),
+        Field("cut", "int", 0, "1: the object in front is removed"),
+        Field("smooth", "int", 0, "1: smooth counts"),
+        *ESCAPE_COLORS.fields,
+    ],
+)
+
+
+def all_planes(scene: Scene) -> Iterator[tuple[CutPlane, Placed]]:
+    """Every plane of a scene, those of a stack one by one."""
+    for plane in scene.cut_planes:
+        for number in range(plane.count):
+            yield plane, moved(plane.plane.placed, normal=number * plane.spacing)
+
+
+def plane_defines(scene: Scene) -> dict[str, object]:
+    """What the text of `kernels/planes.h` depends on."""
+    return {
+        "PLANES": sum(1 for _ in all_planes(scene)),
+        "ESCAPE_COLORS": "CutPlane",
+        **escape_defines(scene.chain),
+    }
+
+
+def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
+    """The planes, one record each."""
+    zoom, origin = _zoom(scene)
+    rows = [
+        {
+            "center": placed.center,
+            "normal": placed.normal,
+            "side": placed.side,
+            "up": placed.up,
+            "half_width": placed.width / 2,
+            "half_height": placed.height / 2,
+            "opacity": plane.opacity,
+            "zoom": zoom,
+            "zoom_origin": origin,
+            "cut": int(plane.cut),
+            "smooth": int(plane.colors.mode == "smooth"),
+            **escape_colors_values(plane.colors, _iterations(scene, plane)),
+        }
+        for plane, placed in all_planes(scene)
+    ]
+    return CUT_PLANE.array(precision, rows)
+
+
+def plane_orbits(scene: Scene, precision: Precision) -> list[Record]:
+    """The limits of each plane's orbits."""
+    return [orbit_record(scene.chain, _iterations(scene, plane), precision) for plane, _ in all_planes(scene)]
+
+
+def plane_palettes(scene: Scene) -> npt.NDArray[np.float32]:
+    """The palettes of all planes, shape (planes, 256, 3), linear Rec. 709."""
+    return np.stack([escape_palette(plane.colors) for plane, _ in all_planes(scene)])
+
+
+def _iterations(scene: Scene, plane: CutPlane) -> int:
+    return plane.iterations if plane.iterations is not None else scene.formula.iterations
+
+
+def _zoom(scene: Scene) -> tuple[float, npt.NDArray[np.float64]]:
+    """From the picture to where the formula is evaluated: a factor, and what is added."""
+    if not isinstance(scene.renderer, VolumeRenderer):
+        return 1.0, np.zeros(3)
+    shown, filled = used_boxes(scene, scene.renderer)
+    zoom = 1 / scene.renderer.magnification
+    return zoom, np.array(filled.center) - zoom * np.array(shown.center)
