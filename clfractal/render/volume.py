@@ -9,10 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
+from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Struct
+from clfractal.formulas.opencl import write_formula
 from clfractal.render import layout
 from clfractal.render.plan import Plan
+from clfractal.render.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
 from clfractal.render.view import scene_view
 from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.checks import used_boxes
@@ -59,7 +62,7 @@ VOLUME = Struct(
     ],
 )
 
-STRUCTS = (layout.VIEW, layout.LIGHT, layout.MATERIAL, GRID, VOLUME)
+STRUCTS = (layout.VIEW, layout.LIGHT, layout.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
 Floats = npt.NDArray[np.float32]
 
 
@@ -87,13 +90,18 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
         "ADAPTIVE": int(settings.noise is not None),
+        **plane_defines(scene),
         # What headers of the surface's colours ask for.
         "COLORING": 0,
         "COLORING_SOLID": 0,
         "COLORING_NORMAL": 1,
     }
     structs = "".join(struct.c_text() for struct in STRUCTS)
-    return flatten("volume.cl", generated={"structs.h": structs}, defines=defines)
+    generated = {"structs.h": structs}
+    if not scene.cut_planes:
+        return flatten("volume.cl", generated=generated, defines=defines)
+    generated["formula.h"] = write_formula(scene.chain).text
+    return flatten("volume.cl", generated=generated, defines=defines, user=["formula.h"])
 
 
 class VolumeWorker(TileWorker):
@@ -128,6 +136,7 @@ class VolumeWorker(TileWorker):
             self.grid.table,
             *(_one_of(self.grid.values, pool) for pool in four),
             *(_one_of(self.grid.normals, pool) for pool in four),
+            *(_plane_arguments(scene) if scene.cut_planes else []),
             channel_slots(plan),
         ]
 
@@ -217,6 +226,17 @@ def _mixed(
     at = [place for place, _ in stops]
     columns = zip(*(numbers for _, numbers in stops), strict=True)
     return np.stack([np.interp(values, at, column) for column in columns], axis=1)
+
+
+def _plane_arguments(scene: Scene) -> list[KernelArgument]:
+    """The cut planes, and the formula that they show, in the kernel's order."""
+    own = layout.orbit_record(scene.chain, scene.formula.iterations, "float32")
+    return [
+        plane_records(scene, "float32"),
+        np.stack([own, *plane_orbits(scene, "float32")]),
+        np.array(write_formula(scene.chain).constants, np.float32),
+        plane_palettes(scene),
+    ]
 
 
 def _zoom(scene: Scene) -> float:

@@ -1,0 +1,226 @@
+// One sample of a volume's pixel: the ray through the grid, its light and shadows, and the planes in the picture.
+#define HALVINGS 5   // of the step that met the surface
+
+#if HAS_SHADOWS
+// The part of a light that gets through to a point.
+INLINE real light_through(vec point, vec normal, vec toward, real distance, mask active, world w, real *steps) {
+    __constant const struct Grid *about = w.grid.about;
+    ray r;
+    r.origin = vec_along(point, (real)(w.settings->shadow_lift), normal);
+    r.direction = toward;
+    r.near = R(0.0);
+    r.far = distance;
+#if PLANES > 0
+    real side;
+    active &= planes_cut(&r, &side, w.planes);
+#endif
+    grid_ray g;
+    active &= enter(r, about, &g);
+    const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
+    real number = R(0.0), through = R(1.0);
+    for (int i = 0; i < w.settings->max_steps; ++i) {
+        if (!any_lane(active)) break;
+        const real t = g.near + number * step;
+        active &= less(t, g.far);
+        const cell c = cell_at(vec_along(g.origin, t, g.direction), about);
+        const ints entry = brick_at(c, w.grid);
+        const mask stored = active & less(R(-0.5), to_reals(entry));
+        *steps += pick(active, R(1.0), R(0.0));
+        real onward = number + R(1.0);
+        if (any_lane(active & ~stored)) {
+            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, steps_per_unit, number));
+        }
+        if (any_lane(stored)) {
+            const real value = grid_value(c, entry, stored, w.grid);
+#if SURFACE
+            through = pick(stored & less((real)(w.settings->level), value), R(0.0), through);
+#else
+            real opacity;
+            transfer_at(value, w.settings, w.transfer, &opacity);
+            through = pick(stored, through * (R(1.0) - opacity), through);
+#endif
+            active &= less(R(1.0) - (real)(w.settings->opacity_limit), through);
+        }
+        number = pick(active, onward, number);
+    }
+    return through;
+}
+#endif
+
+// The light that a place of the grid sends to the viewer.
+INLINE color lit(vec point, vec normal, color tint, vec to_viewer, mask active, world w, real *steps) {
+    color sum = color_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < w.settings->light_count; ++i) {
+        __constant const struct Light *light = w.lights + i;
+        const incidence in = light_at(light, point);
+        real share = R(1.0);
+#if HAS_SHADOWS
+        const mask facing = active & less(R(0.0), vec_dot(normal, in.toward));
+        if (light->shadow && any_lane(facing)) share = light_through(point, normal, in.toward, in.distance, facing, w, steps);
+#endif
+        const mask all_lanes = equal(R(0.0), R(0.0));
+        const color open = phong(tint, normal, to_viewer, in, all_lanes, R(1.0), light, w.material);
+        const color dark = phong(tint, normal, to_viewer, in, ~all_lanes, R(1.0), light, w.material);
+        sum = color_add(sum, color_mix(dark, open, share));
+    }
+    return sum;
+}
+
+// A place without a normal faces the viewer, and so does the far side of what is transparent.
+INLINE vec facing_normal(vec normal, vec to_viewer) {
+    const mask none = less(vec_dot(normal, normal), R(0.5));
+    const mask away = less(vec_dot(normal, to_viewer), R(0.0));
+    return vec_pick(none, to_viewer, vec_pick(away, vec_scale(normal, R(-1.0)), normal));
+}
+
+#if PLANES > 0
+// The plane at which a ray begins, or -1 where it begins outside the grid.
+INLINE real in_grid(ray r, real face, __constant const struct Grid *about) {
+    const vec offset = vec_sub(vec_along(r.origin, r.near, r.direction), vec_splat(about->corner));
+    const vec scale = vec_splat(about->scale);
+    const vec p = vec_of(offset.x * scale.x, offset.y * scale.y, offset.z * scale.z);
+    const mask inside = less_equal(R(0.0), fmin(p.x, fmin(p.y, p.z))) & less_equal(p.x, (real)((scalar)about->sides[0])) &
+                        less_equal(p.y, (real)((scalar)about->sides[1])) & less_equal(p.z, (real)((scalar)about->sides[2]));
+    return pick(inside, face, R(-1.0));
+}
+#endif
+
+INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, world w, real *steps) {
+    __constant const struct Grid *about = w.grid.about;
+    const ray r = camera_ray(x, y, lens_x, lens_y, w.view);
+    const vec to_viewer = vec_scale(r.direction, R(-1.0));
+    ray kept = r;
+    mask active = wanted;
+#if PLANES > 0
+    // Where a cutting plane lays the set bare, its face is what is seen.
+    real face, face_count = R(0.0);
+    color face_tint = color_of(R(0.0), R(0.0), R(0.0));
+    vec face_normal = to_viewer;
+    active &= planes_cut(&kept, &face, w.planes);
+    const mask bare = planes_face(kept, in_grid(kept, face, about), active, w.planes, &face_tint, &face_normal, &face_count);
+    active &= ~bare;
+#endif
+    grid_ray g;
+    active &= enter(kept, about, &g);
+    const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
+    const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
+    color seen = color_of(R(0.0), R(0.0), R(0.0));
+    real through = R(1.0), number = R(0.0), seen_t = R(0.0), seen_value = R(0.0), looked = R(0.0);
+    vec seen_normal = zero;
+    mask found = active & ~active;
+    for (int i = 0; i < w.settings->max_steps; ++i) {
+        if (!any_lane(active)) break;
+        const real t = g.near + number * step;
+        active &= less(t, g.far);
+        const cell c = cell_at(vec_along(g.origin, t, g.direction), about);
+        const ints entry = brick_at(c, w.grid);
+        const mask stored = active & less(R(-0.5), to_reals(entry));
+        looked += pick(active, R(1.0), R(0.0));
+        real onward = number + R(1.0);
+        real value = R(0.0);
+        if (any_lane(active & ~stored)) {
+            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, steps_per_unit, number));
+        }
+        if (any_lane(stored)) {
+            value = grid_value(c, entry, stored, w.grid);
+#if SURFACE
+            const mask met = stored & less_equal((real)(w.settings->level), value);
+            found |= met;
+            active &= ~met;
+#else
+            real opacity;
+            const color tint = transfer_at(value, w.settings, w.transfer, &opacity);
+            const mask adds = stored & less(R(0.0), opacity);
+            if (any_lane(adds)) {
+                const vec point = vec_along(r.origin, t, r.direction);
+                const vec normal = facing_normal(grid_normal(c, entry, adds, w.grid), to_viewer);
+#if COLOR_BY_NORMAL
+                const color base = color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
+#else
+                const color base = tint;
+#endif
+                const real share = through * opacity;
+                const color light = lit(point, normal, base, to_viewer, adds, w, &looked);
+                seen = color_pick(adds, color_add(seen, color_scale(light, share)), seen);
+                through = pick(adds, through * (R(1.0) - opacity), through);
+                // Where half of the light is stopped: what the data channels tell.
+                const mask half_way = adds & ~found & less_equal(through, R(0.5));
+                seen_t = pick(half_way, t, seen_t);
+                seen_value = pick(half_way, value, seen_value);
+                seen_normal = vec_pick(half_way, normal, seen_normal);
+                found |= half_way;
+                active &= less(R(1.0) - (real)(w.settings->opacity_limit), through);
+            }
+#endif
+        }
+        number = pick(active, onward, number);
+    }
+#if SURFACE
+    // The crossing lies between this place and the one before.
+    real low = fmax(g.near, g.near + (number - R(1.0)) * step), high = g.near + number * step;
+    cell c;
+    ints entry = (ints)(-1);
+    for (int i = 0; i < HALVINGS; ++i) {
+        if (!any_lane(found)) break;
+        const real middle = R(0.5) * (low + high);
+        c = cell_at(vec_along(g.origin, middle, g.direction), about);
+        entry = brick_at(c, w.grid);
+        const mask stored = found & less(R(-0.5), to_reals(entry));
+        const real value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
+        const mask inside = less_equal((real)(w.settings->level), value);
+        high = pick(inside, middle, high);
+        low = pick(inside, low, middle);
+    }
+    seen_t = high;
+    if (any_lane(found)) {
+        c = cell_at(vec_along(g.origin, seen_t, g.direction), about);
+        entry = brick_at(c, w.grid);
+        const mask stored = found & less(R(-0.5), to_reals(entry));
+        vec normal = grid_normal(c, entry, stored, w.grid);
+        const mask none = less(vec_dot(normal, normal), R(0.5));
+        // A ray that begins inside, at the grid's side, meets a flat face.
+        normal = vec_pick(none, to_viewer, normal);
+        const vec point = vec_along(r.origin, seen_t, r.direction);
+        real opacity;
+        const real value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
+        color base = transfer_at(value, w.settings, w.transfer, &opacity);
+#if COLOR_BY_NORMAL
+        base = color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
+#endif
+        seen = color_pick(found, lit(point, normal, base, to_viewer, found, w, &looked), seen);
+        through = pick(found, R(0.0), R(1.0));
+        seen_normal = normal;
+        seen_value = value;
+    }
+#endif
+    shot s;
+    s.coverage = R(1.0) - through;
+    s.hit = found;
+    color background = color_of(R(0.0), R(0.0), R(0.0));
+    if (!w.material->transparent) {
+        const real share = clamp(y / (real)((scalar)w.view->height), R(0.0), R(1.0));
+        background = color_mix(color_splat(w.material->background_top), color_splat(w.material->background_bottom), share);
+    }
+#if PLANES > 0
+    seen_t = pick(bare, kept.near, seen_t);
+    seen_value = pick(bare, face_count, seen_value);
+    seen_normal = vec_pick(bare, face_normal, seen_normal);
+    s.hit |= bare;
+    s.coverage = pick(bare, R(1.0), s.coverage);
+    seen = color_pick(bare, face_tint, seen);
+#endif
+    s.radiance = color_add(seen, color_scale(background, through));
+    s.point = vec_along(r.origin, seen_t, r.direction);
+    s.depth = vec_dot(vec_sub(s.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
+    s.normal = seen_normal;
+    s.smooth = seen_value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset);
+    s.steps = looked;
+    *steps += looked;
+#if PLANES > 0
+    // What is seen of the grid is weighted by its coverage already.
+    const color object = color_scale(seen, R(1.0) / fmax(s.coverage, R(1e-6)));
+    const real distance = pick(s.hit, seen_t, (real)(REAL_LARGEST));
+    s = planes_into(s, object, background, planes_seen(r, distance, wanted, w.planes), w.view);
+#endif
+    return s;
+}
