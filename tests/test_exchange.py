@@ -72,7 +72,11 @@ def test_a_scene_becomes_a_volume(shell: InProcess) -> None:
     assert np.array_equal(values[np.abs(radius - 1) > 1e-3], 255 * (radius < 1)[np.abs(radius - 1) > 1e-3])
     assert np.allclose(header["space directions"], STEP * np.eye(3), atol=1e-15)
     assert np.allclose(header["space origin"], CORNER + STEP / 2, atol=1e-15)
-    scene = load_scene(read_volume("ball.nrrd").texts[SCENE_KEY])
+    text = read_volume("ball.nrrd").texts[SCENE_KEY]
+    assert text.isascii()
+    assert "\n" not in text
+    assert ": " not in text
+    scene = load_scene(text)
     assert scene.renderer.type == "volume"
     assert scene.renderer.resolution == 36
 

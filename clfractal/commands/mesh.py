@@ -15,6 +15,7 @@ from clfractal.commands.voxelize import Order, Teller, fill, grid_volume, volume
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
+from clfractal.files.document import write_document
 from clfractal.files.mesh import EXTENSIONS, SINGLE_PRECISION, TOO_FINE, Mesh, is_too_fine, write_mesh
 from clfractal.files.nrrd import MAGIC
 from clfractal.files.regular import read_bytes
@@ -73,7 +74,7 @@ def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: 
         raise _nothing(order, found, close)
     if found.job is not None:
         mesh = _dressed(mesh, found.job, volume, tell, shell)
-    write_mesh(order.output, mesh, text=volume.texts.get(SCENE_KEY, ""))
+    write_mesh(order.output, mesh, text=write_document(found.job.resolved()) if found.job is not None else "")
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
     shell.say(
@@ -123,7 +124,7 @@ def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
 def _job_of(order: Order, volume: Volume, shell: Shell) -> Job | None:
     """The scene that made a volume, if it says so: it knows normals and colours."""
     text = volume.texts.get(SCENE_KEY)
-    if not text or "\n" not in text:
+    if not text or not ("\n" in text or text.startswith("{")):  # else it would be the name of a file
         return None
     from clfractal import job as jobs
     from clfractal.device.select import choose

@@ -164,13 +164,12 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
 
 def grid_volume(grid: Grid, job: Job) -> Volume:
     """The grid's values as they are stored, with where they are and the scene that made them."""
-    from clfractal.files.document import write_document
-
     settings = job.scene.renderer
     assert isinstance(settings, VolumeRenderer)
     corner, spacing = np.array(grid.corner), np.array(grid.spacing)
     texts = {
-        SCENE_KEY: write_document(job.resolved()),
+        # In one line, and without a colon before a space: VTK's reader takes what stands before one for a field.
+        SCENE_KEY: json.dumps(job.resolved(), separators=(",", ":")).replace(": ", ":\\u0020"),
         "value": settings.value,
         # What the bytes 0 and 255 stand for; floats are the value's own numbers.
         "range": f"{grid.range[0]:g} {grid.range[1]:g}",
