@@ -119,6 +119,7 @@ class _Filler:
         self.scene, self.renderer, self.device, self.lattice = scene, renderer, device, lattice
         self.lanes, self.precision, self.progress = lanes, precision, progress
         self.sub_points = renderer.sub_points if renderer.value == "coverage" else 1
+        self.formula = write_formula(scene.chain)
         self.stats = GridStats()
 
     def run(self, on_compile: Callable[[str], None] | None) -> Grid:
@@ -128,15 +129,15 @@ class _Filler:
         sample: Kind = "byte" if renderer.value == "inside" else renderer.store
         source: programs.Source = "bits" if renderer.value == "inside" else "bricks"
         recipes = [
-            programs.fill_recipe(chain, renderer, self.lanes, self.precision),
+            programs.fill_recipe(chain, self.formula, renderer, self.lanes, self.precision),
             programs.store_recipe(source, sample, renderer.store, renderer.normal_radius),
         ]
         if octree:
-            recipes.append(programs.nodes_recipe(chain, self.lanes, self.precision))
+            recipes.append(programs.nodes_recipe(chain, self.formula, self.lanes, self.precision))
         if not whole:
             recipes.append(programs.classify_recipe(source, sample))
         if renderer.normals != "gradient":
-            recipes.append(programs.normals_recipe(chain, renderer, self.lanes, self.precision))
+            recipes.append(programs.normals_recipe(chain, self.formula, renderer, self.lanes, self.precision))
         built = programs.build_all(self.device, recipes, on_compile)
         kernels = {recipe.kernel: each for recipe, each in zip(recipes, built, strict=True)}
         start = time.perf_counter()
@@ -171,7 +172,7 @@ class _Filler:
             self.lattice.axes(precision, self.sub_points),
             self.lattice.record(precision, self.sub_points, NODE_SAFETY * chain.step_scale).reshape(1),
             orbit_record(chain, iterations, precision).reshape(1),
-            np.array(write_formula(chain).constants, precision),
+            np.array(self.formula.constants, precision),
         ]
         self.constants = [upload(self.device, record) for record in records]
         packets = 512 / self.lanes * self.sub_points**3

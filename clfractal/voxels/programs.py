@@ -17,7 +17,7 @@ from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
-from clfractal.formulas.opencl import write_formula
+from clfractal.formulas.opencl import FormulaText
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.grid import SAMPLE_BYTES, Kind
 from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
@@ -47,13 +47,13 @@ _FLOAT = Argument("scalar", dtype="float32")
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """A program to build: its text's entry file and defines, its kernel, and the groups that it runs in."""
+    """A program to build: its text's entry file, defines and formula, its kernel, and the groups that it runs in."""
 
     entry: str
     kernel: str
     defines: dict[str, object]
     precision: Precision
-    chain: Chain | None
+    formula: str | None
     items: int
     group: tuple[int, int]
     arguments: tuple[Argument, ...]
@@ -87,10 +87,10 @@ def build_all(
             on_compile(line)
 
     def build(recipe: Recipe) -> Built:
-        structs = EXTENT.c_text() if recipe.chain is None else ORBIT.c_text() + LATTICE.c_text()
+        structs = EXTENT.c_text() if recipe.formula is None else ORBIT.c_text() + LATTICE.c_text()
         generated = {"structs.h": structs}
-        if recipe.chain is not None:
-            generated["formula.h"] = write_formula(recipe.chain).text
+        if recipe.formula is not None:
+            generated["formula.h"] = recipe.formula
         text = flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
         key = (recipe.kernel, text.text)
         if key in loaded:
@@ -109,21 +109,23 @@ def build_all(
         return list(pool.map(build, recipes))
 
 
-def nodes_recipe(chain: Chain, lanes: int, precision: Precision) -> Recipe:
+def nodes_recipe(chain: Chain, formula: FormulaText, lanes: int, precision: Precision) -> Recipe:
     """`empty_nodes`: which nodes of the octree hold nothing."""
     return Recipe(
         "voxels_nodes.cl",
         "empty_nodes",
         _formula_defines(chain, lanes, precision),
         precision,
-        chain,
+        formula.text,
         1,
         (1, max(NODE_POINTS // lanes, 1)),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
     )
 
 
-def fill_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
+def fill_recipe(
+    chain: Chain, formula: FormulaText, renderer: VolumeRenderer, lanes: int, precision: Precision
+) -> Recipe:
     """`fill_bricks`: the values of bricks' voxels."""
     sample: Kind = "byte" if renderer.value == "inside" else renderer.store
     items = BRICK**3 // max(lanes * (1 if lanes == 1 else PACKETS), 8)
@@ -137,7 +139,7 @@ def fill_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: P
             **_sample_defines(sample),
         },
         precision,
-        chain,
+        formula.text,
         items,
         (items, 1),
         (_BUFFER, _BUFFER, _INT, _BUFFER, _FLOAT, *[_BUFFER] * 4),
@@ -171,7 +173,9 @@ def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int) -> Recip
     return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, 1, BRICK_GROUP, arguments)
 
 
-def normals_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
+def normals_recipe(
+    chain: Chain, formula: FormulaText, renderer: VolumeRenderer, lanes: int, precision: Precision
+) -> Recipe:
     """`refine_normals`: normals of samples at the surface by `least_squares` or `exact`."""
     return Recipe(
         "voxels_normals.cl",
@@ -182,7 +186,7 @@ def normals_recipe(chain: Chain, renderer: VolumeRenderer, lanes: int, precision
             "NORMALS": NORMALS.index(renderer.normals),
         },
         precision,
-        chain,
+        formula.text,
         1,
         (1, 1),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
