@@ -11,8 +11,8 @@ from typing import Any
 
 from clfractal.device import probe, tune
 from clfractal.device.select import DeviceInfo, by_key, vectorises_across_work_items
-from clfractal.render import engine
 from clfractal.render.film import Film
+from clfractal.render.loop import render_one
 from clfractal.render.plan import make_plan
 from clfractal.scene.load import load_scene
 
@@ -43,5 +43,5 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     times = []
     for _ in range(_RENDERS):
         film = Film(plan.channels, (_SIDE, _SIDE), plan.region)
-        times.append(engine.render(scene, plan, device, film).kernel_ms)
+        times.append(render_one(scene, plan, device, film).kernel_ms)
     return {**answer, "milliseconds": max(min(times), 1e-3)}

@@ -6,6 +6,7 @@ from math import dist
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.layout import MAX_LAYOUT_PIXELS
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -28,6 +29,8 @@ def check_parts(scene: Scene) -> None:
     if isinstance(scene.renderer, VolumeRenderer):
         used_boxes(scene, scene.renderer)
     _check_planes(scene)
+    if scene.layout is not None:
+        _check_views(scene)
     _check_lights(scene)
 
 
@@ -75,6 +78,22 @@ def _check_step(step: float | None, radius: float, path: str) -> None:
             f" got {step:g}",
             Where(path=path),
         )
+
+
+def _check_views(scene: Scene) -> None:
+    """Every view is a scene of its own, and wrong or right by itself."""
+    pixels = scene.image.width * scene.image.height
+    if pixels > MAX_LAYOUT_PIXELS:
+        raise SceneError(
+            f"must be at most {MAX_LAYOUT_PIXELS:,} pixels with a layout, got {pixels:,}", Where(path="image")
+        )
+    for number, (view, _) in enumerate(scene.views):
+        try:
+            check_parts(view)
+        except SceneError as error:
+            raise SceneError(
+                error.message, Where(path=f"layout.views.{number}.{error.where.path}")
+            ) from error
 
 
 def _check_planes(scene: Scene) -> None:

@@ -15,6 +15,7 @@ from clfractal.scene.base import Section
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
 from clfractal.scene.formula import FormulaSpec
+from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
@@ -41,6 +42,7 @@ class Scene(Section):
     environment: Environment | None = None
     fog: Fog | None = None
     cut_planes: CutPlanes = Field((), description="planes that stand in the picture, or cut the object open")
+    layout: Layout | None = Field(None, description="several views in one picture; one if null")
     output: Output = Field(default_factory=dict, validate_default=True)
 
     @cached_property
@@ -86,6 +88,28 @@ class Scene(Section):
         from clfractal.scene.environment import read_map
 
         return read_map(self.environment, self.folder)
+
+    @cached_property
+    def views(self) -> "list[tuple[Scene, Place]]":
+        """The views of the layout, each a scene of its own, and their places in the picture.
+
+        Raises:
+            SceneError: there is no room for one.
+        """
+        from clfractal.errors import SceneError, Where
+
+        assert self.layout is not None
+        found = []
+        places = self.layout.places(self.image.width, self.image.height)
+        for number, (view, place) in enumerate(zip(self.layout.views, places, strict=True)):
+            if place.width < 1 or place.height < 1:
+                raise SceneError(
+                    f"there is no room for it in a picture of {self.image.width} x {self.image.height} pixels",
+                    Where(path=f"layout.views.{number}"),
+                )
+            image = Image(width=place.width, height=place.height)
+            found.append((self.model_copy(update={**view.changes(), "image": image, "layout": None}), place))
+        return found
 
     @property
     def surface(self) -> SurfaceRenderer:

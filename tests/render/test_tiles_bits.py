@@ -11,7 +11,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes, best_lanes
-from clfractal.render import engine
+from clfractal.render import engine, loop
 from clfractal.render.engine import Progress
 from clfractal.render.film import Film
 from clfractal.render.store import JournalFilm
@@ -86,7 +86,7 @@ def test_batches(
     capacity: int,
 ) -> None:
     """How many tiles are launched at once, in which order."""
-    monkeypatch.setattr(engine, "CAPACITY", capacity)
+    monkeypatch.setattr(loop, "CAPACITY", capacity)
     assert same(stacked(shoot(SCENES[name], device)), wholes[name])
 
 
@@ -95,8 +95,8 @@ def test_tiles_in_parts(
     device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """A budget so short that every tile takes many launches."""
-    monkeypatch.setattr(engine, "BATCH_SECONDS", 1e-6)
-    monkeypatch.setattr(engine, "CAPACITY", 1)
+    monkeypatch.setattr(loop, "BATCH_SECONDS", 1e-6)
+    monkeypatch.setattr(loop, "CAPACITY", 1)
     launches = []
     scene = SCENES[name]
     plan = plan_of(scene, device)
@@ -119,7 +119,7 @@ def test_statistics_do_not_depend_on_batches(device: Device, monkeypatch: pytest
 
     at_once = counted()
     assert at_once[0] == 3 * 100 * 75
-    monkeypatch.setattr(engine, "BATCH_SECONDS", 1e-6)
+    monkeypatch.setattr(loop, "BATCH_SECONDS", 1e-6)
     assert counted() == at_once
 
 
@@ -149,7 +149,7 @@ def test_interrupted_and_resumed(
     tmp_path: Path,
 ) -> None:
     """A journal left by a render that ended after some tiles is continued to the same picture."""
-    monkeypatch.setattr(engine, "CAPACITY", 1)
+    monkeypatch.setattr(loop, "CAPACITY", 1)
     scene = SCENES["hast"]
     plan = plan_of(scene, device)
 

@@ -1,0 +1,94 @@
+"""Several views in one picture, as the thesis's split window has them."""
+
+from dataclasses import dataclass
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.scene.base import Color, Fraction, Section, problem
+from clfractal.scene.coloring import Coloring
+from clfractal.scene.cut_plane import CutPlanes
+from clfractal.scene.lighting import Environment, Fog, Lights
+from clfractal.scene.parts import Background, Camera, Material
+from clfractal.scene.renderer import Renderer
+
+MAX_VIEWS = 16
+# A picture of several views is kept in memory.
+MAX_LAYOUT_PIXELS = 2**25
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a view lies in the picture: its top left corner and its size, pixels."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+class LayoutView(Section):
+    """One view: what it has in the place of the scene's own."""
+
+    area: Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)] | None = Field(
+        None,
+        description="left, top, width and height as parts of the picture; the next cell of the grid if null",
+    )
+    camera: Camera | None = None
+    renderer: Renderer | None = None
+    lights: Lights | None = None
+    material: Material | None = None
+    coloring: Coloring | None = None
+    background: Background | None = None
+    environment: Environment | None = None
+    fog: Fog | None = None
+    cut_planes: CutPlanes | None = None
+
+    @model_validator(mode="after")
+    def _within(self) -> Self:
+        if self.area is not None:
+            left, top, width, height = self.area
+            if width <= 0 or height <= 0 or left + width > 1 + 1e-9 or top + height > 1 + 1e-9:
+                raise problem("must lie within the picture, [0, 0, 1, 1], and not be empty", "area")
+        return self
+
+    def changes(self) -> dict[str, object]:
+        """The sections that the view has of its own."""
+        names = [name for name in type(self).model_fields if name != "area"]
+        return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
+
+
+class Layout(Section):
+    """Views in a grid, from left to right and from top to bottom, or wherever their `area` says."""
+
+    views: Annotated[tuple[LayoutView, ...], Field(strict=False, min_length=1, max_length=MAX_VIEWS)]
+    columns: Annotated[int, Field(strict=True, ge=1, le=MAX_VIEWS)] | None = Field(
+        None, description="cells of a row; one row if null"
+    )
+    gap: int = Field(0, ge=0, le=1024, description="between cells, pixels")
+    background: Color = Field((0.0, 0.0, 0.0), description="of gaps, linear Rec. 709")
+
+    def places(self, width: int, height: int) -> list[Place]:
+        """Where each view lies in a picture of `width` x `height` pixels; a place may be empty."""
+        columns = self.columns or sum(1 for view in self.views if view.area is None) or 1
+        cells = sum(1 for view in self.views if view.area is None)
+        rows = max(-(-cells // columns), 1)
+        across, down = _cells(width, columns, self.gap), _cells(height, rows, self.gap)
+        found, cell = [], 0
+        for view in self.views:
+            if view.area is None:
+                (x, w), (y, h) = across[cell % columns], down[cell // columns]
+                cell += 1
+            else:
+                left, top, wide, high = view.area
+                x, y = round(left * width), round(top * height)
+                w, h = round((left + wide) * width) - x, round((top + high) * height) - y
+            found.append(Place(x, y, w, h))
+        return found
+
+
+def _cells(length: int, count: int, gap: int) -> list[tuple[int, int]]:
+    """Begin and length of each of `count` cells with gaps between them."""
+    room = length - gap * (count - 1)
+    edges = [number * room // count + number * gap for number in range(count + 1)]
+    return [(edges[number], edges[number + 1] - gap - edges[number]) for number in range(count)]
