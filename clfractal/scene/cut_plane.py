@@ -43,8 +43,10 @@ class CutPlaneRenderer(Sampled):
 
     tag = "cut_plane"
     type: Literal["cut_plane"] = "cut_plane"
-    plane: Plane = Field(default_factory=dict, validate_default=True)
-    colors: EscapeColors = Field(default_factory=dict, validate_default=True)
+    plane: Plane = Field(default_factory=dict, validate_default=True, description="where it lies")
+    colors: EscapeColors = Field(
+        default_factory=dict, validate_default=True, description="colours by escape counts"
+    )
     periodicity: bool = Field(
         True, description="whether points inside are found early, by orbits that come back"
     )
@@ -53,8 +55,10 @@ class CutPlaneRenderer(Sampled):
 class CutPlane(Section):
     """A plane that stands in the picture of the object, coloured by escape counts."""
 
-    plane: Plane = Field(default_factory=dict, validate_default=True)
-    colors: EscapeColors = Field(default_factory=dict, validate_default=True)
+    plane: Plane = Field(default_factory=dict, validate_default=True, description="where it lies")
+    colors: EscapeColors = Field(
+        default_factory=dict, validate_default=True, description="colours by escape counts"
+    )
     opacity: Fraction = Field(0.8, description="of the plane outside the set; 0: not shown there")
     cut: bool = Field(False, description="whether the object in front of the plane is removed")
     iterations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] | None = Field(
