@@ -293,13 +293,14 @@ class _Block:
         local = base - self.start
         on_edge = axis != _CENTER
         with np.errstate(all="ignore"):  # values may be infinite, or none
-            points[on_edge], slopes[on_edge] = self._on_edges(local[on_edge], axis[on_edge])
+            field = self._slopes()
+            points[on_edge], slopes[on_edge] = self._on_edges(local[on_edge], axis[on_edge], field)
             if not on_edge.all():
-                points[~on_edge], slopes[~on_edge] = self._in_cells(local[~on_edge])
+                points[~on_edge], slopes[~on_edge] = self._in_cells(local[~on_edge], field)
         slopes[~np.isfinite(slopes)] = 0
         return points, slopes
 
-    def _on_edges(self, local: Keys, axis: Keys) -> tuple[Doubles, Doubles]:
+    def _on_edges(self, local: Keys, axis: Keys, field: list[Values]) -> tuple[Doubles, Doubles]:
         step = np.eye(3, dtype=np.int64)[2 - axis]
         ends = [local, local + step]
         d = [self.differences[tuple(end.T)].astype(np.float64) for end in ends]
@@ -311,12 +312,14 @@ class _Block:
         t[cut] = 0.5
         # Whole numbers of the whole grid first: rounded the same in every brick.
         points = (local + self.start + t[:, None] * step)[:, ::-1]
-        slopes = (1 - t)[:, None] * self._slopes(local) + t[:, None] * self._slopes(ends[1])
+        slopes = np.stack(
+            [(1 - t) * each[_kept(ends[0], each)] + t * each[_kept(ends[1], each)] for each in field], axis=1
+        )
         # A cut face looks out of the box.
         slopes[cut] = (step * (beyond[0].astype(np.int64) - beyond[1])[:, None])[cut][:, ::-1]
         return points, slopes
 
-    def _in_cells(self, local: Keys) -> tuple[Doubles, Doubles]:
+    def _in_cells(self, local: Keys, field: list[Values]) -> tuple[Doubles, Doubles]:
         """The middle of the places where the surface crosses the edges of a cell."""
         sums, slopes, counts = np.zeros((len(local), 3)), np.zeros((len(local), 3)), np.zeros(len(local))
         for axis in range(3):
@@ -327,7 +330,7 @@ class _Block:
                 begin = local + offset
                 end = begin + np.eye(3, dtype=np.int64)[2 - axis]
                 crosses = np.flatnonzero(self._is_inside(begin) != self._is_inside(end))
-                place, slope = self._on_edges(begin[crosses], np.full(len(crosses), axis))
+                place, slope = self._on_edges(begin[crosses], np.full(len(crosses), axis), field)
                 sums[crosses] += place
                 slopes[crosses] += slope
                 counts[crosses] += 1
@@ -337,20 +340,40 @@ class _Block:
         index = tuple(at.T)
         return np.asarray((self.differences[index] >= 0) & ~self.outside[index])
 
-    def _slopes(self, at: Keys) -> Doubles:
-        """Central differences along x, y, z, weighted 1 2 1 along the two other axes (Sobel's): (n, 3)."""
-        found = np.zeros((len(at), 3))
-        flat = self.differences.reshape(-1)
-        strides = np.array(self.differences.strides) // self.differences.itemsize
-        # The margin is missing where a sample of the padding is asked for: its neighbour inside stands in.
-        kept = np.clip(at, 1, np.array(self.differences.shape) - 2)
-        index = kept @ strides
-        for offset in product((-1, 0, 1), repeat=3):
-            if any(offset):
-                value = flat[index + int(np.dot(offset, strides))]
-                for axis in range(3):
-                    along = offset[2 - axis]
-                    if along:
-                        others = sum(abs(o) for o in offset) - 1
-                        found[:, axis] += value * (along * (4, 2, 1)[others] / 32)
-        return found
+    def _slopes(self) -> list[Values]:
+        """Central differences along x, y, z of the block's inner samples, weighted 1 2 1 along the others (Sobel's)."""
+        d = self.differences
+        if d.dtype.kind == "f":
+            # Of a jump by more than this only the direction matters, and sums stay finite.
+            d = np.clip(np.nan_to_num(d), -1e30, 1e30)
+        blurred_x = _blur(d, 2)
+        return [
+            _blur(_blur(_difference(d, 2), 1), 0),
+            _blur(_difference(blurred_x, 1), 0),
+            _difference(_blur(blurred_x, 1), 0),
+        ]
+
+
+def _kept(at: Keys, inner: Values) -> tuple[Keys, ...]:
+    """Samples of a block among its inner ones; of those that the margin has its neighbour inside."""
+    return tuple(np.clip(at[:, axis] - 1, 0, inner.shape[axis] - 1) for axis in range(3))
+
+
+def _along(axis: int, part: slice) -> tuple[slice, ...]:
+    return tuple(part if a == axis else slice(None) for a in range(3))
+
+
+def _difference(d: Values, axis: int) -> Values:
+    """Half of what changes from the sample before to the one after; one sample less at both ends."""
+    result: Values = d[_along(axis, slice(2, None))] - d[_along(axis, slice(0, -2))]
+    result *= 0.5
+    return result
+
+
+def _blur(d: Values, axis: int) -> Values:
+    """Weighted 1 2 1; one sample less at both ends."""
+    result: Values = d[_along(axis, slice(2, None))] + d[_along(axis, slice(0, -2))]
+    result *= 0.5
+    result += d[_along(axis, slice(1, -1))]
+    result *= 0.5
+    return result
