@@ -73,6 +73,7 @@ class Job:
             "scene": scene,
             # The scene only names its map, and the file may be another one by now.
             "environment": surroundings.digest() if surroundings is not None else None,
+            "grid": self.scene.given.digest() if self.scene.given is not None else None,
             "version": clfractal.__version__,
             "device": self.device.info.name,
             "driver": self.device.info.key,

@@ -76,6 +76,8 @@ def finest_steps(scene: Scene, view: View) -> float:
 
 def _finest_voxels(scene: Scene, renderer: VolumeRenderer) -> float:
     """Of a volume it is the voxels that are evaluated; their coordinates are found in float64, and rounded once."""
+    if renderer.file is not None:
+        return math.inf
     _, box = used_boxes(scene, renderer)
     sides = np.array(box.sides)
     resolution = renderer.resolution if isinstance(renderer.resolution, tuple) else (renderer.resolution,) * 3

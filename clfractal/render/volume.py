@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,9 +20,11 @@ from clfractal.render.planes import CUT_PLANE, plane_defines, plane_orbits, plan
 from clfractal.render.view import scene_view
 from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.checks import used_boxes
+from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
 
@@ -97,10 +100,9 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "COLORING_NORMAL": 1,
     }
     structs = "".join(struct.c_text() for struct in STRUCTS)
-    generated = {"structs.h": structs}
-    if not scene.cut_planes:
-        return flatten("volume.cl", generated=generated, defines=defines)
-    generated["formula.h"] = write_formula(scene.chain).text
+    # The formula is needed where planes show it.
+    formula = write_formula(scene.chain).text if scene.cut_planes else ""
+    generated = {"structs.h": structs, "formula.h": formula}
     return flatten("volume.cl", generated=generated, defines=defines, user=["formula.h"])
 
 
@@ -117,14 +119,7 @@ class VolumeWorker(TileWorker):
         scene, plan = self.scene, self.plan
         settings = settings_of(scene)
         width, height = scene.image.width, scene.image.height
-        self.grid = fill_grid(
-            scene,
-            settings,
-            self.device,
-            lanes=plan.lanes,
-            precision=plan.precision,
-            on_compile=self.on_compile,
-        )
+        self.grid = self._fill(settings)
         four = (0, 1, 2, 3)
         return [
             layout.view_record(scene_view(scene), width, height, plan.region, "float32"),
@@ -132,7 +127,7 @@ class VolumeWorker(TileWorker):
             grid_record(scene, self.grid),
             layout.material_record(scene, "float32"),
             layout.light_records(scene, "float32"),
-            transfer_table(scene, self.grid),
+            transfer_table(scene, value_range(scene, self.grid)),
             self.grid.table,
             *(_one_of(self.grid.values, pool) for pool in four),
             *(_one_of(self.grid.normals, pool) for pool in four),
@@ -140,14 +135,49 @@ class VolumeWorker(TileWorker):
             channel_slots(plan),
         ]
 
+    def _fill(self, settings: VolumeRenderer) -> Grid:
+        given = self.scene.given
+        if given is None:
+            return fill_grid(
+                self.scene,
+                settings,
+                self.device,
+                lanes=self.plan.lanes,
+                precision=self.plan.precision,
+                on_compile=self.on_compile,
+            )
+        return grid_from_dense(
+            given.values,
+            self.device,
+            corner=given.corner,
+            spacing=given.spacing,
+            threshold=least_visible(settings, given),
+            normal_radius=settings.normal_radius,
+            on_compile=self.on_compile,
+        )
+
+
+def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
+    """The value up to which a grid's voxels cannot be seen; None if the least can."""
+    stops = settings.transfer.opacity
+    if stops is None:
+        return float(np.nextafter(np.float32((given.low + given.high) / 2), np.float32(-np.inf)))
+    for before, stop in pairwise(stops):
+        if before.opacity == 0 and stop.opacity > 0:
+            return before.at if stops[0].opacity == 0 else None
+    return None if stops[0].opacity > 0 else stops[-1].at
+
 
 def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
     """Where the grid lies in the picture: in the first box, whatever is zoomed to."""
     shown, _ = used_boxes(scene, settings_of(scene))
+    middle = np.array(shown.center)
+    if scene.given is not None:
+        middle = np.array(grid.corner) + np.array(grid.spacing) * np.array(grid.shape) / 2
     # A resolution that does not divide the box evenly goes past it a little.
     size = np.array(grid.spacing) * np.array(grid.shape) * _zoom(scene)
     values = {
-        "corner": np.array(shown.center) - size / 2,
+        "corner": middle - size / 2,
         "scale": np.array(grid.shape) / size,
         "sides": grid.shape,
         "bricks": grid.bricks,
@@ -195,17 +225,18 @@ def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
     """The values between which the transfer table lies: those of its stops, or of the grid."""
     transfer = settings_of(scene).transfer
     stops = [stop.at for stop in transfer.opacity or ()] + [stop.at for stop in transfer.color or ()]
-    stops = stops or list(grid.range)
+    if not stops:
+        given = scene.given
+        stops = list(grid.range) if given is None else [given.low, given.high]
     low, high = min(stops), max(stops)
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
-def transfer_table(scene: Scene, grid: Grid) -> Floats:
-    """Opacity of one step, red, green and blue (linear) at TRANSFER_SIZE values; shape (TRANSFER_SIZE, 4)."""
+def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
+    """Opacity of one step, red, green and blue (linear) at values from `limits[0]` to `limits[1]`; shape (TRANSFER_SIZE, 4)."""
     settings = settings_of(scene)
     transfer = settings.transfer
-    low, high = value_range(scene, grid)
-    values = np.linspace(low, high, TRANSFER_SIZE)
+    values = np.linspace(*limits, TRANSFER_SIZE)
     table = np.empty((TRANSFER_SIZE, 4))
     if transfer.opacity is None:
         table[:, 0] = 1.0

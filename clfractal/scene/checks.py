@@ -27,7 +27,7 @@ def check_parts(scene: Scene) -> None:
         _check_step(scene.renderer.step, radius, "renderer.step")
         _check_residual(scene, scene.renderer)
     if isinstance(scene.renderer, VolumeRenderer):
-        used_boxes(scene, scene.renderer)
+        _check_volume(scene, scene.renderer)
     _check_planes(scene)
     if scene.layout is not None:
         _check_views(scene)
@@ -38,6 +38,19 @@ def used_bounds(scene: Scene) -> tuple[Vector, float]:
     """Centre and radius of the ball that is looked in, scene units: the renderer's, or the formula's own."""
     bounds = scene.renderer.bounds if isinstance(scene.renderer, SurfaceRenderer) else None
     return (bounds.center, bounds.radius) if bounds else (scene.chain.center, scene.chain.radius)
+
+
+def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
+    used_boxes(scene, renderer)
+    if renderer.file is not None and renderer.zoom:
+        raise SceneError(
+            "a file's grid has no more to zoom to; remove zoom or file", Where(path="renderer.zoom")
+        )
+    if scene.coloring.by not in ("solid", "normal"):
+        raise SceneError(
+            f"must be solid or normal for a volume, got {scene.coloring.by}; renderer.transfer.color colours values",
+            Where(path="coloring.by"),
+        )
 
 
 def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:

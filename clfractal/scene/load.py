@@ -145,6 +145,7 @@ def _checked(document: Document, folder: Path) -> Scene:
             if scene.environment.file is not None:
                 # Kept in the scene, so that what is rendered is what was checked.
                 _ = scene.surroundings
+        _ = scene.given
     except (SceneError, FileError) as error:
         raise document.locate(error) from error
     return scene

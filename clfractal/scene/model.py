@@ -24,6 +24,7 @@ from clfractal.scene.surface import SurfaceRenderer
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
     from clfractal.scene.environment import EnvironmentMap
+    from clfractal.scene.given import GivenGrid
 
 
 class Scene(Section):
@@ -67,7 +68,8 @@ class Scene(Section):
         copied = super().model_copy()
         # Beside the fields, as cached properties are: it is no part of what a scene says.
         copied.__dict__["folder"] = folder
-        copied.__dict__.pop("surroundings", None)
+        for derived in ("surroundings", "given", "views"):
+            copied.__dict__.pop(derived, None)
         return copied
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -88,6 +90,21 @@ class Scene(Section):
         from clfractal.scene.environment import read_map
 
         return read_map(self.environment, self.folder)
+
+    @cached_property
+    def given(self) -> "GivenGrid | None":
+        """The grid that a volume scene shows in place of its formula; of a loaded scene it has been read and checked.
+
+        Raises:
+            FileError: its file is missing or wrong; the path says where.
+        """
+        from clfractal.scene.volume import VolumeRenderer
+
+        if not isinstance(self.renderer, VolumeRenderer) or self.renderer.file is None:
+            return None
+        from clfractal.scene.given import read_given
+
+        return read_given(self.renderer, self.folder)
 
     @cached_property
     def views(self) -> "list[tuple[Scene, Place]]":
