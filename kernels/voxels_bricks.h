@@ -21,10 +21,14 @@
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
+// Instead of a brick's number: all its voxels are outside, or inside as a whole.
+#define ALL_OUTSIDE -1
+#define ALL_INSIDE -2
+
 // Where a brick's voxels are.
 typedef struct {
     int x, y, z;   // the brick's place
-    int near[27];  // the evaluated bricks around it, x fastest; -1: outside the solid throughout, 0
+    int near[27];  // the evaluated bricks around it, x fastest; or one of these:
 } surroundings;
 
 #if SOURCE == SOURCE_SLAB
@@ -48,7 +52,7 @@ INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __
                 const bool there = x >= 0 && x < extent->bricks[0] && y >= 0 && y < extent->bricks[1] && z >= 0 &&
                                    z < extent->bricks[2];
                 const size_t place_in_table = ((size_t)z * extent->bricks[1] + y) * extent->bricks[0] + x;
-                around.near[next++] = there ? numbers[place_in_table] : -1;
+                around.near[next++] = there ? numbers[place_in_table] : ALL_OUTSIDE;
             }
         }
     }
@@ -75,7 +79,7 @@ typedef struct {
 
 // An octant's bits: the two least bytes are the layer z = 0 of it, the least four bits its row y = 0.
 INLINE uint2 octant_bits(__global const SAMPLE *samples, int number, int octant) {
-    if (number < 0) return (uint2)(0, 0);
+    if (number < 0) return (uint2)(number == ALL_INSIDE ? 0xffffffffu : 0u);
     return as_uint2(vload8(0, samples + (size_t)number * 64 + 8 * octant));
 }
 
@@ -161,10 +165,12 @@ INLINE int row_of(const surroundings *around, int y, int z, __constant const str
     const int octant = ((row_z >> 1) & 2) | ((row_y >> 2) & 1);
     return OCTANT_VOXELS * 2 * octant + 16 * (row_z & 3) + 4 * (row_y & 3);
 }
-INLINE void row_part(float *part, __global const SAMPLE *samples, int number, int place) {
+INLINE void row_part(float *part, __global const SAMPLE *samples, int number, int place,
+                     __constant const struct Extent *extent) {
+    const float uniform = number == ALL_INSIDE ? extent->whole : 0.0f;
     for (int i = 0; i < BRICK; ++i) {
         const int voxel = place + (i < 4 ? i : i - 4 + OCTANT_VOXELS);
-        part[i] = number < 0 ? 0.0f : (float)samples[(size_t)number * 512 + voxel];
+        part[i] = number < 0 ? uniform : (float)samples[(size_t)number * 512 + voxel];
     }
 }
 INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
@@ -172,9 +178,9 @@ INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, 
     row r;
     int first;
     const int place = row_of(around, y, z, extent, &first);
-    row_part(r.value, samples, around->near[first], place);
-    row_part(r.value + 8, samples, around->near[first + 1], place);
-    row_part(r.value + 16, samples, around->near[first + 2], place);
+    row_part(r.value, samples, around->near[first], place, extent);
+    row_part(r.value + 8, samples, around->near[first + 1], place, extent);
+    row_part(r.value + 16, samples, around->near[first + 2], place, extent);
     for (int i = 0; i < BRICK; ++i) {
         if (around->x == 0) r.value[i] = r.value[8];
         if (around->x == extent->bricks[0] - 1) r.value[16 + i] = r.value[15];

@@ -66,18 +66,19 @@ INLINE void packet_values(ulong place, int first, real *values, __global const s
 #endif
 }
 
-// samples: of each brick its voxels; of FILL_INSIDE a bit each. `skip`: of each brick which of its octants hold nothing.
-// `scale`: of a value that is kept in 8 bits.
-__kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks, int first, __global const uchar *skip,
+// samples: of each brick its voxels; of FILL_INSIDE a bit each. `known`: two bytes of each brick, which of its octants hold
+// nothing, and which nothing else. `scale`: of a value that is kept in 8 bits.
+__kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks, int first, __global const uchar *known,
                           float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
                           __constant const struct Orbit *orbit, __constant const scalar *k) {
     const size_t brick = (size_t)first + get_global_id(1);
     const int item = (int)get_global_id(0) * ITEM_VOXELS;
     const ulong place = bricks[brick];
-    const bool skipped = ((skip[brick] >> (item / OCTANT_VOXELS)) & 1) != 0;
+    const int octant = item / OCTANT_VOXELS;
+    const bool empty = ((known[2 * brick] >> octant) & 1) != 0, full = ((known[2 * brick + 1] >> octant) & 1) != 0;
 #if FILL_KIND == FILL_INSIDE
-    uint bits = 0;
-    for (int part = 0; part < ITEM_VOXELS && !skipped; part += LANES * PACKETS) {
+    uint bits = full ? 0xffffffffu : 0u;
+    for (int part = 0; part < ITEM_VOXELS && !empty && !full; part += LANES * PACKETS) {
         vec points[PACKETS];
         mask inside[PACKETS];
         #pragma unroll
@@ -92,8 +93,8 @@ __kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks
     __global SAMPLE *values = samples + brick * BRICK_VOXELS + item;
     for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {
         real found[PACKETS];
-        for (int p = 0; p < PACKETS; ++p) found[p] = R(0.0);
-        if (!skipped) packet_values(place, item + part, found, axes, lattice, orbit, k);
+        for (int p = 0; p < PACKETS; ++p) found[p] = full ? R(1.0) : R(0.0);
+        if (!empty && !full) packet_values(place, item + part, found, axes, lattice, orbit, k);
         for (int p = 0; p < PACKETS; ++p) {
             scalar each[LANES];
             lanes_store(found[p], each);

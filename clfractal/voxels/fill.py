@@ -22,7 +22,7 @@ from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels import programs
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import Lattice, Places, all_places, lattice_of, unpack_places
-from clfractal.voxels.octree import descend
+from clfractal.voxels.octree import EMPTY, FULL, Descent, descend
 from clfractal.voxels.store import Evaluated, store
 
 # Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
@@ -32,6 +32,8 @@ SLOW_APPLICATIONS = 1e7
 NODE_SAFETY = 0.75
 # Voxels a side of an octant of a brick.
 OCTANT = 4
+# In place of the number of a brick, as in `kernels/voxels_bricks.h`; -1: outside.
+ALL_INSIDE = -2
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +122,7 @@ class _Filler:
         self.lanes, self.precision, self.progress = lanes, precision, progress
         self.sub_points = renderer.sub_points if renderer.value == "coverage" else 1
         self.formula = write_formula(scene.chain)
+        self.decided = 0  # octants
         self.stats = GridStats()
 
     def run(self, on_compile: Callable[[str], None] | None) -> Grid:
@@ -143,8 +146,12 @@ class _Filler:
         start = time.perf_counter()
         self._upload()
         every = self.lattice.evaluated_bricks
-        places = self._descend(kernels["empty_nodes"]) if octree else all_places(every)
-        evaluated = self._fill(kernels["fill_bricks"], kernels.get("empty_nodes"), places, source, sample)
+        if octree:
+            descent = self._descend(kernels["classify_nodes"])
+        else:
+            descent = Descent(all_places(every), np.zeros(0, np.uint64), 0)
+        self.stats = replace(self.stats, nodes=descent.looked)
+        evaluated = self._fill(kernels["fill_bricks"], kernels.get("classify_nodes"), descent, source, sample)
         grid = store(
             self.device,
             self.lattice,
@@ -180,25 +187,23 @@ class _Filler:
         bricks = 0.05 * units * SLOW_APPLICATIONS / (packets * max(iterations, 1))
         self.first_part = int(np.clip(bricks, units, 2048))
 
-    def _descend(self, empty_nodes: programs.Built) -> Places:
-        def empty(nodes: Places, cells: int) -> npt.NDArray[np.bool_]:
+    def _descend(self, classify_nodes: programs.Built) -> Descent:
+        def classify(nodes: Places, cells: int) -> npt.NDArray[np.uint8]:
             packets = -(-len(nodes) // self.lanes)
             padded = np.zeros(packets * self.lanes, np.uint64)
             padded[: len(nodes)] = nodes
             result = np.empty(len(padded), np.uint8)
             if packets:
-                flags = self._look(empty_nodes, upload(self.device, padded), packets, cells)
-                cl.enqueue_copy(self.device.queue, result, flags)
+                classes = self._look(classify_nodes, upload(self.device, padded), packets, cells)
+                cl.enqueue_copy(self.device.queue, result, classes)
             self._tell("octree", len(nodes), len(nodes))
-            return result[: len(nodes)].astype(np.bool_)
+            return result[: len(nodes)]
 
-        places, looked = descend(self.lattice, empty)
-        self.stats = replace(self.stats, nodes=looked)
-        return places
+        return descend(self.lattice, classify)
 
-    def _look(self, empty_nodes: programs.Built, nodes: cl.Buffer, packets: int, cells: int) -> cl.Buffer:
-        """Which nodes hold nothing: a byte of 0 or 1 of each, on the device."""
-        device, kernel = self.device, empty_nodes.kernel
+    def _look(self, classify_nodes: programs.Built, nodes: cl.Buffer, packets: int, cells: int) -> cl.Buffer:
+        """Classes of nodes, a byte of each, on the device."""
+        device, kernel = self.device, classify_nodes.kernel
         flags = device.buffer(packets * self.lanes, "nodes")
         with device.failures("looking at nodes"):
             kernel.set_args(flags, nodes, *map(np.int32, (0, packets, cells)), *self.constants)
@@ -208,50 +213,52 @@ class _Filler:
             2,
             packets,
             doing="looking at nodes",
-            group=empty_nodes.group,
-            first_part=64 * self.first_part,
+            group=classify_nodes.group,
+            first_part=8 * self.first_part,
         )
         self.stats = replace(self.stats, octree_ms=self.stats.octree_ms + milliseconds)
         return flags
 
-    def _skipped(self, empty_nodes: programs.Built | None, places: Places, bricks: cl.Buffer) -> cl.Buffer:
-        """Of each brick a byte, on the device: which of its octants hold nothing."""
+    def _octants(self, classify_nodes: programs.Built | None, places: Places, bricks: cl.Buffer) -> cl.Buffer:
+        """Of each brick two bytes, on the device: which of its octants hold nothing, and which nothing else."""
         packets = -(-8 * len(places) // self.lanes)
-        if empty_nodes is None or not packets:
-            self.skipped = 0
-            return upload(self.device, np.zeros(max(len(places), 1), np.uint8))
-        flags = np.empty(packets * self.lanes, np.uint8)
-        cl.enqueue_copy(self.device.queue, flags, self._look(empty_nodes, bricks, packets, OCTANT))
-        self.stats = replace(self.stats, nodes=self.stats.nodes + 8 * len(places))
-        of_bricks = flags[: 8 * len(places)]
-        self.skipped = int(np.count_nonzero(of_bricks))
-        return upload(self.device, np.packbits(of_bricks, bitorder="little"))
+        known = np.zeros((max(len(places), 1), 2), np.uint8)
+        if classify_nodes is not None and packets:
+            found = np.empty(packets * self.lanes, np.uint8)
+            cl.enqueue_copy(self.device.queue, found, self._look(classify_nodes, bricks, packets, OCTANT))
+            classes = found[: 8 * len(places)]
+            for byte, kind in enumerate((EMPTY, FULL)):
+                known[:, byte] = np.packbits(classes == kind, bitorder="little")
+            self.stats = replace(self.stats, nodes=self.stats.nodes + len(classes))
+            self.decided = int(np.count_nonzero(classes))
+        return upload(self.device, known)
 
     def _fill(
         self,
         fill_bricks: programs.Built,
-        empty_nodes: programs.Built | None,
-        places: Places,
+        classify_nodes: programs.Built | None,
+        descent: Descent,
         source: programs.Source,
         sample: Kind,
     ) -> Evaluated:
-        device, kernel = self.device, fill_bricks.kernel
+        device, kernel, places = self.device, fill_bricks.kernel, descent.open
         brick_bytes = 64 if source == "bits" else 512 * SAMPLE_BYTES[sample]
         samples = device.buffer(max(len(places), 1) * brick_bytes, "the voxels' values")
         bricks = upload(
             device, np.append(places, np.uint64(0))
         )  # the last packet of octants may go past the end
-        skip = self._skipped(empty_nodes, places, bricks)
+        known = self._octants(classify_nodes, places, bricks)
         x, y, z = self.lattice.evaluated_bricks
         numbers = np.full(x * y * z, -1, np.int32)
-        at = unpack_places(places)
+        at, full = unpack_places(places), unpack_places(descent.full)
+        numbers[full[:, 0] + x * (full[:, 1] + y * full[:, 2])] = ALL_INSIDE
         numbers[at[:, 0] + x * (at[:, 1] + y * at[:, 2])] = np.arange(len(places), dtype=np.int32)
         scale = 1.0
         if sample == "byte":
             limit = self.scene.formula.iterations if self.renderer.value == "iterations" else 1
             scale = 255.0 / max(limit, 1)
         with device.failures("filling the grid"):
-            kernel.set_args(samples, bricks, np.int32(0), skip, np.float32(scale), *self.constants)
+            kernel.set_args(samples, bricks, np.int32(0), known, np.float32(scale), *self.constants)
         milliseconds = run_in_parts(
             device,
             kernel,
@@ -263,7 +270,7 @@ class _Filler:
             first_part=self.first_part,
             done=lambda done: self._tell("fill", done, len(places)),
         )
-        points = (8 * len(places) - self.skipped) * OCTANT**3 * self.sub_points**3
+        points = (8 * len(places) - self.decided) * OCTANT**3 * self.sub_points**3
         self.stats = replace(self.stats, evaluated_voxels=points, fill_ms=milliseconds)
         # What 1 is to the source: a bit, 255 of a byte, or 1 of a share.
         unit = 255.0 if source == "bricks" and sample == "byte" else 1.0
@@ -274,6 +281,7 @@ class _Filler:
         return Evaluated(
             places,
             at,
+            full,
             samples,
             bricks,
             upload(device, numbers),

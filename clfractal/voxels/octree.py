@@ -3,40 +3,57 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.voxels.lattice import Lattice, Places, Shape, all_places, pack_places, unpack_places
+from clfractal.voxels.lattice import BRICK, Lattice, Places, Shape, all_places, pack_places, unpack_places
 
 # Nodes to begin with: too few leave a device idle, and large nodes are seldom empty.
 MOST_FIRST_NODES = 4096
 FIRST_LEVEL = 3
+# As in `kernels/voxels_nodes.cl`.
+UNDECIDED, EMPTY, FULL = 0, 1, 2
 
 
-def descend(lattice: Lattice, empty: Callable[[Places, int], npt.NDArray[np.bool_]]) -> tuple[Places, int]:
-    """The bricks of a grid that are not shown to be empty, and how many nodes were looked at.
+@dataclass(frozen=True, slots=True, eq=False)
+class Descent:
+    """The bricks of a grid after going down its octree.
+
+    Attributes:
+        open: places of bricks that are not decided, those of one node beside each other.
+        full: places of bricks that are inside as a whole, their ninth layer included.
+        looked: how many nodes were looked at.
+    """
+
+    open: Places
+    full: Places
+    looked: int
+
+
+def descend(lattice: Lattice, classify: Callable[[Places, int], npt.NDArray[np.uint8]]) -> Descent:
+    """Goes down the octree over a grid's evaluated bricks.
 
     Args:
         lattice: the grid.
-        empty: tells of nodes, `cells` voxels a side, which of them hold nothing.
-
-    Returns:
-        Places among the evaluated bricks, those of one node beside each other.
+        classify: tells of nodes, `cells` voxels a side, whether they are UNDECIDED, EMPTY or FULL.
     """
     bricks = lattice.evaluated_bricks
     level = FIRST_LEVEL
-    while int(np.prod([-(-n >> level) for n in bricks])) > MOST_FIRST_NODES:
+    while int(np.prod(_halved(bricks, level))) > MOST_FIRST_NODES:
         level += 1
-    nodes = all_places(_halved(bricks, level))
-    looked = 0
+    nodes, looked = all_places(_halved(bricks, level)), 0
+    full = np.zeros(0, np.uint64)
     while True:
         looked += len(nodes)
-        nodes = nodes[~empty(nodes, 8 << level)]
+        classes = classify(nodes, BRICK << level)
+        full = np.append(full, nodes[classes == FULL])
+        nodes = nodes[classes == UNDECIDED]
         if level == 0:
-            return nodes, looked
+            return Descent(nodes, full, looked)
         level -= 1
-        nodes = _children(nodes, _halved(bricks, level))
+        nodes, full = (_children(each, _halved(bricks, level)) for each in (nodes, full))
 
 
 def levels(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
@@ -77,7 +94,7 @@ def _eighth(empty: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 
 def _halved(bricks: Shape, level: int) -> Shape:
-    x, y, z = (-(-n >> level) for n in bricks)
+    x, y, z = (-(-n // (1 << level)) for n in bricks)
     return x, y, z
 
 

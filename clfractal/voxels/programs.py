@@ -110,10 +110,10 @@ def build_all(
 
 
 def nodes_recipe(chain: Chain, formula: FormulaText, lanes: int, precision: Precision) -> Recipe:
-    """`empty_nodes`: which nodes of the octree hold nothing."""
+    """`classify_nodes`: which nodes of the octree are outside or inside as a whole."""
     return Recipe(
         "voxels_nodes.cl",
-        "empty_nodes",
+        "classify_nodes",
         _formula_defines(chain, lanes, precision),
         precision,
         formula.text,

@@ -27,9 +27,10 @@ class Evaluated:
 
     Attributes:
         places: where they are among the lattice's evaluated bricks; `at` the same, shape (n, 3).
+        full: where bricks are, shape (m, 3), that are inside as a whole and were not evaluated.
         samples: their voxels, on the device.
         bricks: `places` on the device.
-        numbers: of each place its number among them or -1, on the device, x fastest.
+        numbers: of each place its number among them, -1 (outside) or -2 (in `full`), on the device, x fastest.
         scale: factor from a value to what is stored.
         whole: the value of a voxel that is inside as a whole.
         opaque: the least value that counts as inside.
@@ -37,6 +38,7 @@ class Evaluated:
 
     places: Places
     at: npt.NDArray[np.int64]
+    full: npt.NDArray[np.int64]
     samples: cl.Buffer
     bricks: cl.Buffer
     numbers: cl.Buffer
@@ -98,7 +100,8 @@ def store(
     solid_slot = 0 if classify is not None else None
     first_slot = 0 if solid_slot is None else 1
     mixed = np.flatnonzero(within & (classes == MIXED))
-    solid = evaluated.at[within & (classes == INSIDE)]
+    full = evaluated.full[(evaluated.full < np.array(lattice.bricks)).all(axis=1)]
+    solid = np.concatenate([evaluated.at[within & (classes == INSIDE)], full])
     stored = evaluated.at[mixed]
     bz, by, bx = lattice.bricks[::-1]
     entries = np.full((bz, by, bx), -1, np.int32)

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as arrays
 
 from clfractal.scene.volume import Box
 from clfractal.voxels.lattice import Lattice, all_places, lattice_of, pack_places, unpack_places
-from clfractal.voxels.octree import descend, levels
+from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, levels
 
 
 def test_voxels_of_a_cube() -> None:
@@ -71,22 +71,30 @@ def test_places_travel_in_64_bits() -> None:
 def test_descending_finds_the_bricks_that_hold_something(
     x: int, y: int, z: int, seed: int, share: float
 ) -> None:
-    held = np.random.default_rng(seed).random((z, y, x)) < share
+    random = np.random.default_rng(seed)
+    held = random.random((z, y, x)) < share
+    # Half of the block is inside as a whole.
+    whole = np.zeros_like(held)
+    whole[: z // 2] = True
+    held |= whole
 
-    def empty(nodes: npt.NDArray[np.uint64], cells: int) -> npt.NDArray[np.bool_]:
+    def classify(nodes: npt.NDArray[np.uint64], cells: int) -> npt.NDArray[np.uint8]:
         side = cells // 8
         spans = [
             tuple(slice(side * n, side * n + side) for n in place[::-1]) for place in unpack_places(nodes)
         ]
-        return np.array([not held[span].any() for span in spans], np.bool_)
+        classes = [FULL if whole[s].all() else UNDECIDED if held[s].any() else EMPTY for s in spans]
+        return np.array(classes, np.uint8)
 
     lattice = Lattice((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (8 * x, 8 * y, 8 * z))
-    places, looked = descend(lattice, empty)
-    found = unpack_places(places)
-    np.testing.assert_array_equal(
-        found[np.lexsort(found.T)], np.argwhere(held)[:, ::-1][np.lexsort(np.argwhere(held)[:, ::-1].T)]
-    )
-    assert looked >= 1
+    descent = descend(lattice, classify)
+    for places, expected in ((descent.open, held & ~whole), (descent.full, whole)):
+        found = np.zeros_like(held)
+        at = unpack_places(places)
+        found[at[:, 2], at[:, 1], at[:, 0]] = True
+        assert len(at) == found.sum()
+        np.testing.assert_array_equal(found, expected)
+    assert descent.looked >= 1
 
 
 @given(
