@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clfractal.commands.voxelize import Order, Teller, fill, grid_volume, volume_scene
+from clfractal.commands.voxelize import COLORING_KEY, Order, Teller, fill, grid_volume, painted, volume_scene
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
@@ -20,8 +20,8 @@ from clfractal.files.mesh import EXTENSIONS, SINGLE_PRECISION, TOO_FINE, Mesh, i
 from clfractal.files.nrrd import MAGIC
 from clfractal.files.regular import read_bytes
 from clfractal.files.volume import SCENE_KEY, Volume, read_volume
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shell import Shell
 
@@ -32,12 +32,20 @@ _NPY = b"\x93NUMPY"
 
 
 @dataclass(frozen=True, slots=True)
+class _Made:
+    """What a grid comes from, and what its surface is to look like."""
+
+    job: Job
+    coloring: Coloring
+
+
+@dataclass(frozen=True, slots=True)
 class _Found:
     """A grid to take the surface of, and what made it: None for volumes of others."""
 
     volume: Volume
     level: float
-    job: Job | None
+    made: _Made | None
     is_file: bool
 
 
@@ -72,9 +80,9 @@ def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: 
     )
     if not len(mesh.triangles):
         raise _nothing(order, found, close)
-    if found.job is not None:
-        mesh = _dressed(mesh, found.job, volume, tell, shell)
-    write_mesh(order.output, mesh, text=write_document(found.job.resolved()) if found.job is not None else "")
+    if found.made is not None:
+        mesh = _dressed(mesh, found.made, volume, tell, shell)
+    write_mesh(order.output, mesh, text=_text(found.made) if found.made is not None else "")
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
     shell.say(
@@ -90,7 +98,7 @@ def _check_library() -> None:
 
 def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
     """The scene's grid, filled; a level is in the value's own numbers, and in the middle if not given."""
-    scene = volume_scene(order)
+    scene, coloring = volume_scene(order), painted(order)
     grid, job = fill(order, scene, shell)
     low, high = grid.range
     wanted = (low + high) / 2 if level is None else level
@@ -98,7 +106,7 @@ def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
         raise SceneError(f"must be above {low:g} and at most {high:g}, got {wanted:g}", Where("--level"))
     # Floats are a value's own numbers, bytes are spread over its range.
     stored = 255 * (wanted - low) / (high - low) if grid.kind == "byte" else wanted
-    return _Found(grid_volume(grid, job), stored, job, False)
+    return _Found(grid_volume(grid, job, coloring), stored, _Made(job, coloring), False)
 
 
 def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
@@ -118,10 +126,10 @@ def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
     shell.say(
         f"{order.source}: {x} x {y} x {z} voxels, {memory.shown(volume.values.nbytes)}, level {level:g}"
     )
-    return _Found(volume, level, _job_of(order, volume, shell), True)
+    return _Found(volume, level, _made(order, volume, shell), True)
 
 
-def _job_of(order: Order, volume: Volume, shell: Shell) -> Job | None:
+def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
     """The scene that made a volume, if it says so: it knows normals and colours."""
     text = volume.texts.get(SCENE_KEY)
     if not text or not ("\n" in text or text.startswith("{")):  # else it would be the name of a file
@@ -129,15 +137,28 @@ def _job_of(order: Order, volume: Volume, shell: Shell) -> Job | None:
     from clfractal import job as jobs
     from clfractal.device.select import choose
 
+    folder = Path(order.source).parent
     try:
         overrides = [f"renderer.precision={order.precision}"] if order.precision else []
-        scene = load_scene(text, overrides=overrides, folder=Path(order.source).parent)
+        scene = load_scene(text, overrides=overrides, folder=folder)
+        painting = volume.texts.get(COLORING_KEY, "{}")
+        coloring = load_scene(
+            text, overrides=["renderer={type: surface}", f"coloring={painting}"], folder=folder
+        ).coloring
     except ClfractalError as error:
         shell.say(f"{order.source}: its scene is of no use, normals are those of the values: {error}")
         return None
     if not isinstance(scene.renderer, VolumeRenderer) or not _is_along_axes(volume):
         return None
-    return jobs.prepare(scene, choose(order.device), on_start=shell.say)
+    return _Made(jobs.prepare(scene, choose(order.device), on_start=shell.say), coloring)
+
+
+def _text(made: _Made) -> str:
+    """What is kept of the scene in a mesh."""
+    resolved = made.job.resolved()
+    del resolved["coloring"]
+    coloring = write_document({"coloring": made.coloring.model_dump(mode="json")})
+    return write_document(resolved) + "".join(f"# {line}\n" for line in coloring.splitlines())
 
 
 def _is_along_axes(volume: Volume) -> bool:
@@ -174,20 +195,19 @@ def _nothing(order: Order, found: _Found, close: bool) -> ClfractalError:
     )
 
 
-def _dressed(mesh: Mesh, job: Job, volume: Volume, tell: Teller, shell: Shell) -> Mesh:
+def _dressed(mesh: Mesh, made: _Made, volume: Volume, tell: Teller, shell: Shell) -> Mesh:
     """With the formula's normals and the scene's colours."""
     from clfractal.render.vertices import COLORED_BY, dress, on_faces
 
-    scene: Scene = job.scene
-    if scene.coloring.by not in COLORED_BY:
-        shell.say(
-            f"coloring.by: {scene.coloring.by} is not known of vertices; they get the material's colour"
-        )
+    job, by = made.job, made.coloring.by
+    if by not in COLORED_BY:
+        shell.say(f"coloring.by: {by} is not known of vertices; they get the material's colour")
     spacing = np.diag(volume.directions)
     z, y, x = volume.values.shape
     return dress(
         mesh,
-        scene,
+        job.scene,
+        made.coloring,
         job.device,
         lanes=job.plan.lanes,
         precision=job.plan.precision,

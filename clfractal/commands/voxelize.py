@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +17,10 @@ from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
 from clfractal.files.volume import BESIDE, EXTENSIONS, SCENE_KEY, Volume, write_volume
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shell import Shell
 
@@ -26,7 +28,13 @@ if TYPE_CHECKING:
     from clfractal.job import Job
     from clfractal.voxels.grid import Grid
 
-_AS_VOLUME = "renderer={type: volume}"
+_AS_VOLUME, _AS_SURFACE, _PLAIN = (
+    "renderer={type: volume}",
+    "renderer={type: surface}",
+    "coloring={by: solid}",
+)
+COLORING_KEY = "coloring"
+"""Under which of a volume's texts the scene's coloring stands: the renderer of volumes has fewer ways than a mesh."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +81,10 @@ def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
             raise FileError("is not compressed: NPY has no way for it; .nrrd has", Where(str(order.output)))
         check_output(f"{order.output}{BESIDE}", (BESIDE,))
     scene = volume_scene(order)
+    coloring = painted(order)
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
     grid, job = fill(order, scene, shell)
-    volume = grid_volume(grid, job)
+    volume = grid_volume(grid, job, coloring)
     write_volume(order.output, volume, compress=compress)
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
@@ -93,8 +102,9 @@ def volume_scene(order: Order) -> Scene:
         given["renderer.resolution"] = ("--resolution", _resolution(order.resolution))
     if order.precision is not None:
         given["renderer.precision"] = ("--precision", json.dumps(order.precision))
-    before = [] if isinstance(load_scene(Path(order.source)).renderer, VolumeRenderer) else [_AS_VOLUME]
-    overrides = [*before, *order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
+    before = [_PLAIN] if _is_volume(order) else [_AS_VOLUME, _PLAIN]
+    wanted = [each for each in order.overrides if not _is_of_coloring(each)]
+    overrides = [*before, *wanted, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
         scene = load_scene(Path(order.source), overrides=overrides)
     except ClfractalError as error:
@@ -109,6 +119,22 @@ def volume_scene(order: Order) -> Scene:
         where = Where(order.source, path="renderer.file")
         raise SceneError("the scene shows a grid that is in a file already", where)
     return scene
+
+
+def painted(order: Order) -> Coloring:
+    """The scene's own coloring, with the options folded in, whatever its renderer can do with it."""
+    before = [] if isinstance(load_scene(Path(order.source)).renderer, SurfaceRenderer) else [_AS_SURFACE]
+    return load_scene(
+        Path(order.source), overrides=[*before, *filter(_is_of_coloring, order.overrides)]
+    ).coloring
+
+
+def _is_volume(order: Order) -> bool:
+    return isinstance(load_scene(Path(order.source)).renderer, VolumeRenderer)
+
+
+def _is_of_coloring(override: str) -> bool:
+    return re.match(r"\s*coloring\s*[.=]", override) is not None
 
 
 def _resolution(text: str) -> str:
@@ -162,19 +188,24 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
     return grid, job
 
 
-def grid_volume(grid: Grid, job: Job) -> Volume:
+def grid_volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
     """The grid's values as they are stored, with where they are and the scene that made them."""
     settings = job.scene.renderer
     assert isinstance(settings, VolumeRenderer)
     corner, spacing = np.array(grid.corner), np.array(grid.spacing)
     texts = {
         # In one line, and without a colon before a space: VTK's reader takes what stands before one for a field.
-        SCENE_KEY: json.dumps(job.resolved(), separators=(",", ":")).replace(": ", ":\\u0020"),
+        SCENE_KEY: _one_line(job.resolved()),
+        COLORING_KEY: _one_line(coloring.model_dump(mode="json")),
         "value": settings.value,
         # What the bytes 0 and 255 stand for; floats are the value's own numbers.
         "range": f"{grid.range[0]:g} {grid.range[1]:g}",
     }
     return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts)
+
+
+def _one_line(plain: Any) -> str:
+    return json.dumps(plain, separators=(",", ":")).replace(": ", ":\\u0020")
 
 
 def sides(grid: Grid) -> str:

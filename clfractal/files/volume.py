@@ -39,6 +39,9 @@ BESIDE = ".json"
 
 _MAPPED = 64 << 20  # bytes; smaller data are read: a mapped file that is cut short later ends the process
 _PIECE = 1 << 20  # bytes read, written or compressed at once, so that Ctrl-C is heard in between
+# Bytes after which the disk is waited for: to bring a large file to it at once, at the end, takes seconds, in which
+# Ctrl-C could not be answered in an orderly way.
+_FLUSHED = 16 << 20
 _DEFLATE_AT_MOST = 1032  # times smaller, by the format itself
 _NPY_MAGIC = b"\x93NUMPY"
 _NPY_HEADER = re.compile(
@@ -196,7 +199,7 @@ def _stored(dtype: np.dtype[Any], *, half: bool) -> np.dtype[Any]:
 def _write_values(
     stream: Any, slabs: Iterable[Values], shape: tuple[int, ...], stored: np.dtype[Any]
 ) -> None:
-    planes = 0
+    planes, waiting = 0, 0
     for slab in slabs:
         if slab.shape[1:] != tuple(shape[1:]):
             raise ValueError(f"a slab of a volume of shape {shape} has the shape {slab.shape}")
@@ -204,8 +207,13 @@ def _write_values(
         plain: Any = np.ascontiguousarray(slab, stored).reshape(-1).view(np.uint8)
         for start in range(0, len(plain), _PIECE):
             piece = memoryview(plain[start : start + _PIECE])
+            waiting += len(piece)
             while len(piece):  # an unbuffered file may take less than it is given
                 piece = piece[stream.write(piece) :]
+            if waiting >= _FLUSHED:
+                os.fdatasync(stream.fileno())
+                waiting = 0
+    os.fdatasync(stream.fileno())
     if planes != shape[0]:
         raise ValueError(f"a volume of {shape[0]} planes got {planes}")
 

@@ -34,6 +34,7 @@ COLORED_BY = ("solid", "normal", "iterations")
 def dress(
     mesh: Mesh,
     scene: Scene,
+    coloring: Coloring,
     device: Device,
     *,
     lanes: int,
@@ -42,12 +43,13 @@ def dress(
     flat: Flags | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Mesh:
-    """The mesh with normals from the formula's Jacobian, and the colours of the scene.
+    """The mesh with normals from the formula's Jacobian, and colours.
 
     A normal stays as it is where the formula has none nearby, or one that is far from it: the detail there is finer than
-    the grid. Colours are the material's where `coloring.by` is none of COLORED_BY.
+    the grid. Colours are the scene's material's where `coloring.by` is none of COLORED_BY.
 
     Args:
+        coloring: what chooses the colours, in place of the scene's.
         voxel: the side of a voxel, scene units.
         flat: (n,), vertices that keep their normal: those of faces that the box cuts.
         progress: told the part that is done, 0 to 1.
@@ -83,7 +85,7 @@ def dress(
             left = left[~good]
         if progress is not None:
             progress((part[-1] + 1) / count)
-    return replace(mesh, normals=normals, colors=_colors(scene, normals, smooth))
+    return replace(mesh, normals=normals, colors=_colors(scene, coloring, normals, smooth))
 
 
 def on_faces(vertices: Doubles, corner: Doubles, spacing: Doubles, shape: tuple[int, int, int]) -> Flags:
@@ -94,10 +96,9 @@ def on_faces(vertices: Doubles, corner: Doubles, spacing: Doubles, shape: tuple[
 
 
 def _colors(
-    scene: Scene, normals: npt.NDArray[np.float32], smooth: npt.NDArray[np.float32]
+    scene: Scene, coloring: Coloring, normals: npt.NDArray[np.float32], smooth: npt.NDArray[np.float32]
 ) -> npt.NDArray[np.float32]:
     """Linear colours, (n, 3), as rays find them (kernels/color.h)."""
-    coloring = scene.coloring
     if coloring.by == "normal":
         return np.float32(0.5) + np.float32(0.5) * normals
     if coloring.by == "iterations":

@@ -226,3 +226,24 @@ def test_progress_and_range() -> None:
     assert value_range(np.array([[[3.0, np.nan, -1.0, np.inf]]])) == (-1, 3)
     assert value_range(np.full((2, 2, 2), np.nan)) == (0, 0)
     assert value_range(np.arange(40 * 6, dtype=np.uint8).reshape(40, 2, 3)) == (0, 239)
+
+
+class Watched:
+    """Values that are only given out in pieces, and how large the largest was."""
+
+    def __init__(self, values: Doubles) -> None:
+        self.values, self.shape, self.largest = values, values.shape, 0
+
+    def __getitem__(self, place: tuple[slice, slice, slice]) -> Doubles:
+        part = self.values[place]
+        self.largest = max(self.largest, part.size)
+        return part
+
+
+def test_no_more_than_a_brick_is_asked_for_at_once() -> None:
+    watched = Watched(ball())
+    values: Any = watched
+    mesh = mesh_of(values, brick=12)
+    # A brick of 12 cells has 13 samples a side, and one more on each side for slopes.
+    assert 0 < watched.largest <= 15**3
+    assert np.array_equal(triangle_set(mesh), triangle_set(mesh_of(ball())))
