@@ -61,7 +61,8 @@ class Grid:
     Attributes:
         lattice: where the voxels are.
         kind: how samples are kept, `byte` or `float`.
-        range: what the samples 0 and 255 stand for (`byte`), or 0 and 1 (`float`): the value's own numbers.
+        range: the least and the largest value that a voxel can have. Of `byte` the samples 0 and 255 stand for them;
+            of `float` the samples are the values (of a given array of floats the range is 0 to 1, whatever it holds).
         device: where the buffers are.
         layout: slots of the pools and their parts.
         table_entries: of each brick its slot, or -(1 + level) if it cannot be seen; int32 of shape (bz, by, bx).
@@ -70,7 +71,8 @@ class Grid:
         table: the same on the device, x fastest.
         values: samples, uint8 or float32, in up to four buffers (`layout.ranges()`).
         normals: four bytes a sample: round(127.5 (n + 1)) of the outward normal's x, y and z (128 where there is
-            none), and 255 inside, 0 outside.
+            none), and 255 inside, 0 outside. `least_squares` and `exact` ones are those of samples of a brick's cells
+            that the surface goes through: of a sample that bricks share, a copy may still be by differences.
         solid_slot: the slot that all bricks share which are inside as a whole; None where each has its own.
         background: value of what is not stored.
         stats: what filling took.
