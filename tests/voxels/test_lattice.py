@@ -11,9 +11,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
+from clfractal.device.layout import verify
+from clfractal.device.select import has_float64
+from clfractal.device.structs import Precision
 from clfractal.scene.volume import Box
-from clfractal.voxels.lattice import Lattice, all_places, lattice_of, pack_places, unpack_places
+from clfractal.voxels.lattice import (
+    EXTENT,
+    LATTICE,
+    Lattice,
+    all_places,
+    lattice_of,
+    pack_places,
+    unpack_places,
+)
 from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, levels
+from tests.voxels.grids import device
 
 
 def test_voxels_of_a_cube() -> None:
@@ -126,3 +138,10 @@ def test_levels_are_quick() -> None:
     levels(table)
     # A tenth of this is usual.
     assert time.process_time() - start < 0.1
+
+
+@pytest.mark.conformance
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_the_device_lays_structs_out_as_we_do(precision: Precision) -> None:
+    if precision == "float32" or has_float64(device().info):
+        verify(device(), (LATTICE, EXTENT), precision, isolated=False)
