@@ -236,9 +236,9 @@ def mesh(
         float | None,
         typer.Option("--level", help="Value at the surface.  [default: half way between the ends]"),
     ] = None,
-    close: Annotated[
-        bool, typer.Option("--close/--no-close", help="Close the surface where the box cuts it.")
-    ] = True,
+    no_close: Annotated[
+        bool, typer.Option("--no-close", help="Leave the surface open where the box cuts it.")
+    ] = False,
     device: DeviceOption = None,
     precision: Precision = None,
     overrides: Overrides = None,
@@ -251,7 +251,7 @@ def mesh(
 
     order = Order(source, output, resolution, device, precision, tuple(overrides or ()))
     shell = _shell(context, quiet=quiet, verbose=verbose)
-    return lambda: make_mesh(order, shell, level=level, close=close)
+    return lambda: make_mesh(order, shell, level=level, close=not no_close)
 
 
 @app.command()

@@ -131,7 +131,8 @@ def text(header: Header) -> bytes:
     lines += [
         f"type: {_TYPES[header.dtype.str[1:]][0]}",
         "dimension: 3",
-        "space: 3D-right-handed",
+        # Of the right-handed spaces the one that ITK and 3D Slicer take coordinates of as they are.
+        "space: left-posterior-superior",
         "sizes: " + " ".join(str(side) for side in reversed(header.shape)),
         "space directions: " + " ".join(rows),
         "space origin: " + _vector(header.origin),

@@ -92,7 +92,7 @@ def test_another_reader_finds_the_same(dtype: str, compress: bool, tmp_path: Pat
     assert np.array_equal(found, values)
     assert np.array_equal(header["space directions"], DIRECTIONS)
     assert np.array_equal(header["space origin"], ORIGIN)
-    assert header["space"] == "3D-right-handed"
+    assert header["space"] == "left-posterior-superior"
     assert header["kinds"] == ["domain"] * 3
     assert header["encoding"] == ("gzip" if compress else "raw")
 
