@@ -37,9 +37,11 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
             some |= own != 0;
             all &= own == 0x1ff;
 #else
+            float nine[16];
+            vstore16(row_window(&r, 0), 0, nine);
             for (int x = 0; x < BRICK_SIDE; ++x) {
-                some |= r.value[BRICK + x] != 0.0f;
-                all &= r.value[BRICK + x] >= extent->whole;
+                some |= nine[x] != 0.0f;
+                all &= nine[x] >= extent->whole;
             }
 #endif
         }

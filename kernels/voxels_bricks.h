@@ -136,10 +136,6 @@ INLINE float16 row_window(const row *r, int offset) {
     return convert_float16(convert_int16(((uint16)(*r) >> shift) & 1u));
 }
 #else
-// Voxel x of the row is entry x + 8.
-typedef struct {
-    float value[40];
-} row;
 // Rows are loaded one by one.
 typedef struct {
     __global const SAMPLE *samples;
@@ -154,6 +150,17 @@ INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples,
     n->extent = extent;
 }
 
+// Voxel x of the row is entry x + VOXELS_BEFORE.
+#if RADIUS <= 2
+#define VOXELS_BEFORE 4
+typedef float16 row;
+#else
+#define VOXELS_BEFORE 8
+typedef struct {
+    float value[40];
+} row;
+#endif
+
 #if SOURCE == SOURCE_BRICKS
 // The row `y`, `z` (voxels from the brick's first, -8 to 15): the first of its three bricks in `near`, and the first of the
 // row's voxels in them (bricks are kept octant by octant: see voxels.h; its second four are an octant further on).
@@ -165,46 +172,75 @@ INLINE int row_of(const surroundings *around, int y, int z, __constant const str
     const int octant = ((row_z >> 1) & 2) | ((row_y >> 2) & 1);
     return OCTANT_VOXELS * 2 * octant + 16 * (row_z & 3) + 4 * (row_y & 3);
 }
-INLINE void row_part(float *part, __global const SAMPLE *samples, int number, int place,
-                     __constant const struct Extent *extent) {
-    const float uniform = number == ALL_INSIDE ? extent->whole : 0.0f;
-    for (int i = 0; i < BRICK; ++i) {
-        const int voxel = place + (i < 4 ? i : i - 4 + OCTANT_VOXELS);
-        part[i] = number < 0 ? uniform : (float)samples[(size_t)number * 512 + voxel];
-    }
+// Four voxels of a brick, or of none.
+INLINE float4 four_voxels(__global const SAMPLE *samples, int number, int place, __constant const struct Extent *extent) {
+    if (number < 0) return (float4)(number == ALL_INSIDE ? extent->whole : 0.0f);
+    return convert_float4(vload4(0, samples + (size_t)number * 512 + place));
 }
-INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
-                    __constant const struct Extent *extent) {
-    row r;
+
+INLINE row row_at(const neighbourhood *n, int y, int z) {
     int first;
-    const int place = row_of(around, y, z, extent, &first);
-    row_part(r.value, samples, around->near[first], place, extent);
-    row_part(r.value + 8, samples, around->near[first + 1], place, extent);
-    row_part(r.value + 16, samples, around->near[first + 2], place, extent);
-    for (int i = 0; i < BRICK; ++i) {
-        if (around->x == 0) r.value[i] = r.value[8];
-        if (around->x == extent->bricks[0] - 1) r.value[16 + i] = r.value[15];
-    }
-    for (int i = 24; i < 40; ++i) r.value[i] = 0.0f;
+    const surroundings *around = n->around;
+    const int place = row_of(around, y, z, n->extent, &first), next = place + OCTANT_VOXELS;
+    const float4 own = four_voxels(n->samples, around->near[first + 1], place, n->extent);
+    const float4 own_next = four_voxels(n->samples, around->near[first + 1], next, n->extent);
+    float4 left = four_voxels(n->samples, around->near[first], next, n->extent);
+    float4 right = four_voxels(n->samples, around->near[first + 2], place, n->extent);
+    if (around->x == 0) left = (float4)(own.x);
+    if (around->x == n->extent->bricks[0] - 1) right = (float4)(own_next.w);
+#if RADIUS <= 2
+    return (float16)(left, own, own_next, right);
+#else
+    row r;
+    float4 far_left = four_voxels(n->samples, around->near[first], place, n->extent);
+    float4 far_right = four_voxels(n->samples, around->near[first + 2], next, n->extent);
+    if (around->x == 0) far_left = left;
+    if (around->x == n->extent->bricks[0] - 1) far_right = right;
+    vstore16((float16)(far_left, left, own, own_next), 0, r.value);
+    vstore16((float16)(right, far_right, (float8)(0.0f)), 1, r.value);
+    vstore8((float8)(0.0f), 4, r.value);
     return r;
+#endif
 }
 #else
 // The slab is some layers of a whole grid, x fastest; `first_layer` is the grid's layer that it begins with.
-INLINE row load_row(__global const SAMPLE *samples, const surroundings *around, int y, int z,
-                    __constant const struct Extent *extent) {
-    row r;
-    const int row_y = clamp(BRICK * around->y + y, 0, extent->last[1]);
-    const int row_z = clamp(BRICK * around->z + z, 0, extent->last[2]) - extent->first_layer;
+INLINE row row_at(const neighbourhood *n, int y, int z) {
+    __constant const struct Extent *extent = n->extent;
+    const int row_y = clamp(BRICK * n->around->y + y, 0, extent->last[1]);
+    const int row_z = clamp(BRICK * n->around->z + z, 0, extent->last[2]) - extent->first_layer;
     const size_t start = ((size_t)row_z * (extent->last[1] + 1) + row_y) * (extent->last[0] + 1);
-    for (int i = 0; i < 24; ++i) {
-        r.value[i] = (float)samples[start + clamp(BRICK * around->x + i - BRICK, 0, extent->last[0])];
+    const int first = BRICK * n->around->x - VOXELS_BEFORE;
+#if RADIUS <= 2
+    if (first >= 0 && first + 15 <= extent->last[0]) return convert_float16(vload16(0, n->samples + start + first));
+#endif
+    float each[40];
+    for (int i = 0; i < 40; ++i) {
+        each[i] = i < 24 ? (float)n->samples[start + clamp(first + i, 0, extent->last[0])] : 0.0f;
     }
-    for (int i = 24; i < 40; ++i) r.value[i] = 0.0f;
+    row r;
+#if RADIUS <= 2
+    r = vload16(0, each);
+#else
+    for (int i = 0; i < 40; ++i) r.value[i] = each[i];
+#endif
     return r;
 }
 #endif
 
-INLINE row row_at(const neighbourhood *n, int y, int z) { return load_row(n->samples, n->around, y, z, n->extent); }
-
-INLINE float16 row_window(const row *r, int offset) { return vload16(0, r->value + offset + BRICK); }
+// Voxels `offset` to `offset` + 8 of the row; what follows has no meaning.
+INLINE float16 row_window(const row *r, int offset) {
+#if RADIUS <= 2
+    switch (offset) {
+        case -3: return (float16)(r->s12345678, r->s9abcdeff);
+        case -2: return (float16)(r->s23456789, r->sabcdefff);
+        case -1: return (float16)(r->s3456789a, r->sbcdeffff);
+        case 1: return (float16)(r->s56789abc, r->sdeffffff);
+        case 2: return (float16)(r->s6789abcd, r->sefffffff);
+        case 3: return (float16)(r->s789abcde, r->sffffffff);
+        default: return (float16)(r->s456789ab, r->scdefffff);
+    }
+#else
+    return vload16(0, r->value + offset + VOXELS_BEFORE);
+#endif
+}
 #endif
