@@ -22,9 +22,11 @@ from clfractal.formulas.opencl import operations_per_application
 from clfractal.job import Job, prepare
 from clfractal.render import engine
 from clfractal.render.film import Film
+from clfractal.render.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.shell import Shell
+from clfractal.voxels.fill import fill_grid
 
 REPETITIONS = 7
 STILL_REPETITIONS = 3
@@ -47,6 +49,20 @@ camera: {position: [-0.8, 2.2, 3.0], target: [-0.5, 0, 0], up: [0, 1, 0], fov: 5
 renderer: {bounds: {center: [-0.3, 0, 0], radius: 2}}
 lights: [{direction: [-0.4, -0.5, -0.77], shadow: true}]
 """
+# Row 5: the thesis's grid, composited; row 4 is filling it.
+VOLUME = HAST.replace(
+    "renderer: {bounds: {center: [-0.3, 0, 0], radius: 2}}",
+    "renderer: {type: volume, box: {center: [-0.3, 0, 0], size: 4}, resolution: 512,"
+    " transfer: {opacity: [{at: 0.2, opacity: 0}, {at: 0.8, opacity: 1}]}}",
+)
+# Row 6: the Mandelbrot set as hast's plane z = 0.
+PLANE = """\
+version: 1
+formula: {name: hast, parameters: {power: 2}, iterations: 256}
+image: {width: 1000, height: 1000}
+camera: {}
+renderer: {type: cut_plane, plane: {width: 4, height: 4}, colors: {mode: stepped}}
+"""
 POINTS = "renderer.points={count: 9}"
 # A row: its scene, what it changes in it, and how often it is rendered.
 ROWS: dict[str, tuple[str, tuple[str, ...], int]] = {
@@ -64,6 +80,10 @@ ROWS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "hast2-steps": (HAST, ("renderer.search=steps",), STILL_REPETITIONS),
     "hast2-steps-points9": (HAST, ("renderer.search=steps", POINTS), STILL_REPETITIONS),
     "hast2-occlusion8": (HAST, ("renderer.ambient_occlusion={rays: 8}",), STILL_REPETITIONS),
+    # Frames of a volume, composited and as a surface, without filling its grid; and a cut plane.
+    "hast2-volume512": (VOLUME, (), REPETITIONS),
+    "hast2-volume512-surface": (VOLUME, ("renderer.transfer={}",), REPETITIONS),
+    "hast2-plane256": (PLANE, (), REPETITIONS),
 }
 
 
@@ -99,6 +119,8 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell) -> None:
     for name, (text, changes, repetitions) in ROWS.items():
         rows.append(_render_row(name, load_scene(text, overrides=changes), chosen, peak, repetitions))
         shell.say(f"{name}: {rows[-1].ms:.0f} ms")
+    rows.append(_grid_row(chosen))
+    shell.say(f"{rows[-1].name}: {rows[-1].ms:.0f} ms")
     rows.append(_shell_row(chosen))
     report = {
         "device": chosen.info.name,
@@ -117,7 +139,7 @@ def table(report: Mapping[str, Any]) -> list[str]:
     """The report as lines of text."""
     lines = [
         f"{report['device']}; {report['platform']}; FMA peak {report['peak_gflops_float32']:.0f} GFLOP/s",
-        f"{'row':22} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'of peak':>8} {'lanes':>5}",
+        f"{'row':24} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'of peak':>8} {'lanes':>5}",
     ]
     for row in report["rows"]:
         cells = [
@@ -127,7 +149,7 @@ def table(report: Mapping[str, Any]) -> list[str]:
             _cell(row["fma_share"], 7, 1, 100.0, "%"),
             _cell(row["lanes"], 5, 0),
         ]
-        lines.append(f"{row['name']:22} {row['ms']:8.1f} {row['wall_ms']:8.1f} " + " ".join(cells))
+        lines.append(f"{row['name']:24} {row['ms']:8.1f} {row['wall_ms']:8.1f} " + " ".join(cells))
     return lines
 
 
@@ -163,6 +185,20 @@ def _once(job: Job) -> tuple[float, engine.Progress]:
     start = time.perf_counter()
     state = engine.render(job.scene, job.plan, job.device, film)
     return time.perf_counter() - start, state
+
+
+def _grid_row(device: Device) -> Row:
+    """Filling the grid of row 5: octree, values and normals."""
+    job = prepare(load_scene(VOLUME), device, precision="float32")
+    settings = settings_of(job.scene)
+    times = []
+    for _ in range(STILL_REPETITIONS + 1):
+        start = time.perf_counter()
+        stats = fill_grid(job.scene, settings, device, lanes=job.plan.lanes, precision="float32").stats
+        on_device = stats.octree_ms + stats.fill_ms + stats.store_ms + stats.normals_ms
+        times.append((on_device, 1e3 * (time.perf_counter() - start) - stats.build_ms))
+    ms, wall_ms = (statistics.median(column) for column in zip(*times[1:], strict=True))
+    return Row("hast2-grid512", ms=ms, wall_ms=wall_ms, lanes=job.plan.lanes)
 
 
 def _shell_row(device: Device) -> Row:
