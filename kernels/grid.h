@@ -25,9 +25,9 @@ INLINE cell cell_at(vec p, __constant const struct Grid *about) {
     const real y = clamp(p.y - R(0.5), R(0.0), (real)((scalar)(about->sides[1] - 1)));
     const real z = clamp(p.z - R(0.5), R(0.0), (real)((scalar)(about->sides[2] - 1)));
     cell c;
-    c.x = min(to_ints(x), (ints)(about->sides[0] - 2));
-    c.y = min(to_ints(y), (ints)(about->sides[1] - 2));
-    c.z = min(to_ints(z), (ints)(about->sides[2] - 2));
+    c.x = min(to_ints(x), (ints)(max(about->sides[0] - 2, 0)));
+    c.y = min(to_ints(y), (ints)(max(about->sides[1] - 2, 0)));
+    c.z = min(to_ints(z), (ints)(max(about->sides[2] - 2, 0)));
     c.u = x - to_reals(c.x);
     c.v = y - to_reals(c.y);
     c.w = z - to_reals(c.z);

@@ -166,8 +166,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
         c = cell_at(vec_along(g.origin, middle, g.direction), about);
         entry = brick_at(c, w.grid);
         const mask stored = found & less(R(-0.5), to_reals(entry));
-        const real value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
-        const mask inside = less_equal((real)(w.settings->level), value);
+        const mask inside = stored & less_equal((real)(w.settings->level), grid_value(c, entry, stored, w.grid));
         high = pick(inside, middle, high);
         low = pick(inside, low, middle);
     }
@@ -203,7 +202,6 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     }
 #if PLANES > 0
     seen_t = pick(bare, kept.near, seen_t);
-    seen_value = pick(bare, face_count, seen_value);
     seen_normal = vec_pick(bare, face_normal, seen_normal);
     s.hit |= bare;
     s.coverage = pick(bare, R(1.0), s.coverage);
@@ -214,6 +212,9 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     s.depth = vec_dot(vec_sub(s.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
     s.normal = seen_normal;
     s.smooth = seen_value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset);
+#if PLANES > 0
+    s.smooth = pick(bare, face_count, s.smooth);
+#endif
     s.steps = looked;
     *steps += looked;
 #if PLANES > 0

@@ -161,11 +161,16 @@ def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
     """The value up to which a grid's voxels cannot be seen; None if the least can."""
     stops = settings.transfer.opacity
     if stops is None:
-        return float(np.nextafter(np.float32((given.low + given.high) / 2), np.float32(-np.inf)))
+        return float(np.nextafter(np.float32(surface_level(given.low, given.high)), np.float32(-np.inf)))
     for before, stop in pairwise(stops):
         if before.opacity == 0 and stop.opacity > 0:
             return before.at if stops[0].opacity == 0 else None
     return None if stops[0].opacity > 0 else stops[-1].at
+
+
+def surface_level(low: float, high: float) -> float:
+    """The value of the surface of a grid with values from `low` to `high`, however they are coloured."""
+    return (low + high) / 2
 
 
 def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
@@ -194,10 +199,11 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
     longest = float(np.linalg.norm(np.array(grid.spacing) * np.array(grid.shape))) * _zoom(scene)
     per_sample = (grid.range[1] - grid.range[0]) / full_sample(grid)
     low, high = ((value - grid.range[0]) / per_sample for value in value_range(scene, grid))
+    least, most = grid.range if scene.given is None else (scene.given.low, scene.given.high)
     width = settings.filter_width
     values = {
         "step": step,
-        "level": (low + high) / 2,
+        "level": (surface_level(least, most) - grid.range[0]) / per_sample,
         "low": low,
         "range": 1 / (high - low),
         "value_scale": per_sample,
@@ -218,7 +224,7 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
 
 def full_sample(grid: Grid) -> float:
     """The sample that stands for `grid.range[1]`."""
-    return 255.0 if grid.kind == "byte" else 1.0
+    return 255.0 if grid.kind == "byte" else grid.range[1]
 
 
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
@@ -233,7 +239,7 @@ def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
 
 
 def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
-    """Opacity of one step, red, green and blue (linear) at values from `limits[0]` to `limits[1]`; shape (TRANSFER_SIZE, 4)."""
+    """Opacity of one step, red, green and blue (linear) for values between `limits`; shape (TRANSFER_SIZE, 4)."""
     settings = settings_of(scene)
     transfer = settings.transfer
     values = np.linspace(*limits, TRANSFER_SIZE)
