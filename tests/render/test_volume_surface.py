@@ -1,0 +1,213 @@
+"""The surface of a grid: balls that are filled, and grids of others, against the sphere; light, shadows, samples, zooms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from tests.render.shots import (
+    BALL_RADIUS,
+    CHANNELS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    Floats,
+    normals_of,
+    points_of,
+    rays,
+    shoot,
+    stacked,
+    to_sphere,
+    view_of,
+)
+from tests.render.volumes import LIT, keep, middles, volume_scene
+
+CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
+BOX = {"center": [0, 0, 0], "size": 2.5}
+# Not a cube, sides of voxels 0.05, 0.0625 and 0.04.
+LONG = {"center": [0.1, -0.05, 0.02], "size": [2.5, 3.0, 2.4]}
+
+
+def lit(points: Floats, normals: Floats, to_viewer: Floats, tint: Any) -> Floats:
+    """The thesis's Eq. 5 with the lights of `LIT`, without shadows."""
+    total = np.zeros_like(points)
+    for light in LIT["lights"]:
+        if light.get("type") == "point":
+            toward = np.array(light["position"]) - points
+        else:
+            toward = -np.array(light["direction"], float) + 0 * points
+        toward = toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+        facing = (normals * toward).sum(-1, keepdims=True)
+        mirrored = 2 * facing * normals - toward
+        highlight = np.maximum((mirrored * to_viewer).sum(-1, keepdims=True), 0) ** 32
+        body = tint * (0.1 + 0.7 * np.maximum(facing, 0)) + 0.2 * highlight * (facing > 0)
+        total += np.array(light.get("color", [1, 1, 1])) * body
+    return total
+
+
+PHONG = {"ambient": 0.1, "diffuse": 0.7, "specular": 0.2, "shininess": 32}
+LOOK = {**LIT, "material": {**LIT["material"], **PHONG}}
+
+
+@pytest.mark.parametrize(
+    ("box", "resolution", "keys", "degrees"),
+    [
+        (BOX, 64, {"value": "inside"}, 12),
+        (BOX, 64, {"value": "coverage"}, 4),
+        (LONG, [50, 48, 60], {"value": "coverage"}, 5),
+        (LONG, [50, 48, 60], {"value": "inside", "normals": "exact"}, 5),
+    ],
+    ids=["inside", "coverage", "long box", "exact"],
+)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_filled_ball(
+    device: Device, camera: str, box: dict[str, Any], resolution: Any, keys: dict[str, Any], degrees: float
+) -> None:
+    """Rays hit within a voxel of the ball; depth, point, normal, light and coverage are those of the hit."""
+    scene = volume_scene(CAMERAS[camera], box=box, resolution=resolution, look=LOOK, **keys)
+    film = shoot(scene, device)
+    origin, direction, _ = rays(scene)
+    distance, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
+    hit = film["A"] == 1
+    voxel = 0.0625
+    assert hit[nearest < BALL_RADIUS - voxel].all()
+    assert not hit[nearest > BALL_RADIUS + voxel].any()
+    np.testing.assert_array_equal(film["A"], hit)
+    points = points_of(film)
+    assert np.abs(np.linalg.norm(points, axis=-1) - BALL_RADIUS)[hit].max() < voxel
+    # On the pixel's own ray, at its depth.
+    t = ((points - origin) * direction).sum(-1)
+    assert np.linalg.norm(origin + t[..., None] * direction - points, axis=-1)[hit].max() < 1e-5
+    eye = np.array(scene.camera.position)
+    depth = (points - eye) @ view_of(scene).axis
+    np.testing.assert_allclose(film["Z"][hit], depth[hit], atol=1e-5)
+    clear = hit & (nearest < 0.8 * BALL_RADIUS)
+    assert np.abs(t - distance)[clear].max() < voxel / 0.6
+    # Normals.
+    normals = normals_of(film)
+    np.testing.assert_allclose(np.linalg.norm(normals[hit], axis=-1), 1, atol=1e-5)
+    cosine = (normals * points).sum(-1)[hit] / np.linalg.norm(points, axis=-1)[hit]
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    assert np.percentile(angle, 95) < degrees
+    assert angle.max() < 2.5 * degrees
+    # Light, from the very normals.
+    wanted = lit(points, normals, -direction, np.array([0.8, 0.6, 0.4]))
+    np.testing.assert_allclose(stacked(film, "RGB")[hit], wanted[hit], atol=2e-4)
+    # Nothing where nothing is, but the background.
+    np.testing.assert_array_equal(stacked(film, "RGB")[~hit], 0.5)
+    assert np.isposinf(film["Z"][~hit]).all()
+    assert not stacked(film, [n for n in CHANNELS if n[0] in "NPi"])[~hit].any()
+    assert np.isfinite(stacked(film, [n for n in CHANNELS if n != "Z"])).all()
+
+
+def test_color_by_normal(device: Device) -> None:
+    flat = {**LIT, "material": {"ambient": 0.5, "diffuse": 0, "specular": 0}, "coloring": {"by": "normal"}}
+    scene = volume_scene(PERSPECTIVE, box=BOX, resolution=64, value="coverage", look=flat)
+    film = shoot(scene, device)
+    hit = film["A"] == 1
+    # Two lights: 0.5 white and 0.5 of a bluish one.
+    wanted = 0.5 * (0.5 * normals_of(film) + 0.5) * (1 + np.array([0.2, 0.4, 0.9]))
+    np.testing.assert_allclose(stacked(film, "RGB")[hit], wanted[hit], atol=1e-5)
+    assert hit.sum() > 500
+
+
+@pytest.mark.parametrize("offset", [0.0, -500.0, 300.0])
+@pytest.mark.parametrize(
+    "colors", [None, [{"at": -1000, "color": [1, 1, 1]}, {"at": 9000, "color": [1, 1, 1]}]]
+)
+def test_the_surface_of_a_given_grid(
+    device: Device, tmp_path: Path, offset: float, colors: list[dict[str, Any]] | None
+) -> None:
+    """It lies halfway between the least and the largest value, wherever those lie and however they are coloured."""
+    corner, spacing, sides = np.array([-1.3, -1.1, -1.2]), np.array([0.0625, 0.05, 0.08]), (42, 44, 31)
+    distance = np.linalg.norm(middles(sides, corner, spacing), axis=-1) - 0.9
+    values = (offset - 100 * np.clip(distance, -0.5, 0.5)).astype(np.float32)
+    keep(tmp_path / "a.nrrd", values, corner, spacing)
+    scene = volume_scene(
+        PERSPECTIVE, folder=tmp_path, file="a.nrrd", transfer={"color": colors}, normal_radius=0
+    )
+    film = shoot(scene, device)
+    origin, direction, _ = rays(scene)
+    _, nearest = to_sphere(origin, direction, (0, 0, 0), 0.9)
+    hit = film["A"] == 1
+    np.testing.assert_array_equal(
+        hit[np.abs(nearest - 0.9) > 0.01], nearest[np.abs(nearest - 0.9) > 0.01] < 0.9
+    )
+    clear = nearest < 0.8
+    # A step of half a voxel, halved five times, and the curve between voxels.
+    radius = np.linalg.norm(points_of(film), axis=-1)
+    assert np.abs(radius - 0.9)[hit].max() < 0.004
+    cosine = (normals_of(film) * points_of(film)).sum(-1)[clear] / radius[clear]
+    assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 1.5
+    # Close to the level, on its inner side.
+    np.testing.assert_allclose(film["iterations"][hit], offset, atol=0.4)
+
+
+def test_a_grid_of_one_layer(device: Device, tmp_path: Path) -> None:
+    """A picture as a volume: one voxel deep along each axis in turn."""
+    square = np.zeros((20, 30), np.uint8)
+    square[5:15, 10:25] = 200
+    camera = {"projection": "orthographic", "height": 2.0}
+    places: list[tuple[Any, list[float], list[float]]] = [
+        (square[None], [0.05, 0.05, 0.4], [0, 0, 3]),
+        (square[:, None], [0.05, 0.4, 0.05], [0, -3, 0]),
+        (square[:, :, None], [0.4, 0.05, 0.05], [3, 0, 0]),
+    ]
+    for number, (values, spacing, position) in enumerate(places):
+        size = np.array(values.shape[::-1]) * spacing
+        keep(tmp_path / f"{number}.nrrd", values, -size / 2, spacing)
+        up = [0, 1, 0] if number == 0 else [0, 0, 1]
+        scene = volume_scene(
+            {**camera, "position": position, "up": up},
+            folder=tmp_path,
+            file=f"{number}.nrrd",
+            size=(40, 40),
+            interpolation="nearest",
+        )
+        film = shoot(scene, device)
+        wanted = np.zeros((40, 40))
+        wanted[10 + 5 : 10 + 15, 5 + 10 : 5 + 25] = 1
+        # Rows of the picture run downward, those of the array upward.
+        np.testing.assert_array_equal(film["A"], wanted[::-1])
+
+
+def test_shadow_of_a_ball_on_a_slab(device: Device, tmp_path: Path) -> None:
+    """Light falls along a slant: its shadow is an ellipse on the slab, and nothing else is dark."""
+    sides, spacing = (64, 48, 40), 0.05
+    corner = np.array([-1.6, -1.2, -1.0])
+    places = middles(sides, corner, [spacing] * 3)
+    ball = 0.4 - np.linalg.norm(places - [0.1, 0, 0.4], axis=-1)
+    solid = np.maximum(ball, -0.6 - places[..., 2])
+    keep(tmp_path / "s.nrrd", np.clip(0.5 + solid / spacing, 0, 1).astype(np.float32), corner, [spacing] * 3)
+    toward = np.array([-0.3, 0.2, 1.0])
+    light = [{"direction": list(-toward), "shadow": True}, {"direction": [0, 0, -1], "shadow": False}]
+    look = {
+        "lights": light,
+        "material": {"ambient": 0.25, "diffuse": 0.5, "specular": 0, "color": [1, 1, 1]},
+        "background": "transparent",
+    }
+    camera = {"projection": "orthographic", "position": [0, -3, 6], "target": [0, 0, 0], "height": 3}
+    films = {
+        shadows: shoot(
+            volume_scene(camera, folder=tmp_path, file="s.nrrd", look=look, size=(64, 64), shadows=shadows),
+            device,
+        )
+        for shadows in (True, False)
+    }
+    film = films[True]
+    points, normals = points_of(film), normals_of(film)
+    slab = (film["A"] == 1) & (np.abs(points[..., 2] + 0.6) < 0.03) & (normals[..., 2] > 0.99)
+    slab &= (np.abs(points[..., 0]) < 1.4) & (np.abs(points[..., 1]) < 1.0)
+    assert slab.sum() > 700
+    unit = toward / np.linalg.norm(toward)
+    _, nearest = to_sphere(points, np.broadcast_to(unit, points.shape), [0.1, 0, 0.4], 0.4)
+    dark, open_ = slab & (nearest < 0.4 - 0.05), slab & (nearest > 0.4 + 0.05)
+    assert dark.sum() > 60
+    # Ambient of both, diffuse of the second; and the first's diffuse by its slant.
+    np.testing.assert_allclose(film["R"][dark], 0.5 + 0.5, atol=0.01)
+    np.testing.assert_allclose(film["R"][open_], 0.5 + 0.5 + 0.5 * unit[2], atol=0.01)
+    np.testing.assert_allclose(films[False]["R"][dark], 0.5 + 0.5 + 0.5 * unit[2], atol=0.01)
+    assert (film["steps"] >= films[False]["steps"]).all()

@@ -1,0 +1,131 @@
+"""Grids whose pictures are known from mathematics, scenes that show them, and rays through them by NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.files.volume import Volume, write_volume
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from tests.render.shots import BALL, BALL_ITERATIONS, Floats, rays
+
+# Light that shows a place's own colour, whatever its normal.
+FLAT: dict[str, Any] = {
+    "material": {"ambient": 1, "diffuse": 0, "specular": 0, "color": [0.75, 0.5, 0.25]},
+    "lights": [{"direction": [0, 1, -0.5], "shadow": False}],
+    "background": "transparent",
+}
+# Two lights with highlights, over a grey background.
+LIT: dict[str, Any] = {
+    "material": {"color": [0.8, 0.6, 0.4]},
+    "lights": [
+        {"direction": [-1, 2, -1.5], "shadow": False},
+        {"type": "point", "position": [3, -2, 4], "color": [0.2, 0.4, 0.9], "shadow": False},
+    ],
+    "background": {"top": [0.5, 0.5, 0.5], "bottom": [0.5, 0.5, 0.5]},
+}
+# To each axis another number of voxels.
+SIDES, BOX = (40, 48, 32), {"center": [0.1, 0.05, -0.1], "size": [2.5, 3.0, 2.0]}
+
+
+def middles(shape: Sequence[int], corner: npt.ArrayLike, spacing: npt.ArrayLike) -> Floats:
+    """Middles of the voxels of a grid of `shape` (x, y, z), shape (nz, ny, nx, 3)."""
+    axes = [
+        c + (np.arange(n) + 0.5) * s
+        for n, c, s in zip(shape, np.asarray(corner, float), np.asarray(spacing, float), strict=True)
+    ]
+    z, y, x = np.meshgrid(*axes[::-1], indexing="ij")
+    return np.stack([x, y, z], axis=-1)
+
+
+def keep(path: Path, values: npt.NDArray[Any], corner: npt.ArrayLike, spacing: npt.ArrayLike) -> None:
+    """Writes a grid along the axes."""
+    sides = np.asarray(spacing, float)
+    write_volume(path, Volume(values, np.asarray(corner, float) + sides / 2, np.diag(sides)))
+
+
+def volume_scene(
+    camera: Mapping[str, Any],
+    *,
+    folder: Path | None = None,
+    size: tuple[int, int] = (48, 48),
+    formula: Mapping[str, Any] = BALL,
+    look: Mapping[str, Any] = FLAT,
+    sections: Mapping[str, Any] | None = None,
+    **renderer: Any,
+) -> Scene:
+    """A scene of a volume: of a ball that is filled, or of a `file` in `folder`."""
+    return load_scene(
+        {
+            "version": 1,
+            "formula": {"inline": dict(formula), "iterations": BALL_ITERATIONS},
+            "image": {"width": size[0], "height": size[1]},
+            "camera": dict(camera),
+            "renderer": {"type": "volume", **renderer},
+            **look,
+            **(sections or {}),
+        },
+        folder=folder,
+    )
+
+
+def value_at(values: npt.NDArray[Any], places: Floats, *, nearest: bool = False) -> Floats:
+    """Values at places given in voxels from the grid's corner; beyond the outermost middles the nearest goes on."""
+    shape = np.array(values.shape[::-1])
+    at = np.clip(places - 0.5, 0, shape - 1)
+    cell = np.minimum(at.astype(int), np.maximum(shape - 2, 0))
+    share = at - cell
+    if nearest:
+        share = (share >= 0.5).astype(float)
+    result = np.zeros(places.shape[:-1])
+    for corner in range(8):
+        bits = np.array([corner & 1, corner >> 1 & 1, corner >> 2])
+        weight = np.where(bits, share, 1 - share).prod(-1)
+        x, y, z = np.moveaxis(np.minimum(cell + bits, shape - 1), -1, 0)
+        result += weight * np.where(weight > 0, values[z, y, x], 0)
+    return result
+
+
+def to_box(origin: Floats, direction: Floats, corner: Floats, sides: Floats) -> tuple[Floats, Floats]:
+    """Where rays enter and leave a box; they miss it where the first is not less."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (corner - origin) / direction, (corner + sides - origin) / direction
+    return np.maximum(np.minimum(one, other).max(-1), 0), np.maximum(one, other).min(-1)
+
+
+def composited(
+    scene: Scene,
+    values: npt.NDArray[Any],
+    corner: npt.ArrayLike,
+    spacing: npt.ArrayLike,
+    look: Callable[[Floats], tuple[Floats, Floats]],
+    *,
+    step: float = 0.5,
+    nearest: bool = False,
+    limit: float = 0.99,
+) -> tuple[Floats, Floats]:
+    """Colour (premultiplied) and opacity of each pixel's ray, place after place, in flat light.
+
+    Args:
+        look: of values their opacity for a voxel's side, and their colour.
+    """
+    low, sides = np.asarray(corner, float), np.asarray(spacing, float)
+    origin, direction, _ = rays(scene)
+    near, far = to_box(origin, direction, low, sides * values.shape[::-1])
+    length = step * sides.min()
+    through = np.ones(near.shape)
+    color = np.zeros((*near.shape, 3))
+    for number in range(int(np.linalg.norm(sides * values.shape[::-1]) / length) + 2):
+        t = near + number * length
+        going = (t < far) & (through > 1 - limit)
+        places = (origin + t[..., None] * direction - low) / sides
+        opacity, tint = look(value_at(values, np.where(going[..., None], places, 0), nearest=nearest))
+        share = np.where(going, 1 - (1 - opacity) ** step, 0)
+        color += (through * share)[..., None] * tint
+        through *= 1 - share
+    return color, 1 - through
