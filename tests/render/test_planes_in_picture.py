@@ -1,0 +1,291 @@
+"""Cut planes in the picture of an object: quads by depth, and planes that cut it open, for surfaces and volumes.
+
+The object is the ball of radius BALL_RADIUS, the planes' colours are those of the escape counts of z^2, whose bailout
+spheres of radius 4^(2^-n) make rings.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.formulas import reference
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.palette import named_table
+from tests.render.shots import (
+    BALL,
+    BALL_ITERATIONS,
+    BALL_RADIUS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    SOLIDS,
+    SPHERE_CENTER,
+    SPHERE_RADIUS,
+    Floats,
+    normals_of,
+    points_of,
+    rays,
+    shoot,
+    stacked,
+    to_sphere,
+    view_of,
+)
+
+POSITION = [1.5, -2.5, 1.2]
+CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
+RENDERERS: dict[str, dict[str, Any]] = {
+    "surface": {"type": "surface", "detail": 0.05},
+    "volume": {
+        "type": "volume",
+        "box": {"center": [0, 0, 0.1], "size": 2.7},
+        "resolution": 64,
+        "value": "coverage",
+    },
+}
+# How far from the ball a renderer may find its surface.
+OFF = {"surface": 0.004, "volume": 0.04}
+COLORS = {"mode": "stepped", "palette": "magma", "inside": [0.9, 0.1, 0.3], "scale": 1.5}
+TINT = np.array([0.25, 0.5, 0.75])
+LOOK: dict[str, Any] = {
+    "material": {"ambient": 1, "diffuse": 0, "specular": 0, "color": list(TINT)},
+    "lights": [{"direction": [0, 1, -0.5], "shadow": False}],
+    "background": {"top": [0.5, 0.25, 0.125], "bottom": [0.5, 0.25, 0.125]},
+}
+BACKGROUND = np.array(LOOK["background"]["top"])
+# Planes of a test are filled up to as many, by some that are not seen: each number of planes is a program.
+PLANES = 4
+
+
+def plane(center: list[float], normal: list[float], opacity: float = 0.8, **keys: Any) -> dict[str, Any]:
+    place = {"center": center, "normal": normal, "up": [0.1, 0.2, 1], "width": 2.4, "height": 1.6}
+    place |= {name: keys.pop(name) for name in list(keys) if name in place}
+    return {"plane": place, "colors": COLORS, "opacity": opacity, **keys}
+
+
+def picture(
+    renderer: str,
+    camera: dict[str, Any],
+    planes: list[dict[str, Any]],
+    *,
+    formula: dict[str, Any] = BALL,
+    iterations: int = BALL_ITERATIONS,
+    **sections: Any,
+) -> Scene:
+    more = PLANES - sum(each.get("count", 1) for each in planes)
+    filled = planes + [plane([0, 0, 9], [0, 0, 1], 0.0)] * more
+    return load_scene(
+        {
+            "version": 1,
+            "formula": {"inline": formula, "iterations": iterations},
+            "image": {"width": 56, "height": 56},
+            "camera": camera,
+            "renderer": RENDERERS[renderer],
+            **LOOK,
+            "cut_planes": filled,
+            **sections,
+        }
+    )
+
+
+def escape_tint(scene: Scene, points: Floats, limit: int = BALL_ITERATIONS) -> tuple[Floats, Floats]:
+    """The planes' colours at points, and how near to the rim of a ring they are, in parts of the radius."""
+    flat = np.where(np.isfinite(points), points, 9).reshape(-1, 3)
+    count, inside = reference.escape(scene.chain, flat, limit)
+    at = np.clip(1.5 * count / limit, 0, 1) * 255
+    table = named_table("magma").astype(float)
+    tint = np.stack([np.interp(at, np.arange(256), table[:, i]) for i in range(3)], -1)
+    tint[inside] = COLORS["inside"]
+    radius = np.linalg.norm(flat, axis=-1)
+    rims = 4.0 ** (2.0 ** -np.arange(limit + 1))
+    rim = np.abs(radius[:, None] / rims - 1).min(-1)
+    return tint.reshape(points.shape), rim.reshape(points.shape[:-1])
+
+
+def met(scene: Scene, index: int, number: int = 0) -> tuple[npt.NDArray[np.bool_], Floats, Floats]:
+    """Which rays meet a plane's rectangle, at which distance; and how near to its rim, scene units."""
+    origin, direction, _ = rays(scene)
+    part = scene.cut_planes[index]
+    placed = part.plane.placed
+    center = np.array(placed.center) + number * part.spacing * np.array(placed.normal)
+    with np.errstate(divide="ignore"):
+        t = ((center - origin) @ placed.normal) / (direction @ placed.normal)
+    there = origin + t[..., None] * direction - center
+    room = np.minimum(
+        placed.width / 2 - np.abs(there @ placed.side), placed.height / 2 - np.abs(there @ placed.up)
+    )
+    return (room > 0) & (t > 0), t, np.abs(room)
+
+
+def layered(scene: Scene, renderer: str) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """Colour and coverage of each pixel: quads over the ball and the background, by depth; and where both are certain."""
+    origin, direction, _ = rays(scene)
+    ball, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
+    sure = np.abs(nearest - BALL_RADIUS) > OFF[renderer]
+    slack = OFF[renderer] / np.sqrt(np.maximum(1 - (nearest / BALL_RADIUS) ** 2, 1e-3))
+    layers: list[tuple[Any, Any, Floats]] = [
+        (np.where(np.isfinite(ball), ball, 1e9), np.isfinite(ball) * 1.0, TINT + 0 * direction)
+    ]
+    for index, each in enumerate(scene.cut_planes):
+        for number in range(each.count):
+            seen, t, room = met(scene, index, number)
+            limit = each.iterations or BALL_ITERATIONS
+            tint, rim = escape_tint(scene, origin + t[..., None] * direction, limit)
+            sure &= (~seen | (rim > 1e-4)) & (room > 1e-4) & (~seen | (np.abs(t - ball) > slack))
+            layers.append((np.where(seen, t, 1e9), seen * each.opacity, tint))
+    depth = np.stack([layer[0] for layer in layers])
+    order = np.argsort(depth, axis=0)
+    through, color = np.ones(nearest.shape), np.zeros((*nearest.shape, 3))
+    for rank in order:
+        alpha = np.take_along_axis(np.stack([layer[1] for layer in layers]), rank[None], 0)[0]
+        tint = np.take_along_axis(np.stack([layer[2] for layer in layers]), rank[None, ..., None], 0)[0]
+        color += (through * alpha)[..., None] * tint
+        through = through * (1 - alpha)
+    return color + through[..., None] * BACKGROUND, 1 - through, sure
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("distance", [-1.3, -0.4, 1.3])
+def test_one_quad(device: Device, renderer: str, camera: str, distance: float) -> None:
+    """In front of the ball, through it, behind it: its extents, its colours, and what shows through."""
+    position = np.array(CAMERAS[camera]["position"], float)
+    toward = position / np.linalg.norm(position)
+    place = [float(x) for x in -distance * toward + [0.1, 0, 0.05]]
+    scene = picture(renderer, CAMERAS[camera], [plane(place, [0.2, -1, 0.5], 0.7)])
+    film = shoot(scene, device)
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > 0.85
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    if distance > 0:
+        return
+    # The data channels tell of a quad that stops half of the light or more.
+    seen, t, _ = met(scene, 0)
+    origin, direction, _ = rays(scene)
+    front = seen & sure & (t < to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)[0])
+    assert front.sum() > 20
+    points = origin + t[..., None] * direction
+    np.testing.assert_allclose(points_of(film)[front], points[front], atol=1e-5)
+    np.testing.assert_allclose(
+        film["Z"][front], (points - scene.camera.position)[front] @ view_of(scene).axis, atol=1e-5
+    )
+    np.testing.assert_allclose(
+        normals_of(film)[front], scene.cut_planes[0].plane.placed.normal + 0 * points[front], atol=1e-6
+    )
+    count = reference.escape(scene.chain, points[front], BALL_ITERATIONS)[0]
+    np.testing.assert_array_equal(film["iterations"][front], count)
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize("side", [1, -1])
+def test_several_quads_by_depth(device: Device, renderer: str, side: int) -> None:
+    """Stacked and crossing planes, seen from both sides: each pixel has its own order."""
+    camera = {**PERSPECTIVE, "position": [side * x for x in POSITION]}
+    planes = [
+        plane([0.0, -1.2, 0.1], [0.1, -1, 0.1], 0.5, count=2, spacing=0.3, iterations=3),
+        plane([0.1, 0, 0], [1, 1, 0.3], 0.3, width=3.0),
+        plane([0, 1.3, 0], [0, -1, 0.2], 1.0),
+    ]
+    scene = picture(renderer, camera, planes)
+    film = shoot(scene, device)
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > 0.75
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    assert len(np.unique(np.round(coverage[sure], 4))) >= 4
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> None:
+    scene = picture(
+        renderer, PERSPECTIVE, [plane([0, -1.3, 0], [0, -1, 0], 0.0), plane([0, 0, 0], [1, 0, 0], 0)]
+    )
+    bare = scene.model_copy(update={"cut_planes": ()})
+    with_planes, without = shoot(scene, device), shoot(bare, device)
+    np.testing.assert_allclose(stacked(with_planes, "RGBA"), stacked(without, "RGBA"), atol=1e-5)
+    hit = np.isfinite(without["Z"])
+    np.testing.assert_array_equal(np.isfinite(with_planes["Z"]), hit)
+    np.testing.assert_allclose(with_planes["Z"][hit], without["Z"][hit], atol=1e-5)
+
+
+CUT_CENTER, CUT_NORMAL = np.array([0.1, -0.35, 0.15]), np.array([0.3, -1.0, 0.4])
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_a_cut_ball(device: Device, renderer: str, camera: str) -> None:
+    """The face is the disc in which the plane meets the ball, to the pixel, with the rings of the plane's own count;
+    nothing is left in front of it."""
+    ball = 4.0**0.125  # of three applications
+    cut = plane(list(CUT_CENTER), list(CUT_NORMAL), 0.0, cut=True, iterations=8)
+    scene = picture(renderer, CAMERAS[camera], [cut], iterations=3)
+    film = shoot(scene, device)
+    origin, direction, _ = rays(scene)
+    normal = CUT_NORMAL / np.linalg.norm(CUT_NORMAL)
+    t = ((CUT_CENTER - origin) @ normal) / (direction @ normal)
+    there = origin + t[..., None] * direction
+    radius = np.linalg.norm(there, axis=-1)
+    face = (radius < ball) & (direction @ normal < 0)
+    tint, rim = escape_tint(scene, there, 8)
+    certain = rim > 1e-5
+    assert face.sum() > 250
+    count = reference.escape(scene.chain, there[face & certain], 8)[0]
+    assert {5, 6, 7, 8} <= set(count.tolist())
+    np.testing.assert_array_equal(film["iterations"][face & certain], count)
+    picture_, points = stacked(film, "RGB"), points_of(film)
+    np.testing.assert_allclose(picture_[face & certain], tint[face & certain], atol=2e-4)
+    np.testing.assert_allclose(points[face & certain], there[face & certain], atol=1e-5)
+    np.testing.assert_allclose(
+        normals_of(film)[face & certain], normal + 0 * there[face & certain], atol=1e-6
+    )
+    np.testing.assert_array_equal(film["A"][face & certain], 1)
+    # The rest of the ball, behind the plane; and no face anywhere else.
+    others = certain & ~face & (film["A"] > 0)
+    assert others.sum() > 15
+    assert ((points[others] - CUT_CENTER) @ normal < 0.02).all()
+    assert np.abs(np.linalg.norm(points[others], axis=-1) - ball).max() < 2 * OFF[renderer]
+    np.testing.assert_allclose(picture_[others], TINT + 0 * there[others], atol=1e-5)
+    # A ray that meets the plane off the disc is at its way's nearest to the middle only in what is gone.
+    beyond = (
+        (radius > ball + 2 * OFF[renderer]) & (direction @ normal < 0) & ((there * direction).sum(-1) > 0)
+    )
+    assert beyond.sum() > 5
+    assert not film["A"][beyond].any()
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_what_is_cut_away_throws_no_shadow(device: Device, renderer: str) -> None:
+    """A sphere over a box, lit from above; without the sphere the box has no shadow."""
+    look: dict[str, Any] = {
+        "material": {"ambient": 0.25, "diffuse": 0.5, "specular": 0, "color": [1, 1, 1]},
+        "lights": [{"direction": [0, 0, -1], "shadow": True}],
+    }
+    camera = {"projection": "orthographic", "position": [0, -3, 6], "target": [0, 0, 0], "height": 2.6}
+    seen = {}
+    for cut in (False, True):
+        planes = [plane([0, 0, 0.3], [0, 0, 1], 0.0, cut=cut, up=[0, 1, 0])]
+        scene = picture(renderer, camera, planes, formula=SOLIDS, **look)
+        settings = (
+            scene.renderer.model_copy(update={"shadows": True}) if renderer == "volume" else scene.renderer
+        )
+        seen[cut] = shoot(scene.model_copy(update={"renderer": settings}), device)
+    top = {
+        cut: (np.abs(film["P.Z"]) < 0.03) & (film["A"] == 1) & (film["N.Z"] > 0.999)
+        for cut, film in seen.items()
+    }
+    both = top[True] & top[False] & (np.abs(points_of(seen[True])[..., :2]).max(-1) < 1.1)
+    assert both.sum() > 700
+    away = np.hypot(seen[True]["P.X"] - SPHERE_CENTER[0], seen[True]["P.Y"] - SPHERE_CENTER[1])
+    shadow = both & (away < SPHERE_RADIUS - 0.05)
+    assert shadow.sum() > 20
+    np.testing.assert_allclose(seen[True]["R"][both], 0.75, atol=0.01)
+    np.testing.assert_allclose(seen[False]["R"][shadow], 0.25, atol=0.01)
+    np.testing.assert_allclose(seen[False]["R"][both & (away > SPHERE_RADIUS + 0.05)], 0.75, atol=0.01)
+    # The sphere itself is gone.
+    assert (seen[False]["P.Z"] > 1).any()
+    assert (seen[True]["P.Z"] < 0.1).all()
