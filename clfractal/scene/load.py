@@ -136,19 +136,38 @@ def _checked(document: Document, folder: Path) -> Scene:
         raise document.locate(error) from error
     try:
         check_parts(scene)
-        _check_palettes(scene)
         scene = scene.placed(folder)
-        if scene.environment is not None:
-            from clfractal.scene.environment import check_name
-
-            check_name(scene.environment)
-            if scene.environment.file is not None:
-                # Kept in the scene, so that what is rendered is what was checked.
-                _ = scene.surroundings
-        _ = scene.given
+        _check_names(scene)
+        if scene.layout is not None:
+            _check_views(scene)
     except (SceneError, FileError) as error:
         raise document.locate(error) from error
     return scene
+
+
+def _check_names(scene: Scene) -> None:
+    """Raises SceneError or FileError for what a scene names and nobody has: palettes, environments, files.
+
+    What is read is kept in the scene, so that what is rendered is what was checked.
+    """
+    _check_palettes(scene)
+    if scene.environment is not None:
+        from clfractal.scene.environment import check_name
+
+        check_name(scene.environment)
+        if scene.environment.file is not None:
+            _ = scene.surroundings
+    _ = scene.given
+
+
+def _check_views(scene: Scene) -> None:
+    """The same of each view of its layout."""
+    for number, (view, _) in enumerate(scene.views):
+        try:
+            _check_names(view)
+        except (SceneError, FileError) as error:
+            where = replace(error.where, path=f"layout.views.{number}.{error.where.path}")
+            raise type(error)(error.message, where, details=error.details) from error
 
 
 def _check_palettes(scene: Scene) -> None:
