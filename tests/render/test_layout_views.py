@@ -1,0 +1,217 @@
+"""Several views in one picture: each is its own picture, put into its place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.errors import FileError, SceneError
+from clfractal.render.engine import Progress, render
+from clfractal.render.film import Film
+from clfractal.scene.layout import Layout
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from tests.render.shots import BALL, BALL_ITERATIONS, CHANNELS, plan_of, shoot, stacked
+
+# A surface, a cut plane and a volume, as the thesis's figure 9 has them.
+VIEWS: list[dict[str, Any]] = [
+    {},
+    {"renderer": {"type": "cut_plane", "plane": {"width": 3, "height": 3}}, "background": "transparent"},
+    {
+        "renderer": {"type": "volume", "box": {"size": 2.4}, "resolution": 32, "samples": 2},
+        "camera": {"projection": "orthographic", "position": [1, -3, 1], "height": 3},
+        "material": {"color": [0.2, 0.6, 0.3]},
+    },
+]
+GAP = [0.25, 0.5, 0.125]
+
+
+def scene_of(views: list[dict[str, Any]], size: tuple[int, int] = (91, 50), **layout: Any) -> Scene:
+    return load_scene(
+        {
+            "version": 1,
+            "formula": {"inline": BALL, "iterations": BALL_ITERATIONS},
+            "image": {"width": size[0], "height": size[1]},
+            "camera": {"position": [0.5, -3, 1]},
+            "layout": {"views": views, "background": GAP, **layout},
+        }
+    )
+
+
+def alone(scene: Scene, number: int, size: tuple[int, int]) -> Scene:
+    """The view as a scene that somebody wrote by itself."""
+    plain = scene.resolved()
+    plain["layout"] = None
+    plain["image"] = {"width": size[0], "height": size[1]}
+    view = scene.layout.views[number].model_dump(mode="json") if scene.layout else {}
+    return load_scene({**plain, **{k: v for k, v in view.items() if k != "area" and v is not None}})
+
+
+def check(
+    film: npt.NDArray[np.float32], scene: Scene, places: list[tuple[int, int, int, int]], device: Device
+) -> None:
+    """Each place (x, y, width, height) has the bits of the view alone; all else is the layout's background."""
+    rest = np.ones(film.shape[:2], bool)
+    for number, (x, y, width, height) in enumerate(places):
+        own = stacked(shoot(alone(scene, number, (width, height)), device))
+        part = np.ascontiguousarray(film[y : y + height, x : x + width])
+        np.testing.assert_array_equal(part.view(np.uint32), own.view(np.uint32), err_msg=f"view {number}")
+        rest[y : y + height, x : x + width] = False
+    np.testing.assert_array_equal(film[rest][:, :3], np.full((rest.sum(), 3), GAP))
+    np.testing.assert_array_equal(film[rest][:, CHANNELS.index("A")], 1)
+    np.testing.assert_array_equal(film[rest][:, CHANNELS.index("Z")], np.inf)
+    others = [CHANNELS.index(name) for name in CHANNELS if name[0] in "NPi" or name in ("steps", "samples")]
+    assert not film[rest][:, others].any()
+
+
+def test_views_beside_each_other(device: Device) -> None:
+    """Cells of a row share what the gaps leave: (91 - 2 * 3) / 3 = 28 and a third."""
+    scene = scene_of(VIEWS, gap=3)
+    film = shoot(scene, device)
+    check(stacked(film), scene, [(0, 0, 28, 50), (31, 0, 28, 50), (62, 0, 29, 50)], device)
+
+
+def test_a_region_is_the_part_of_the_whole(device: Device) -> None:
+    scene = scene_of(VIEWS, gap=3)
+    whole = stacked(shoot(scene, device))
+    for x, y, width, height in ((0, 0, 91, 50), (20, 13, 45, 30), (29, 0, 2, 50), (90, 49, 1, 1)):
+        part = stacked(shoot(scene, device, region=(x, y, width, height)))
+        cut = np.ascontiguousarray(whole[y : y + height, x : x + width])
+        np.testing.assert_array_equal(part.view(np.uint32), cut.view(np.uint32))
+
+
+def test_areas_cover_each_other_in_order(device: Device) -> None:
+    """An inset over a view that fills the picture; parts of pixels are rounded."""
+    views = [{**VIEWS[0], "area": [0, 0, 1, 1]}, {**VIEWS[1], "area": [0.7, 0.05, 0.25, 0.5]}]
+    scene = scene_of(views)
+    film = stacked(shoot(scene, device))
+    x, y, width, height = 64, 2, 22, 26  # 63.7, 2.5 (to even), 86.45 - 63.7, 27.5 (to even) - 2
+    inset = stacked(shoot(alone(scene, 1, (width, height)), device))
+    np.testing.assert_array_equal(film[y : y + height, x : x + width], inset)
+    below = stacked(shoot(alone(scene, 0, (91, 50)), device))
+    below[y : y + height, x : x + width] = inset
+    np.testing.assert_array_equal(film, below)
+
+
+@pytest.mark.parametrize(
+    ("layout", "size", "places"),
+    [
+        ({"columns": 2}, (10, 6), [(0, 0, 5, 3), (5, 0, 5, 3), (0, 3, 5, 3)]),
+        ({"columns": 1, "gap": 1}, (4, 11), [(0, 0, 4, 3), (0, 4, 4, 3), (0, 8, 4, 3)]),
+        ({"columns": 2, "gap": 2}, (9, 8), [(0, 0, 3, 3), (5, 0, 4, 3), (0, 5, 3, 3)]),
+        ({}, (7, 2), [(0, 0, 2, 2), (2, 0, 2, 2), (4, 0, 3, 2)]),
+    ],
+)
+def test_cells(
+    layout: dict[str, Any], size: tuple[int, int], places: list[tuple[int, int, int, int]]
+) -> None:
+    found = Layout.model_validate({"views": [{}, {}, {}], **layout}).places(*size)
+    assert [(place.x, place.y, place.width, place.height) for place in found] == places
+
+
+def test_the_samples_asked_for(device: Device) -> None:
+    """Those of a view, unless the render asks for others: then they are every view's."""
+    scene = scene_of(VIEWS)
+    samples = shoot(scene, device)["samples"]
+    assert set(samples[:, :30].flat) == {1}
+    assert set(samples[:, 61:].flat) == {2}
+    assert set(shoot(scene, device, samples=3)["samples"].flat) == {3}
+
+
+def test_progress_and_the_rest_of_a_film(device: Device) -> None:
+    """It grows to the number of tiles; rays of all views are counted; what is there stays."""
+    scene = scene_of(VIEWS, gap=3)
+    plan = plan_of(scene, device)
+    film = Film(plan.channels, (91, 50), plan.region)
+    kept = np.full((len(CHANNELS), film.grid.tile(0).height, film.grid.tile(0).width), 7, np.float32)
+    film.put(0, kept)
+    seen: list[int] = []
+    state: Progress = render(scene, plan, device, film, lambda p: seen.append(p.tiles_done))
+    assert seen == sorted(seen)
+    assert (state.tiles_done, state.tiles_before, state.tiles) == (6, 1, 6)
+    assert state.rays == 50 * (28 + 28 + 2 * 29)
+    tile = film.grid.tile(0)
+    assert (film["R"][: tile.height, : tile.width] == 7).all()
+    whole = shoot(scene, device)
+    np.testing.assert_array_equal(film["R"][tile.height :], whole["R"][tile.height :])
+
+
+@pytest.mark.parametrize(
+    ("views", "layout", "size", "message"),
+    [
+        (
+            [{}, {}, {}],
+            {"gap": 20},
+            (41, 8),
+            "layout.views.0: there is no room for it in a picture of 41 x 8 pixels",
+        ),
+        (
+            [{"area": [0, 0, 1e-3, 1]}, {}],
+            {},
+            (64, 8),
+            "layout.views.0: there is no room for it in a picture of 64 x 8 pixels",
+        ),
+        (
+            [{"area": [0.5, 0, 0.6, 1]}],
+            {},
+            (64, 8),
+            "layout.views.0.area: must lie within the picture, [0, 0, 1, 1], and not be empty",
+        ),
+        (
+            [{"area": [0.5, 0, 0.0, 1]}],
+            {},
+            (64, 8),
+            "layout.views.0.area: must lie within the picture, [0, 0, 1, 1], and not be empty",
+        ),
+        ([{"area": [0.5, 0, -0.5, 1]}], {}, (64, 8), "layout.views.0.area.2: must be at least 0, got -0.5"),
+        (
+            [{"area": [0.5, 0, 0.5]}],
+            {},
+            (64, 8),
+            "layout.views.0.area: must be a list of 4 numbers, got a list of 3",
+        ),
+        ([], {}, (64, 8), "layout.views: must not be empty"),
+        ([{}] * 17, {}, (64, 8), "layout.views: must have at most 16 entries, got 17"),
+        ([{"formula": {}}], {}, (64, 8), "layout.views.0: unknown key 'formula'"),
+        ([{}], {"columns": 0}, (64, 8), "layout.columns: must be at least 1, got 0"),
+        ([{}], {"gap": -1}, (64, 8), "layout.gap: must be at least 0, got -1"),
+        ([{}], {}, (16384, 16384), "image: must be at most 33,554,432 pixels with a layout, got 268,435,456"),
+        (
+            [{}, {"renderer": {"type": "volume", "zoom": [{"center": [9, 0, 0], "scale": 2}]}}],
+            {},
+            (64, 8),
+            "layout.views.1.renderer.zoom.0.center: the box must lie within the one before",
+        ),
+        (
+            [{}, {"renderer": {"type": "cut_plane", "colors": {"palette": "viridiss"}}}],
+            {},
+            (64, 8),
+            "layout.views.1.renderer.colors.palette: unknown palette 'viridiss'; did you mean 'viridis'?",
+        ),
+        (
+            [{"renderer": {"type": "volume", "file": "missing.nrrd"}}],
+            {},
+            (64, 8),
+            "layout.views.0.renderer.file: ",
+        ),
+        (
+            [{"environment": {"name": "studoi"}}],
+            {},
+            (64, 8),
+            "layout.views.0.environment.name: unknown environment 'studoi'; did you mean 'studio'?",
+        ),
+    ],
+)
+def test_bad_layouts(
+    views: list[dict[str, Any]], layout: dict[str, Any], size: tuple[int, int], message: str
+) -> None:
+    """All of it is said before anything is rendered."""
+    with pytest.raises((SceneError, FileError)) as caught:
+        scene_of(views, size, **layout)
+    assert str(caught.value).startswith(message)
+    assert "\n" not in str(caught.value)
+    assert caught.value.status == 2
