@@ -60,6 +60,11 @@ def chosen_by_word(word: str, other: str) -> Discriminator:
     return Discriminator(lambda value: word if isinstance(value, str) else other)
 
 
+def chosen_by_list(several: str, one: str) -> Discriminator:
+    """Chooses `several` for a list and `one` for anything else."""
+    return Discriminator(lambda value: several if isinstance(value, (list, tuple)) else one)
+
+
 def minus(a: Vector, b: Vector) -> Vector:
     """a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

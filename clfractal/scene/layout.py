@@ -34,15 +34,15 @@ class LayoutView(Section):
         None,
         description="left, top, width and height as parts of the picture; the next cell of the grid if null",
     )
-    camera: Camera | None = None
-    renderer: Renderer | None = None
-    lights: Lights | None = None
-    material: Material | None = None
-    coloring: Coloring | None = None
-    background: Background | None = None
-    environment: Environment | None = None
-    fog: Fog | None = None
-    cut_planes: CutPlanes | None = None
+    camera: Camera | None = Field(None, description="in place of the scene's own; that if null")
+    renderer: Renderer | None = Field(None, description="in place of the scene's own; that if null")
+    lights: Lights | None = Field(None, description="in place of the scene's own; that if null")
+    material: Material | None = Field(None, description="in place of the scene's own; that if null")
+    coloring: Coloring | None = Field(None, description="in place of the scene's own; that if null")
+    background: Background | None = Field(None, description="in place of the scene's own; that if null")
+    environment: Environment | None = Field(None, description="in place of the scene's own; that if null")
+    fog: Fog | None = Field(None, description="in place of the scene's own; that if null")
+    cut_planes: CutPlanes | None = Field(None, description="in place of the scene's own; that if null")
 
     @model_validator(mode="after")
     def _within(self) -> Self:
@@ -61,7 +61,9 @@ class LayoutView(Section):
 class Layout(Section):
     """Views in a grid, from left to right and from top to bottom, or wherever their `area` says."""
 
-    views: Annotated[tuple[LayoutView, ...], Field(strict=False, min_length=1, max_length=MAX_VIEWS)]
+    views: Annotated[tuple[LayoutView, ...], Field(strict=False, min_length=1, max_length=MAX_VIEWS)] = Field(
+        description="what each has of its own; all else is the scene's"
+    )
     columns: Annotated[int, Field(strict=True, ge=1, le=MAX_VIEWS)] | None = Field(
         None, description="cells of a row; one row if null"
     )

@@ -5,22 +5,29 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import Color, Fraction, Position, Section, Vector, problem
+from clfractal.scene.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
 from clfractal.scene.sampled import Sampled
 
 MAX_RESOLUTION = 16_384
 Side = Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION)]
-Sides = Annotated[tuple[Side, Side, Side], Field(strict=False), Tag("sides")]
-Size = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
+Sides = Annotated[tuple[Side, Side, Side], Field(strict=False)]
+Resolution = Annotated[
+    Annotated[Side, Tag("one")] | Annotated[Sides, Tag("three")],
+    Field(discriminator=chosen_by_list("three", "one")),
+]
+Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
+Lengths = Annotated[tuple[Length, Length, Length], Field(strict=False)]
+Size = Annotated[
+    Annotated[Length, Tag("one")] | Annotated[Lengths, Tag("three")],
+    Field(discriminator=chosen_by_list("three", "one")),
+]
 
 
 class Box(Section):
     """A box in space, its sides along the axes."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="scene units")
-    size: Annotated[tuple[Size, Size, Size], Field(strict=False)] | Size = Field(
-        4.0, description="its sides, scene units; one number for a cube"
-    )
+    size: Size = Field(4.0, description="its sides, scene units; one number for a cube")
 
     @property
     def sides(self) -> Vector:
@@ -84,9 +91,7 @@ class VolumeRenderer(Sampled):
     zoom: Annotated[tuple[Zoom, ...], Field(strict=False, max_length=64)] = Field(
         (), description="smaller boxes, each within the one before; shown as large as the first"
     )
-    resolution: Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION), Tag("side")] | Sides = Field(
-        512, description="voxels along the longest side, or along x, y and z"
-    )
+    resolution: Resolution = Field(512, description="voxels along the longest side, or along x, y and z")
     file: str | None = Field(
         None,
         min_length=1,
@@ -117,7 +122,9 @@ class VolumeRenderer(Sampled):
     opacity_limit: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
         0.99, description="a ray ends once it is that opaque"
     )
-    transfer: Transfer = Field(default_factory=dict, validate_default=True)
+    transfer: Transfer = Field(
+        default_factory=dict, validate_default=True, description="what the values of voxels look like"
+    )
     shadows: bool = Field(False, description="whether lights with a shadow send rays through the grid")
 
     @property
