@@ -347,8 +347,8 @@ def test_overrides_replace_values() -> None:
     assert scene.lights[0].intensity == 2
     assert scene.formula.parameters == {"power": 4}
     assert scene.background == "transparent"
-    assert scene.renderer.bounds is not None
-    assert scene.renderer.bounds.radius == 3
+    assert scene.surface.bounds is not None
+    assert scene.surface.bounds.radius == 3
     assert with_overrides(scene, ["camera.fov=45"]).camera == scene.camera.model_copy(update={"fov": 45})
 
 
