@@ -1,0 +1,238 @@
+"""One picture of a volume or with cut planes, however it is cut, batched, packed, pooled or sampled; zooms; files askew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.device.tune import accepted_lanes, best_lanes
+from clfractal.files.volume import Volume, write_volume
+from clfractal.render import engine, loop
+from clfractal.render.tiles import TileGrid
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.voxels import pool
+from tests.render.shots import PERSPECTIVE, plan_of, points_of, shoot, stacked
+from tests.render.test_tiles_bits import close, same
+from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
+
+SIZE = (70, 40)
+FOG = {"opacity": [{"at": 0.1, "opacity": 0}, {"at": 1, "opacity": 0.4}]}
+LIGHTS = [{"direction": [-1, 1, -1], "shadow": True}, {"type": "point", "position": [2, -2, 3]}]
+PLANES = [
+    {"plane": {"center": [0, -0.2, 0], "normal": [0.2, -1, 0.3]}, "opacity": 0.5},
+    {"plane": {"center": [0.2, 0, 0], "normal": [1, -0.3, 0.2]}, "cut": True, "opacity": 0.3},
+]
+HAST: dict[str, Any] = {"version": 1, "formula": {"name": "hast", "iterations": 12}}
+CAMERA = {"position": [1.5, -2.5, 1.5], "target": [-0.4, 0, 0], "fov": 45}
+
+
+def scene_of(**sections: Any) -> Scene:
+    image = {"width": SIZE[0], "height": SIZE[1]}
+    return load_scene({**HAST, "image": image, "camera": CAMERA, "lights": LIGHTS, **sections})
+
+
+BOX = {"center": [-0.4, 0, 0], "size": [3.2, 3, 2.8]}
+VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "value": "coverage", "shadows": True}
+SCENES = {
+    "surface": scene_of(renderer=VOLUME, cut_planes=PLANES),
+    "fog": scene_of(renderer={**VOLUME, "transfer": FOG, "samples": 3}, background="transparent"),
+    "cut object": scene_of(renderer={"type": "surface"}, cut_planes=PLANES),
+    "cut plane": scene_of(renderer={"type": "cut_plane", "samples": 3}),
+}
+
+
+@pytest.fixture(scope="module")
+def wholes(device: Device) -> dict[str, npt.NDArray[np.float32]]:
+    """Each scene in one go."""
+    return {name: stacked(shoot(scene, device)) for name, scene in SCENES.items()}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_tiles_and_regions(
+    device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """A tile by itself, a part that begins anywhere, tiles one by one and in parts: the bits of the whole."""
+    scene, whole = SCENES[name], wholes[name]
+    plan = plan_of(scene, device)
+    for index in (1, 3, 5):
+        tile = TileGrid(plan.region).tile(index)
+        pixels = np.moveaxis(engine.render_tile(scene, plan, device, tile), 0, -1)
+        expected = whole[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
+        assert same(np.ascontiguousarray(pixels), np.ascontiguousarray(expected))
+    for x, y, width, height in ((13, 7, 50, 31), (33, 20, 1, 1), (64, 32, 6, 8)):
+        part = stacked(shoot(scene, device, region=(x, y, width, height)))
+        assert same(part, np.ascontiguousarray(whole[y : y + height, x : x + width]))
+    monkeypatch.setattr(loop, "CAPACITY", 1)
+    assert same(stacked(shoot(scene, device)), whole)
+    monkeypatch.setattr(loop, "BATCH_SECONDS", 1e-6)
+    assert same(stacked(shoot(scene, device)), whole)
+
+
+@pytest.mark.parametrize("name", ["surface", "fog"])
+def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
+    """Packets of another width are another program: the last bits differ, and with them what decides at a rim."""
+    for lanes in set(accepted_lanes(device, "float32")) & {1, 8, 16}:
+        if lanes != best_lanes(device, "float32"):
+            close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
+
+
+@pytest.mark.parametrize("parts", [2, 4])
+def test_a_grid_in_several_pools(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: int
+) -> None:
+    """Larger than the device's largest buffer: values and normals come from the right part."""
+    values = np.random.default_rng(5).uniform(0, 255, (33, 41, 50)).astype(np.uint8)
+    values[:12] //= 16
+    keep(tmp_path / "a.nrrd", values, [-1.2, -1, -0.8], [0.05] * 3)
+    transfer = {"opacity": [{"at": 20, "opacity": 0}, {"at": 255, "opacity": 0.5}]}
+    scene = volume_scene(
+        PERSPECTIVE, folder=tmp_path, file="a.nrrd", look=LIT, transfer=transfer, size=(40, 40)
+    )
+    whole = stacked(shoot(scene, device))
+    usual = pool.plan_pools
+    monkeypatch.setattr(
+        "clfractal.voxels.dense.plan_pools",
+        lambda *given: replace(usual(*given), part_slots=-(-usual(*given).slots // parts)),
+    )
+    assert same(stacked(shoot(scene, device)), whole)
+    assert (whole[..., 3] > 0.9).mean() > 0.1
+
+
+@pytest.mark.parametrize("scales", [[4], [2, 2]])
+def test_a_zoom_shows_the_small_box_as_large_as_the_first(device: Device, scales: list[int]) -> None:
+    """The same voxels as of the small box by itself, seen by a camera that is as much nearer."""
+    middle = np.array([-0.4, 0.1, 0.05])
+    first = {"center": list(middle), "size": [2.4, 2.0, 1.6]}
+    small = middle + np.array([-0.3, 0.25, 0.2])
+    light = {"lights": [{"direction": [-1, 1, -1]}], "cut_planes": []}
+    eye = np.array([1.2, -2.8, 1.6])
+    common = {"type": "volume", "resolution": [48, 40, 32], "value": "coverage", "precision": "float32"}
+    zoomed = scene_of(
+        **light,
+        renderer={**common, "box": first, "zoom": [{"center": list(small), "scale": s} for s in scales]},
+    )
+    zoomed = zoomed.model_copy(
+        update={
+            "camera": zoomed.camera.model_copy(
+                update={"position": tuple(middle + eye), "target": tuple(middle)}
+            )
+        }
+    )
+    itself = scene_of(**light, renderer={**common, "box": {"center": list(small), "size": [0.6, 0.5, 0.4]}})
+    itself = itself.model_copy(
+        update={
+            "camera": itself.camera.model_copy(
+                update={"position": tuple(small + eye / 4), "target": tuple(small)}
+            )
+        }
+    )
+    near, far = shoot(zoomed, device), shoot(itself, device)
+    hit = (near["A"] > 0) & (far["A"] > 0)
+    assert hit.mean() > 0.1
+    assert ((near["A"] > 0) != (far["A"] > 0)).mean() < 0.01
+    both = points_of(near)[hit], points_of(far)[hit]
+    off = np.linalg.norm((both[0] - middle) / 4 - (both[1] - small), axis=-1)
+    assert np.percentile(off, 98) < 1e-4
+    different = np.abs(stacked(near, "RGB") - stacked(far, "RGB")).max(-1)[hit]
+    assert np.percentile(different, 98) < 1e-2
+    np.testing.assert_allclose(near["Z"][hit][off < 1e-4] / 4, far["Z"][hit][off < 1e-4], atol=2e-4)
+
+
+def test_samples(device: Device, tmp_path: Path) -> None:
+    """With many samples a pixel's coverage is the part of it that a box covers; data channels are of one sample."""
+    keep(tmp_path / "full.nrrd", np.full((8, 8, 8), 200, np.uint8), [-0.5, -0.5, -0.5], [0.125] * 3)
+    camera = {"projection": "orthographic", "position": [0, -3, 0], "height": 1.6}
+    solid = {"opacity": [{"at": 0, "opacity": 1}]}
+    scene = volume_scene(camera, folder=tmp_path, file="full.nrrd", transfer=solid, samples=64, size=(15, 15))
+    film = shoot(scene, device)
+    edges = np.clip((np.arange(16) - 7.5) * 1.6 / 15, -0.5, 0.5)
+    part = np.diff(edges) / (1.6 / 15)
+    np.testing.assert_allclose(film["A"], part[:, None] * part[None], atol=0.05)
+    assert film["A"].sum() * (1.6 / 15) ** 2 == pytest.approx(1, rel=5e-3)
+    color = np.array(FLAT["material"]["color"])
+    np.testing.assert_allclose(stacked(film, "RGB"), film["A"][..., None] * color, atol=1e-5)
+    assert (film["samples"] == 64).all()
+    # A ray that nothing changes needs no more samples than the fewest.
+    scene = volume_scene(
+        camera,
+        folder=tmp_path,
+        file="full.nrrd",
+        transfer=solid,
+        samples=256,
+        noise=0.02,
+        min_samples=8,
+        size=(15, 15),
+    )
+    film = shoot(scene, device)
+    assert set(film["samples"][4:11, 4:11].flat) == {8}
+    assert film["samples"][2, 4:11].min() > 30
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
+        [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+        [[0, -1, 0], [0, 0, 1], [-1, 0, 0]],
+    ],
+)
+def test_files_whose_axes_run_otherwise(device: Device, tmp_path: Path, turn: list[list[float]]) -> None:
+    """The same object stored along other axes, forward and backward, is the same picture."""
+    shape, spacing = np.array([30, 24, 20]), np.array([0.06, 0.08, 0.1])
+    corner = -shape * spacing / 2
+
+    def object_at(places: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
+        ball = 0.5 - np.linalg.norm(places - [0.2, -0.1, 0.25], axis=-1)
+        nose = 0.2 - np.linalg.norm(places - [-0.6, 0.3, -0.4], axis=-1)
+        values: npt.NDArray[np.float64] = np.clip(0.5 + np.maximum(ball, nose) / 0.08, 0, 1)
+        return values.astype(np.float32)
+
+    straight = object_at(middles(shape.tolist(), corner, spacing))
+    keep(tmp_path / "straight.nrrd", straight, corner, spacing)
+    # Axis i of the file runs along turn[i].
+    axes = np.array(turn, float)
+    of = [int(np.abs(row).argmax()) for row in axes]
+    sides, steps = shape[of], axes * spacing[of][:, None]
+    first = corner + spacing / 2 + np.sum(np.where(axes < 0, (shape - 1) * spacing, 0), axis=0)
+    k, j, i = np.meshgrid(*(np.arange(n) for n in sides[::-1]), indexing="ij")
+    places = first + i[..., None] * steps[0] + j[..., None] * steps[1] + k[..., None] * steps[2]
+    write_volume(tmp_path / "turned.nrrd", Volume(object_at(places), first, steps))
+    films = [
+        shoot(volume_scene(PERSPECTIVE, folder=tmp_path, file=f"{name}.nrrd", look=LIT), device)
+        for name in ("straight", "turned")
+    ]
+    np.testing.assert_allclose(stacked(films[1], "RGBA"), stacked(films[0], "RGBA"), atol=2e-3)
+    assert films[0]["A"].mean() > 0.05
+    # The small ball is where it is: left of the middle, and low.
+    low = points_of(films[1])[films[1]["P.Z"] < -0.3]
+    assert (np.linalg.norm(low - [-0.6, 0.3, -0.4], axis=-1) < 0.25).all()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("transfer", [FOG, {}], ids=["fog", "surface"])
+def test_values_that_are_no_numbers(
+    device: Device, tmp_path: Path, transfer: dict[str, Any], value: float
+) -> None:
+    """A few of them leave the rest of the picture as it is, and make no pixel a NaN."""
+    corner, spacing = [-1.0, -1, -1], [0.0625] * 3
+    distance = np.linalg.norm(middles((32, 32, 32), corner, spacing), axis=-1)
+    values = np.clip(0.5 + (0.7 - distance) / 0.0625, 0, 1).astype(np.float32)
+    keep(tmp_path / "good.nrrd", values, corner, spacing)
+    values[3:5, 4, 5] = value
+    values[16, 16, 16] = value
+    keep(tmp_path / "bad.nrrd", values, corner, spacing)
+    scenes = [
+        volume_scene(PERSPECTIVE, folder=tmp_path, file=f"{name}.nrrd", transfer=transfer)
+        for name in ("good", "bad")
+    ]
+    good, bad = (stacked(shoot(scene, device), "RGBA") for scene in scenes)
+    assert np.isfinite(bad).all()
+    assert (np.abs(good - bad).max(-1) > 0.01).mean() < 0.05
