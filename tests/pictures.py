@@ -21,8 +21,11 @@ from clfractal import resources
 from clfractal.api import load_scene, render
 from clfractal.render.film import Film
 from clfractal.scene.model import Scene
+from clfractal.scene.renderer import Renderer
+from clfractal.scene.volume import VolumeRenderer
 
 WIDTH, HEIGHT = 96, 54
+RESOLUTION = 96  # voxels along the longest side of a volume
 GOLDEN = Path(__file__).parent / "golden"
 FAILURES = Path(__file__).resolve().parents[1] / "test-failures"
 
@@ -35,8 +38,17 @@ def scene_paths() -> list[Path]:
 
 
 def small_scene(path: Path) -> Scene:
-    """The scene at the size of the golden pictures, with one sample per pixel."""
-    sizes = [f"image.width={WIDTH}", f"image.height={HEIGHT}", "renderer.samples=1"]
+    """The scene at the size of the golden pictures, with one sample per pixel, and grids no finer than that needs."""
+    scene = load_scene(path)
+    renderers: dict[str, Renderer] = {"renderer": scene.renderer}
+    for number, view in enumerate(scene.layout.views if scene.layout else ()):
+        if view.renderer is not None:
+            renderers[f"layout.views.{number}.renderer"] = view.renderer
+    sizes = [f"image.width={WIDTH}", f"image.height={HEIGHT}"]
+    for key, renderer in renderers.items():
+        sizes.append(f"{key}.samples=1")
+        if isinstance(renderer, VolumeRenderer):
+            sizes.append(f"{key}.resolution={RESOLUTION}")
     return load_scene(path, overrides=sizes)
 
 

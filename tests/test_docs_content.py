@@ -85,6 +85,8 @@ SECTIONS = {
     "background": "Gradient",
     "environment": "Environment",
     "fog": "Fog",
+    "layout": "Layout",
+    "layout.views": "LayoutView",
     "output": "Output",
 }
 
@@ -94,6 +96,15 @@ CUT_PLANES = {
     "renderer.colors": "EscapeColors",
     "renderer.plane": "Plane",
     "renderer.plane.transform": "Transform",
+    "cut_planes": "CutPlane",
+}
+VOLUMES = {
+    "renderer, volume": "VolumeRenderer",
+    "renderer.box": "Box",
+    "renderer.zoom": "Zoom",
+    "renderer.transfer": "Transfer",
+    "renderer.transfer.opacity": "OpacityStop",
+    "renderer.transfer.color": "ColorStop",
 }
 
 
@@ -159,7 +170,7 @@ def expected_rows(name: str) -> list[list[str]]:
 
 
 def test_every_part_of_a_scene_is_described() -> None:
-    assert {*SECTIONS.values(), *CUT_PLANES.values()} == set(load.schema()["$defs"])
+    assert {*SECTIONS.values(), *CUT_PLANES.values(), *VOLUMES.values()} == set(load.schema()["$defs"])
     keys = {code(row[0]) for row in table("scenes.md", "The top level")}
     assert keys == set(load.schema()["properties"])
     required = {code(row[0]) for row in table("scenes.md", "The top level") if row[1] == "required"}
@@ -176,6 +187,12 @@ def test_keys_defaults_and_ranges_of_a_scene(heading: str) -> None:
 def test_keys_defaults_and_ranges_of_cut_planes(heading: str) -> None:
     told = [row[:3] for row in table("cut_planes.md", heading)]
     assert sorted(told) == sorted(expected_rows(CUT_PLANES[heading]))
+
+
+@pytest.mark.parametrize("heading", VOLUMES)
+def test_keys_defaults_and_ranges_of_volumes(heading: str) -> None:
+    told = [row[:3] for row in table("volumes.md", heading)]
+    assert sorted(told) == sorted(expected_rows(VOLUMES[heading]))
 
 
 def test_limits_of_scene_files() -> None:
