@@ -65,10 +65,21 @@ INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tin
     return found;
 }
 
-// The quads along a ray of the picture, in front of and behind distance `object` (the largest number where nothing was hit).
-INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) {
-    real distance[PLANES], alpha[PLANES], counts[PLANES];
-    color tints[PLANES];
+// Where a ray of the picture meets the quads, and what they are there; the largest number where it misses one.
+typedef struct {
+    real distance[PLANES], alpha[PLANES], count[PLANES];
+    color tint[PLANES];
+} plane_hits;
+
+// The nearest quad past the distance `before`.
+typedef struct {
+    real before, distance, alpha, count;
+    color tint;
+    vec normal;
+} plane_hit;
+
+INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
+    plane_hits hits;
     for (int i = 0; i < PLANES; ++i) {
         __constant const struct CutPlane *plane = set.planes + i;
         const vec normal = vec_splat(plane->normal);
@@ -80,16 +91,41 @@ INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) 
                          less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
                          less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
                          less(R(0.0), (real)(plane->opacity));
-        distance[i] = pick(met, t, (real)(REAL_LARGEST));
-        alpha[i] = R(0.0);
-        counts[i] = R(0.0);
-        tints[i] = color_of(R(0.0), R(0.0), R(0.0));
+        hits.distance[i] = pick(met, t, (real)(REAL_LARGEST));
+        hits.alpha[i] = R(0.0);
+        hits.count[i] = R(0.0);
+        hits.tint[i] = color_of(R(0.0), R(0.0), R(0.0));
         if (!any_lane(met)) continue;
         const escaped e = plane_look(vec_along(r.origin, t, r.direction), met, i, set);
-        tints[i] = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
-        alpha[i] = pick(met, (real)(plane->opacity), R(0.0));
-        counts[i] = e.count;
+        hits.tint[i] = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
+        hits.alpha[i] = pick(met, (real)(plane->opacity), R(0.0));
+        hits.count[i] = e.count;
     }
+    return hits;
+}
+
+INLINE plane_hit planes_next(const plane_hits *hits, real before, plane_set set) {
+    plane_hit next;
+    next.before = before;
+    next.distance = (real)(REAL_LARGEST);
+    next.alpha = R(0.0);
+    next.count = R(0.0);
+    next.tint = color_of(R(0.0), R(0.0), R(0.0));
+    next.normal = vec_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < PLANES; ++i) {
+        const mask nearer = less(before, hits->distance[i]) & less(hits->distance[i], next.distance);
+        next.distance = pick(nearer, hits->distance[i], next.distance);
+        next.alpha = pick(nearer, hits->alpha[i], next.alpha);
+        next.count = pick(nearer, hits->count[i], next.count);
+        next.tint = color_pick(nearer, hits->tint[i], next.tint);
+        next.normal = vec_pick(nearer, vec_splat(set.planes[i].normal), next.normal);
+    }
+    return next;
+}
+
+// The quads along a ray of the picture, in front of and behind distance `object` (the largest number where nothing was hit).
+INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) {
+    const plane_hits hits = planes_met(r, active, set);
     plane_layers layers;
     layers.front = color_of(R(0.0), R(0.0), R(0.0));
     layers.behind = layers.front;
@@ -100,31 +136,20 @@ INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) 
     layers.count = R(0.0);
     real before = R(-1.0);
     for (int pass = 0; pass < PLANES; ++pass) {
-        // The nearest of those that are left.
-        real t = (real)(REAL_LARGEST), a = R(0.0), count = R(0.0);
-        color tint = color_of(R(0.0), R(0.0), R(0.0));
-        vec normal = layers.normal;
-        for (int i = 0; i < PLANES; ++i) {
-            const mask nearer = less(before, distance[i]) & less(distance[i], t);
-            t = pick(nearer, distance[i], t);
-            a = pick(nearer, alpha[i], a);
-            count = pick(nearer, counts[i], count);
-            tint = color_pick(nearer, tints[i], tint);
-            normal = vec_pick(nearer, vec_splat(set.planes[i].normal), normal);
-        }
-        if (!any_lane(less(t, (real)(REAL_LARGEST)))) break;
-        before = t;
-        const mask in_front = less(t, object);
-        const real front = pick(in_front, a * layers.front_through, R(0.0));
-        const real behind = pick(in_front, R(0.0), a * layers.behind_through);
-        layers.front = color_add(layers.front, color_scale(tint, front));
-        layers.behind = color_add(layers.behind, color_scale(tint, behind));
+        const plane_hit next = planes_next(&hits, before, set);
+        if (!any_lane(less(next.distance, (real)(REAL_LARGEST)))) break;
+        before = next.distance;
+        const mask in_front = less(next.distance, object);
+        const real front = pick(in_front, next.alpha * layers.front_through, R(0.0));
+        const real behind = pick(in_front, R(0.0), next.alpha * layers.behind_through);
+        layers.front = color_add(layers.front, color_scale(next.tint, front));
+        layers.behind = color_add(layers.behind, color_scale(next.tint, behind));
         layers.front_through -= front;
         layers.behind_through -= behind;
-        const mask well = in_front & less_equal(R(0.5), a) & less(t, layers.nearest);
-        layers.nearest = pick(well, t, layers.nearest);
-        layers.normal = vec_pick(well, normal, layers.normal);
-        layers.count = pick(well, count, layers.count);
+        const mask well = in_front & less_equal(R(0.5), next.alpha) & less(next.distance, layers.nearest);
+        layers.nearest = pick(well, next.distance, layers.nearest);
+        layers.normal = vec_pick(well, next.normal, layers.normal);
+        layers.count = pick(well, next.count, layers.count);
     }
     const mask seen = less(layers.nearest, (real)(REAL_LARGEST));
     layers.point = vec_along(r.origin, pick(seen, layers.nearest, R(0.0)), r.direction);

@@ -85,6 +85,38 @@ INLINE real in_grid(ray r, real face, __constant const struct Grid *about) {
 }
 #endif
 
+// What is seen along a ray so far: light, and the part of what comes next that gets through; and the place where half of the
+// light is stopped, with the value there (on a plane the count), which is what the data channels tell.
+typedef struct {
+    color light;
+    real through, t, value;
+    vec normal;
+    mask found, on_plane;
+} sight;
+
+INLINE void sight_add(sight *s, color light, real opacity, real t, real value, vec normal, mask of_plane, mask adds) {
+    s->light = color_pick(adds, color_add(s->light, color_scale(light, s->through * opacity)), s->light);
+    s->through = pick(adds, s->through * (R(1.0) - opacity), s->through);
+    const mask half_way = adds & ~s->found & less_equal(s->through, R(0.5));
+    s->t = pick(half_way, t, s->t);
+    s->value = pick(half_way, value, s->value);
+    s->normal = vec_pick(half_way, normal, s->normal);
+    s->on_plane |= half_way & of_plane;
+    s->found |= half_way;
+}
+
+#if PLANES > 0 && !SURFACE
+// Adds the quads that are left before distance `until`, one after the other.
+INLINE void sight_quads(sight *s, real until, mask active, const plane_hits *hits, plane_hit *next, plane_set set) {
+    for (int i = 0; i < PLANES; ++i) {
+        const mask here = active & less(next->distance, until);
+        if (!any_lane(here)) return;
+        sight_add(s, next->tint, next->alpha, next->distance, next->count, next->normal, here, here);
+        *next = planes_next(hits, pick(here, next->distance, next->before), set);
+    }
+}
+#endif
+
 INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, world w, real *steps) {
     __constant const struct Grid *about = w.grid.about;
     const ray r = camera_ray(x, y, lens_x, lens_y, w.view);
@@ -104,10 +136,15 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     active &= enter(kept, about, &g);
     const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
     const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
-    color seen = color_of(R(0.0), R(0.0), R(0.0));
-    real through = R(1.0), number = R(0.0), seen_t = R(0.0), seen_value = R(0.0), looked = R(0.0);
-    vec seen_normal = zero;
-    mask found = active & ~active;
+    const mask nowhere = active & ~active;
+    real number = R(0.0), looked = R(0.0);
+    sight e = {color_of(R(0.0), R(0.0), R(0.0)), R(1.0), R(0.0), R(0.0), zero, nowhere, nowhere};
+#if SURFACE
+    mask found = nowhere;
+#elif PLANES > 0
+    const plane_hits hits = planes_met(r, wanted, w.planes);
+    plane_hit next = planes_next(&hits, R(-1.0), w.planes);
+#endif
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;
         const real t = g.near + number * step;
@@ -139,17 +176,12 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
 #else
                 const color base = tint;
 #endif
-                const real share = through * opacity;
                 const color light = lit(point, normal, base, to_viewer, adds, w, &looked);
-                seen = color_pick(adds, color_add(seen, color_scale(light, share)), seen);
-                through = pick(adds, through * (R(1.0) - opacity), through);
-                // Where half of the light is stopped: what the data channels tell.
-                const mask half_way = adds & ~found & less_equal(through, R(0.5));
-                seen_t = pick(half_way, t, seen_t);
-                seen_value = pick(half_way, value, seen_value);
-                seen_normal = vec_pick(half_way, normal, seen_normal);
-                found |= half_way;
-                active &= less(R(1.0) - (real)(w.settings->opacity_limit), through);
+#if PLANES > 0
+                sight_quads(&e, t, adds, &hits, &next, w.planes);
+#endif
+                sight_add(&e, light, opacity, t, value, normal, nowhere, adds);
+                active &= less(R(1.0) - (real)(w.settings->opacity_limit), e.through);
             }
 #endif
         }
@@ -170,58 +202,52 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
         high = pick(inside, middle, high);
         low = pick(inside, low, middle);
     }
-    seen_t = high;
     if (any_lane(found)) {
-        c = cell_at(vec_along(g.origin, seen_t, g.direction), about);
+        c = cell_at(vec_along(g.origin, high, g.direction), about);
         entry = brick_at(c, w.grid);
         const mask stored = found & less(R(-0.5), to_reals(entry));
         vec normal = grid_normal(c, entry, stored, w.grid);
         const mask none = less(vec_dot(normal, normal), R(0.5));
         // A ray that begins inside, at the grid's side, meets a flat face.
         normal = vec_pick(none, to_viewer, normal);
-        const vec point = vec_along(r.origin, seen_t, r.direction);
+        const vec point = vec_along(r.origin, high, r.direction);
         real opacity;
         const real value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
         color base = transfer_at(value, w.settings, w.transfer, &opacity);
 #if COLOR_BY_NORMAL
         base = color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
 #endif
-        seen = color_pick(found, lit(point, normal, base, to_viewer, found, w, &looked), seen);
-        through = pick(found, R(0.0), R(1.0));
-        seen_normal = normal;
-        seen_value = value;
+        const color light = lit(point, normal, base, to_viewer, found, w, &looked);
+        sight_add(&e, light, R(1.0), high, value, normal, nowhere, found);
     }
 #endif
-    shot s;
-    s.coverage = R(1.0) - through;
-    s.hit = found;
+#if PLANES > 0
+#if !SURFACE
+    sight_quads(&e, kept.near, bare, &hits, &next, w.planes);
+#endif
+    sight_add(&e, face_tint, R(1.0), kept.near, face_count, face_normal, bare, bare);
+#if !SURFACE
+    sight_quads(&e, (real)(REAL_LARGEST), wanted, &hits, &next, w.planes);
+#endif
+#endif
     color background = color_of(R(0.0), R(0.0), R(0.0));
     if (!w.material->transparent) {
         const real share = clamp(y / (real)((scalar)w.view->height), R(0.0), R(1.0));
         background = color_mix(color_splat(w.material->background_top), color_splat(w.material->background_bottom), share);
     }
-#if PLANES > 0
-    seen_t = pick(bare, kept.near, seen_t);
-    seen_normal = vec_pick(bare, face_normal, seen_normal);
-    s.hit |= bare;
-    s.coverage = pick(bare, R(1.0), s.coverage);
-    seen = color_pick(bare, face_tint, seen);
-#endif
-    s.radiance = color_add(seen, color_scale(background, through));
-    s.point = vec_along(r.origin, seen_t, r.direction);
+    shot s;
+    s.coverage = R(1.0) - e.through;
+    s.hit = e.found;
+    s.radiance = color_add(e.light, color_scale(background, e.through));
+    s.point = vec_along(r.origin, e.t, r.direction);
     s.depth = vec_dot(vec_sub(s.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
-    s.normal = seen_normal;
-    s.smooth = seen_value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset);
-#if PLANES > 0
-    s.smooth = pick(bare, face_count, s.smooth);
-#endif
+    s.normal = e.normal;
+    s.smooth = pick(e.on_plane, e.value, e.value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset));
     s.steps = looked;
     *steps += looked;
-#if PLANES > 0
-    // What is seen of the grid is weighted by its coverage already.
-    const color object = color_scale(seen, R(1.0) / fmax(s.coverage, R(1e-6)));
-    const real distance = pick(s.hit, seen_t, (real)(REAL_LARGEST));
-    s = planes_into(s, object, background, planes_seen(r, distance, wanted, w.planes), w.view);
+#if PLANES > 0 && SURFACE
+    const real distance = pick(s.hit, e.t, (real)(REAL_LARGEST));
+    s = planes_into(s, e.light, background, planes_seen(r, distance, wanted, w.planes), w.view);
 #endif
     return s;
 }
