@@ -18,7 +18,7 @@ from clfractal.render.tiles import TileGrid
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
-from tests.render.shots import PERSPECTIVE, plan_of, points_of, shoot, stacked
+from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, shoot, stacked
 from tests.render.test_tiles_bits import close, same
 from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
 
@@ -29,22 +29,22 @@ PLANES = [
     {"plane": {"center": [0, -0.2, 0], "normal": [0.2, -1, 0.3]}, "opacity": 0.5},
     {"plane": {"center": [0.2, 0, 0], "normal": [1, -0.3, 0.2]}, "cut": True, "opacity": 0.3},
 ]
-HAST: dict[str, Any] = {"version": 1, "formula": {"name": "hast", "iterations": 12}}
-CAMERA = {"position": [1.5, -2.5, 1.5], "target": [-0.4, 0, 0], "fov": 45}
+HAST = {"name": "hast", "iterations": 12}
+CAMERA = {"position": [1.5, -2.5, 1.5], "target": [0, 0, 0], "fov": 45}
 
 
 def scene_of(**sections: Any) -> Scene:
     image = {"width": SIZE[0], "height": SIZE[1]}
-    return load_scene({**HAST, "image": image, "camera": CAMERA, "lights": LIGHTS, **sections})
+    plain = {"version": 1, "formula": {"inline": BALL, "iterations": 4}, "image": image, "camera": CAMERA}
+    return load_scene({**plain, "lights": LIGHTS, **sections})
 
 
-BOX = {"center": [-0.4, 0, 0], "size": [3.2, 3, 2.8]}
+BOX = {"center": [0, 0, 0], "size": [2.4, 2.6, 2.8]}
 VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "value": "coverage", "shadows": True}
 SCENES = {
     "surface": scene_of(renderer=VOLUME, cut_planes=PLANES),
     "fog": scene_of(renderer={**VOLUME, "transfer": FOG, "samples": 3}, background="transparent"),
     "cut object": scene_of(renderer={"type": "surface"}, cut_planes=PLANES),
-    "cut plane": scene_of(renderer={"type": "cut_plane", "samples": 3}),
 }
 
 
@@ -75,10 +75,12 @@ def test_tiles_and_regions(
     assert same(stacked(shoot(scene, device)), whole)
 
 
-@pytest.mark.parametrize("name", ["surface", "fog"])
-def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
+@pytest.mark.parametrize(("name", "counts"), [("surface", {1}), ("fog", {1, 8, 16})])
+def test_other_lane_counts(
+    device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str, counts: set[int]
+) -> None:
     """Packets of another width are another program: the last bits differ, and with them what decides at a rim."""
-    for lanes in set(accepted_lanes(device, "float32")) & {1, 8, 16}:
+    for lanes in counts.intersection(accepted_lanes(device, "float32")):
         if lanes != best_lanes(device, "float32"):
             close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
 
@@ -111,7 +113,7 @@ def test_a_zoom_shows_the_small_box_as_large_as_the_first(device: Device, scales
     middle = np.array([-0.4, 0.1, 0.05])
     first = {"center": list(middle), "size": [2.4, 2.0, 1.6]}
     small = middle + np.array([-0.3, 0.25, 0.2])
-    light = {"lights": [{"direction": [-1, 1, -1]}], "cut_planes": []}
+    light = {"lights": [{"direction": [-1, 1, -1]}], "formula": HAST}
     eye = np.array([1.2, -2.8, 1.6])
     common = {"type": "volume", "resolution": [48, 40, 32], "value": "coverage", "precision": "float32"}
     zoomed = scene_of(
