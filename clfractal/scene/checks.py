@@ -31,7 +31,9 @@ def check_parts(scene: Scene) -> None:
     _check_planes(scene)
     if scene.layout is not None:
         _check_views(scene)
-    _check_lights(scene)
+    if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
+        # (A file's grid is no solid of the formula's; its light goes where it may.)
+        _check_lights(scene)
 
 
 def used_bounds(scene: Scene) -> tuple[Vector, float]:
