@@ -240,11 +240,25 @@ def test_a_picture_is_not_replaced_by_its_own(here: Path, shell: InProcess) -> N
 
 
 def test_a_full_disk(here: Path, shell: InProcess) -> None:
+    assert shell("render", "scene.yaml", "-o", "built.png", "--quiet").status == 0  # its program is there now
+    (here / "built.png").unlink()
     for output in ("old.png", "old.exr"):
         with file_size_limit(4096):
             ended = shell("render", "scene.yaml", "-o", output, "--quiet")
         assert ended.is_one_line(2, f"{output}.partial: cannot be written: ")
         assert untouched(here)
+
+
+def test_no_room_for_what_the_compiler_is_told(
+    here: Path, shell: InProcess, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path_factory.mktemp("empty")))
+    monkeypatch.setenv("CLFRACTAL_LANES", "1")
+    with file_size_limit(4096):
+        ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
+    assert ended.is_one_line(2, "clfractal-", "cannot be written: File too large")
+    (here / "old.png.partial").unlink(missing_ok=True)
+    assert untouched(here)
 
 
 def test_a_disk_that_is_full_when_the_picture_is_written(
@@ -304,6 +318,7 @@ def test_a_device_with_too_little_memory(
         return replace(describe(index, platform, device), memory=10_000, max_alloc=5_000)  # type: ignore[arg-type]
 
     monkeypatch.setattr(select, "_describe", tiny)
+    monkeypatch.setattr(select, "_find", select._find.__wrapped__)  # anew, not as remembered
     ended = shell("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(2, "rendering needs ", " MiB of device memory, ", "has 0.0 MiB")
     assert untouched(here)

@@ -71,7 +71,10 @@ def test_killed_at_random_moments(seed: int, undisturbed: tuple[Path, float], tm
             running.send_signal(signal.SIGKILL)
             running.wait()
             kills += 1
-            assert not (tmp_path / "out.exr").exists()
+            # It may have just finished: a picture appears whole, or not at all.
+            if (tmp_path / "out.exr").exists():
+                assert planes(tmp_path / "out.exr") == planes(whole)
+                break
     assert render(tmp_path, "--resume", "--quiet") == Ended(0, "", "") or kills == 0
     assert planes(tmp_path / "out.exr") == planes(whole)
     assert not (tmp_path / "out.exr.partial").exists()

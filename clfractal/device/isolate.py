@@ -21,7 +21,7 @@ import clfractal
 from clfractal import errors
 from clfractal.device.child import ANSWER, REQUEST
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError
+from clfractal.errors import DeviceError, FileError, Where
 
 _NOISE = "driver.log"
 _NOISE_SHOWN = 20_000  # characters
@@ -56,6 +56,7 @@ def run(
         DeviceError: status 3, the child was ended by a signal, failed, or took too long; what the driver
             wrote is in
             the details. Errors of this package raised by the job are raised here again.
+        FileError: the folder has no room for the request.
     """
     if folder is None:
         with tempfile.TemporaryDirectory(prefix="clfractal-") as temporary:
@@ -68,7 +69,10 @@ def run(
         "folder": str(folder),
         "parent": os.getpid(),
     }
-    (folder / REQUEST).write_text(json.dumps(request), encoding="utf-8")
+    try:
+        (folder / REQUEST).write_text(json.dumps(request), encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror}", Where(str(folder))) from error
     status = _wait_for_child(folder, timeout_s)
     return _answer(folder, status, device.info.name, doing, timeout_s)
 

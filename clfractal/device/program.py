@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import pyopencl as cl
 
@@ -22,6 +23,9 @@ from clfractal.device.structs import Precision
 BUILD_TIMEOUT_S = 600.0
 
 _REMARK_SECONDS = 1.5  # longer than a refusal takes: an error stays alone on its line
+_MOST_LOADED = 32
+# By key, the one used last at the end.
+_loaded: WeakKeyDictionary[Device, dict[str, Any]] = WeakKeyDictionary()
 _FORMAT = 2  # of what is kept under a key
 
 
@@ -89,8 +93,9 @@ def build(
     key = _key(device, text, flags, warm)
     binary = cache.load_blob(key)
     if binary is not None:
-        program = compiler.load_kept(device, binary, text, flags)
+        program = _loaded.get(device, {}).get(key) or compiler.load_kept(device, binary, text, flags)
         if program is not None:
+            _remember(device, key, program)
             return Program(device, program, _milliseconds(start), cached=True)
         cache.drop_blob(key)
     remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"compiling for {device.info.name}, once"))
@@ -104,7 +109,17 @@ def build(
         remark.cancel()
     if binary:
         cache.store_blob(key, binary)
+        _remember(device, key, program)
     return Program(device, program, _milliseconds(start), cached=False)
+
+
+def _remember(device: Device, key: str, program: Any) -> None:
+    """Keeps a program in memory: loading one takes PoCL some 50 ms, every time a picture of the same kind is begun."""
+    programs = _loaded.setdefault(device, {})
+    programs.pop(key, None)
+    programs[key] = program
+    if len(programs) > _MOST_LOADED:
+        del programs[next(iter(programs))]
 
 
 def _tell(listener: Callable[[str], None] | None, line: str) -> None:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache as cache_of_calls
 from functools import cached_property
 from typing import Any, Literal
 
@@ -230,7 +231,9 @@ def _status_name(number: int) -> str:
     return str(to_string(number, "status %d"))
 
 
+@cache_of_calls
 def _find() -> list[Device]:
+    """Once for a process: a device keeps its context, and the programs that were loaded for it."""
     found: list[Device] = []
     seen: set[int] = set()
     try:
