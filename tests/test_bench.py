@@ -9,6 +9,7 @@ from clfractal.device.select import choose
 from clfractal.formulas.opencl import operations_per_application
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.surface import SurfaceRenderer
 
 
 def scene_of(row: str, *changes: str) -> Scene:
@@ -29,7 +30,8 @@ def test_rows_are_one_scene_each_but_for_what_they_measure() -> None:
 
 
 def test_every_normal_and_search_and_the_rivals_of_points_have_a_row() -> None:
-    renderers = [scene_of(name).renderer for name in bench.ROWS]
+    found = [scene_of(name).renderer for name in bench.ROWS]
+    renderers = [renderer for renderer in found if isinstance(renderer, SurfaceRenderer)]
     with_points = {
         (renderer.normal, renderer.search) for renderer in renderers if renderer.used_points.count == 9
     }

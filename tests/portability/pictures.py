@@ -82,7 +82,7 @@ def picture(
     plan = make_plan(scene, precision=precision, lanes=lanes, channels=CHANNELS)
     film = Film(plan.channels, size, plan.region)
     engine.render(scene, plan, device, film)
-    if scene.renderer.search == "steps":
+    if scene.surface.search == "steps":
         # A binary search down to the last digit takes a step more or less where that digit differs.
         film["steps"][:] = 0
     return np.stack([film[channel] for channel in CHANNELS])

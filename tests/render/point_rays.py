@@ -101,7 +101,7 @@ class Shot:
 
     def reach(self) -> Floats:
         """More than the distance of a hit and what is lost by rounding, scene units, (SIDE, SIDE)."""
-        by_distance = self.scene.renderer.search == "distance"
+        by_distance = self.scene.surface.search == "distance"
         return 1e-5 + self.footprint * (0.5 * DETAIL if by_distance else 0)
 
     def meets(self, grown: float | Floats) -> Bools:

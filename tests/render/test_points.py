@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from clfractal.device.orbit import EXTRA_APPLICATIONS
 from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
@@ -210,7 +211,7 @@ def test_distances_in_float32(name: str) -> None:
     found = points.distances(chain, here, 5, device=device(), lanes=lanes)
     expected, gradient = reference.distance(chain, here, 5)
     agree(found.full, found.normal, expected, gradient, 2e-3)
-    assert ((found.smooth >= 0) & (found.smooth <= 5 + orbit.EXTRA_APPLICATIONS)).all()
+    assert ((found.smooth >= 0) & (found.smooth <= 5 + EXTRA_APPLICATIONS)).all()
     np.testing.assert_array_equal(found.inside, found.full == 0)
 
 

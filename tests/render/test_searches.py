@@ -94,7 +94,7 @@ class Found:
     def step(self) -> float:
         """Of the search by steps, scene units."""
         radius = used_bounds(self.scene)[1]
-        return self.scene.renderer.step or radius / 100
+        return self.scene.surface.step or radius / 100
 
     def along(self, t: Floats, chosen: Bools) -> Floats:
         """Points of the chosen rays at distances t, shape (n,) or (n, m)."""

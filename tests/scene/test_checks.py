@@ -115,7 +115,7 @@ class TestWhatIsLeftOpen:
 
     def test_points(self) -> None:
         def count(**renderer: Any) -> int:
-            return scene({"inline": BALL}, renderer=renderer).renderer.used_points.count
+            return scene({"inline": BALL}, renderer=renderer).surface.used_points.count
 
         assert count() == 1
         assert count(normal="one_triangle") == 9
