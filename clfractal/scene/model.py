@@ -5,6 +5,7 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -19,6 +20,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
+from clfractal.scene.stereo import Eye, EyeName, Stereo
 from clfractal.scene.surface import SurfaceRenderer
 
 if TYPE_CHECKING:
@@ -44,6 +46,7 @@ class Scene(Section):
     fog: Fog | None = None
     cut_planes: CutPlanes = Field((), description="planes that stand in the picture, or cut the object open")
     layout: Layout | None = Field(None, description="several views in one picture; one if null")
+    stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; one picture if null")
     output: Output = Field(default_factory=dict, validate_default=True)
 
     @cached_property
@@ -63,6 +66,25 @@ class Scene(Section):
         """Where the environment's file is looked for: the folder that the scene was loaded from, or the current one."""
         return Path()
 
+    @cached_property
+    def eye(self) -> Eye:
+        """Whose picture of a stereo scene this is; the one between the two unless `seen_by` chose another."""
+        return Eye()
+
+    def seen_by(self, name: EyeName) -> Self:
+        """A stereo scene as one eye sees it: its image is that eye's, what was read and derived is shared."""
+        assert self.stereo is not None
+        wide, high = self.stereo.squeeze
+        copied = super().model_copy()
+        if (wide, high) != (1, 1):
+            image = Image(width=self.image.width // wide, height=self.image.height // high)
+            copied = super().model_copy(update={"image": image})
+            derived = ("folder", "chain", "surroundings", "given")
+            copied.__dict__ |= {each: self.__dict__[each] for each in derived if each in self.__dict__}
+        copied.__dict__.pop("views", None)
+        copied.__dict__["eye"] = replace(self.eye, name=name, wide=wide, high=high)
+        return copied
+
     def placed(self, folder: Path) -> Self:
         """The same scene, as loaded from another folder."""
         copied = super().model_copy()
@@ -73,9 +95,10 @@ class Scene(Section):
         return copied
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As of every section; the copy stays in the scene's folder."""
+        """As of every section; the copy stays in the scene's folder, and shows the same eye's picture."""
         copied = super().model_copy(update=update, deep=deep)
         copied.__dict__["folder"] = self.folder
+        copied.__dict__["eye"] = self.eye
         return copied
 
     @cached_property
@@ -125,7 +148,11 @@ class Scene(Section):
                     Where(path=f"layout.views.{number}"),
                 )
             image = Image(width=place.width, height=place.height)
-            found.append((self.model_copy(update={**view.changes(), "image": image, "layout": None}), place))
+            shown = self.model_copy(update={**view.changes(), "image": image, "layout": None})
+            # It takes up a part of the screen.
+            share = self.eye.share * place.width / self.image.width
+            shown.__dict__["eye"] = replace(self.eye, share=share)
+            found.append((shown, place))
         return found
 
     @property

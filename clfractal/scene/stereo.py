@@ -1,0 +1,114 @@
+"""Stereo: a real screen, the viewer before it, and how the two pictures are shown."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.scene.base import Position, Reflectance, Section, cross, length, problem
+
+Positive = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
+EyeName = Literal["left", "right", "middle"]
+Mode = Literal[
+    "left",
+    "right",
+    "pair",
+    "multi_view",
+    "split",
+    "over_under",
+    "split_half",
+    "over_under_half",
+    "rows",
+    "columns",
+    "checkerboard",
+    "anaglyph_chessboard",
+    "anaglyph",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Eye:
+    """Whose picture a scene shows.
+
+    Attributes:
+        name: one of the two eyes, or the cyclopean one between them.
+        wide, high: how many of the finished picture's pixels one of this eye's pixels takes up (2 if squeezed).
+        share: the part of the screen's width that the picture takes up (less than 1 for a view of a layout).
+    """
+
+    name: EyeName = "middle"
+    wide: int = 1
+    high: int = 1
+    share: float = 1.0
+
+
+class StereoPlane(Section):
+    """The rectangle in space that lies on the screen."""
+
+    center: Position = Field((0.0, 0.0, 0.0), description="its middle, scene units")
+    normal: Position = Field((0.0, -1.0, 0.0), description="towards the viewer")
+    up: Position = Field((0.0, 0.0, 1.0), description="towards its top")
+    width: Annotated[float, Field(strict=True, ge=1e-18, le=1e6)] = Field(4.0, description="scene units")
+    height: Annotated[float, Field(strict=True, ge=1e-18, le=1e6)] | None = Field(
+        None, description="scene units; as the picture's pixels are square if null"
+    )
+
+    @model_validator(mode="after")
+    def _faces_somewhere(self) -> Self:
+        if length(self.normal) < 1e-12:
+            raise problem("must not be zero", "normal")
+        if length(self.up) < 1e-12:
+            raise problem("must not be zero", "up")
+        if length(cross(self.normal, self.up)) <= 1e-6 * length(self.normal) * length(self.up):
+            raise problem("must not be parallel to the normal", "up")
+        return self
+
+
+class Stereo(Section):
+    """A pair of pictures for the two eyes of a viewer before a real screen.
+
+    Screen, distance and interpupillary distance are measured in the real world, in any one unit.
+    """
+
+    mode: Mode = Field("split", description="how the pair is shown")
+    screen_width: Positive = Field(0.52, description="of the picture on the real screen")
+    screen_distance: Positive = Field(0.6, description="from the viewer's eyes to the screen")
+    interpupillary_distance: Positive = Field(0.063, description="between the viewer's pupils")
+    swap: bool = Field(False, description="the right eye takes the left one's place in the picture")
+    plane: StereoPlane | None = Field(
+        None, description="what lies on the screen; the plane through the camera's target if null"
+    )
+    convergence: Literal["off_axis", "parallel", "toe_in"] = Field(
+        "off_axis", description="off_axis is right for a screen; the others are for comparison"
+    )
+    separation: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False)] = Field(
+        1.0, description="distance between the eyes that look, in the viewer's own"
+    )
+    fit: Literal["auto"] | None = Field(
+        None, description="auto: plane and separation are chosen so that the depth fits the budget"
+    )
+    budget: Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)] = Field(
+        1.0, description="most parallax that `fit` allows, degrees"
+    )
+    method: Literal["color", "half_color", "gray", "dubois"] = Field(
+        "dubois", description="of anaglyph: how the two pictures' colours are mixed"
+    )
+    glasses: Literal["red_cyan", "green_magenta", "amber_blue"] = Field(
+        "red_cyan", description="of anaglyph: the filters before the left and the right eye"
+    )
+    colors: Annotated[tuple[Reflectance, Reflectance], Field(strict=False)] = Field(
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)),
+        description="of anaglyph_chessboard: the left and the right eye's filter, linear Rec. 709",
+    )
+
+    @property
+    def eyes(self) -> tuple[EyeName, ...]:
+        """The eyes whose pictures are shown."""
+        if self.mode == "left":
+            return ("left",)
+        return ("right",) if self.mode == "right" else ("left", "right")
+
+    @property
+    def squeeze(self) -> tuple[int, int]:
+        """How many of the finished picture's pixels an eye's pixel is wide and high."""
+        return (2 if self.mode == "split_half" else 1, 2 if self.mode == "over_under_half" else 1)
