@@ -13,7 +13,7 @@ from clfractal.errors import FileError, Where
 from clfractal.files import atomic
 from clfractal.files.channels import CHANNELS
 from clfractal.files.png import Bits, stream_png, write_png
-from clfractal.render.tiled import Floats, TiledStore
+from clfractal.render.tiled import Floats, Picture
 
 # Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
 _FILE_KEYS = {"scene": "clfractal", "worldToCamera": "worldToCamera", "worldToNDC": "worldToNDC"}
@@ -37,7 +37,7 @@ def check_output(path: str | Path, channels: Collection[str] | None = None) -> N
 
 
 def save_outputs(
-    store: TiledStore,
+    store: Picture,
     paths: Iterable[str | Path],
     *,
     header: Mapping[str, Any] | None = None,
@@ -96,7 +96,7 @@ def save_outputs(
             )
 
 
-def png_bytes(store: TiledStore) -> bytes:
+def png_bytes(store: Picture) -> bytes:
     """An 8-bit PNG of a film, for notebooks; transparent where the film is."""
     stream = io.BytesIO()
     region = store.region
@@ -113,16 +113,16 @@ def png_bytes(store: TiledStore) -> bytes:
     return stream.getvalue()
 
 
-def _transparent(store: TiledStore, wanted: bool | None) -> bool:
+def _transparent(store: Picture, wanted: bool | None) -> bool:
     chosen = bool(store.header.get("transparent", False)) if wanted is None else wanted
     return chosen and "A" in store.channels
 
 
-def _exposure(store: TiledStore, wanted: float | None) -> float:
+def _exposure(store: Picture, wanted: float | None) -> float:
     return float(store.header.get("exposure", 0.0)) if wanted is None else wanted
 
 
-def _colors(store: TiledStore, *, alpha: bool, exposure: float) -> Iterator[Floats]:
+def _colors(store: Picture, *, alpha: bool, exposure: float) -> Iterator[Floats]:
     """The bands as arrays (rows, width, 3 or 4), colours made lighter by `exposure` stops."""
     gain = np.float32(2.0**exposure)
     for _, band in store.bands():

@@ -1,4 +1,4 @@
-"""What holds the tiles of a picture: the engine writes to one, files are made from one."""
+"""What holds a picture: the engine writes tiles to one, files are made from one."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ Floats = npt.NDArray[np.float32]
 Bands = Iterator[tuple[int, dict[str, Floats]]]
 
 
-class TiledStore(Protocol):
-    """Where the engine puts finished tiles and from where files are written."""
+class Picture(Protocol):
+    """What files are made from."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -27,15 +27,26 @@ class TiledStore(Protocol):
 
     @property
     def region(self) -> Region:
-        """The part of the picture that the store holds."""
-
-    @property
-    def grid(self) -> TileGrid:
-        """The tiles of the region."""
+        """The part of the picture that is held."""
 
     @property
     def header(self) -> dict[str, Any]:
         """What files tell about the picture; see `Film`."""
+
+    def bands(self) -> Bands:
+        """The picture from top to bottom, some rows at a time; one row of tiles of a store.
+
+        Gives (first_row, channel name -> float32 of shape (rows, region width)); first_row in picture
+        coordinates. Pixels of missing tiles have the channel's fill value.
+        """
+
+
+class TiledStore(Picture, Protocol):
+    """Where the engine puts finished tiles and from where files are written."""
+
+    @property
+    def grid(self) -> TileGrid:
+        """The tiles of the region."""
 
     @property
     def done(self) -> npt.NDArray[np.bool_]:
@@ -43,13 +54,6 @@ class TiledStore(Protocol):
 
     def put(self, tile_index: int, array: Floats) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns), cut to the region as `grid.tile` is."""
-
-    def bands(self) -> Bands:
-        """The picture from top to bottom, one row of tiles at a time.
-
-        Gives (first_row, channel name -> float32 of shape (rows, region width)); first_row in picture
-        coordinates. Pixels of missing tiles have the channel's fill value.
-        """
 
 
 def check_tile(array: Floats, tile: Tile, channels: Sequence[str]) -> None:

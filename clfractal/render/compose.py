@@ -1,0 +1,270 @@
+"""One picture of the two that a stereo scene has: beside each other, interlaced, or as an anaglyph.
+
+All in linear light and in picture coordinates of the finished picture: a region of it equals the same part of the whole.
+A store of each eye's picture goes in, `Composed` comes out and is written like any other picture, a few rows at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.errors import SceneError, Where
+from clfractal.render.anaglyph import matrices, mix
+from clfractal.render.film import Film
+from clfractal.render.tiled import Bands, Floats, Picture
+from clfractal.render.tiles import Region
+from clfractal.scene.stereo import Mode, Stereo
+
+Side = Literal["left", "right"]
+Planes = Mapping[str, Floats]
+
+BESIDE: tuple[Mode, ...] = ("split", "split_half")
+BELOW: tuple[Mode, ...] = ("over_under", "over_under_half")
+PICKED: tuple[Mode, ...] = ("rows", "columns", "checkerboard", "anaglyph_chessboard")
+"""Modes in which each pixel is one of either eye's."""
+APART: tuple[Mode, ...] = ("pair", "multi_view")
+"""Modes that keep both pictures whole; nothing is composed."""
+
+# Of one eye's picture: a composed one has no camera of its own.
+_OF_AN_EYE = ("worldToCamera", "worldToNDC", "view")
+
+
+def eye_size(stereo: Stereo, image: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of each eye's picture, pixels; `image` is the scene's `image`.
+
+    Raises:
+        ValueError: an odd size that is to be halved; a scene is checked for it when it is loaded.
+    """
+    (width, height), (wide, high) = image, stereo.squeeze
+    if width % wide or height % high:
+        raise ValueError(f"{width} x {height} pixels cannot be halved for {stereo.mode}")
+    return width // wide, height // high
+
+
+def picture_size(stereo: Stereo, image: tuple[int, int]) -> tuple[int, int]:
+    """Width and height of the finished picture, pixels; of one eye's where nothing is composed."""
+    width, height = eye_size(stereo, image)
+    return width * (2 if stereo.mode in BESIDE else 1), height * (2 if stereo.mode in BELOW else 1)
+
+
+def composed_channels(stereo: Stereo, channels: Sequence[str]) -> tuple[str, ...]:
+    """The channels of the finished picture, of those that the eyes' have: an anaglyph mixes colours and nothing else.
+
+    Raises:
+        SceneError: an anaglyph of pictures without R, G and B.
+    """
+    if stereo.mode not in ("anaglyph", "anaglyph_chessboard"):
+        return tuple(channels)
+    missing = [name for name in "RGB" if name not in channels]
+    if missing:
+        raise SceneError(
+            f"{stereo.mode} needs the channels R, G, B; {', '.join(missing)} not among them",
+            Where(path="output.channels"),
+        )
+    return tuple(channels) if stereo.mode in PICKED else tuple(name for name in channels if name in "RGBA")
+
+
+def eye_regions(stereo: Stereo, image: tuple[int, int], region: Region) -> dict[Side, Region | None]:
+    """The part of each eye's picture that a region of the finished one is made of; None of an eye that it does not need.
+
+    Raises:
+        ValueError: the region is not inside the finished picture.
+    """
+    if not region.inside(*picture_size(stereo, image)):
+        raise ValueError(f"{region} is not inside a picture of {picture_size(stereo, image)}")
+    mode = stereo.mode
+    if mode in ("left", "right"):
+        return {"left": region if mode == "left" else None, "right": region if mode == "right" else None}
+    width, height = eye_size(stereo, image)
+    if mode in BESIDE:
+        first, second = (_part(region, from_x, 0, width, height) for from_x in (0, width))
+    elif mode in BELOW:
+        first, second = (_part(region, 0, from_y, width, height) for from_y in (0, height))
+    elif mode in PICKED:
+        # One row and column of every parity tells it.
+        few = (min(region.height, 2), min(region.width, 2))
+        picked = _picks_first(mode, few, (region.x, region.y))
+        first, second = region if picked.any() else None, None if picked.all() else region
+    else:
+        first = second = region
+    if _swapped(stereo):
+        first, second = second, first
+    return {"left": first, "right": second}
+
+
+def compose(
+    stereo: Stereo, left: Planes, right: Planes, origin: tuple[int, int] = (0, 0)
+) -> dict[str, Floats]:
+    """The finished picture, or some rows of it.
+
+    Args:
+        left, right: channel -> float32 of shape (rows, columns), the part of each eye's picture that is shown
+            (`eye_regions`); empty for an eye that is not.
+        origin: x, y of the first pixel in the finished picture, which parities are counted from.
+
+    Raises:
+        ValueError: a mode of which nothing is composed, or no picture at all.
+    """
+    mode = stereo.mode
+    if mode in APART:
+        raise ValueError(f"{mode} keeps both eyes' pictures")
+    if mode in ("left", "right"):
+        return dict(left if mode == "left" else right)
+    first, second = (right, left) if _swapped(stereo) else (left, right)
+    channels = composed_channels(stereo, tuple(first or second))
+    if mode == "anaglyph":
+        return _anaglyph(stereo, left, right, channels)
+    if mode in PICKED:
+        picked = _picks_first(mode, next(iter((first or second).values())).shape, origin)
+        result = {
+            name: np.where(picked, (first or second)[name], (second or first)[name]) for name in channels
+        }
+        if mode == "anaglyph_chessboard":
+            for component, name in enumerate("RGB"):
+                of_first, of_second = (np.float32(color[component]) for color in stereo.colors)
+                result[name] = _times(result[name], np.where(picked, of_first, of_second))
+        return result
+    axis = 1 if mode in BESIDE else 0
+    shown = [planes for planes in (first, second) if planes]
+    return {name: np.concatenate([planes[name] for planes in shown], axis=axis) for name in channels}
+
+
+class Composed:
+    """The finished picture of two eyes' stores, made as it is read; see `Film` for its attributes.
+
+    Args:
+        image: the scene's `image`, see `eye_size`.
+        left, right: what holds the parts that `eye_regions` tells; None of an eye that is not needed.
+        region: the part of the finished picture; all of it if None.
+        header: added to what both pictures' headers agree in; the cameras are told only if one eye is shown alone.
+
+    Raises:
+        SceneError: as of `composed_channels`.
+        ValueError: a store is missing or holds another part, or nothing is composed in this mode.
+    """
+
+    def __init__(
+        self,
+        stereo: Stereo,
+        image: tuple[int, int],
+        left: Picture | None,
+        right: Picture | None,
+        region: Region | None = None,
+        header: Mapping[str, Any] | None = None,
+    ) -> None:
+        if stereo.mode in APART:
+            raise ValueError(f"{stereo.mode} keeps both eyes' pictures")
+        self.stereo = stereo
+        self.display = picture_size(stereo, image)
+        self.region = region or Region(0, 0, *self.display)
+        wanted = eye_regions(stereo, image, self.region)
+        stores: dict[Side, Picture | None] = {"left": left, "right": right}
+        for side, store in stores.items():
+            part = wanted[side]
+            if part is not None and (store is None or store.region != part):
+                raise ValueError(f"the {side} eye's picture must hold {part}, got {store and store.region}")
+        self.left = left if wanted["left"] else None
+        self.right = right if wanted["right"] else None
+        needed = [store for store in (self.left, self.right) if store is not None]
+        if len({store.channels for store in needed}) > 1:
+            raise ValueError("both eyes' pictures must have the same channels")
+        self.channels: tuple[str, ...] = composed_channels(stereo, needed[0].channels)
+        alone = stereo.mode in ("left", "right")
+        agreed = agreed_header([store.header for store in needed])
+        kept = {key: value for key, value in agreed.items() if alone or key not in _OF_AN_EYE}
+        self.header: dict[str, Any] = {**kept, **(header or {})}
+
+    def bands(self) -> Bands:
+        """The picture from top to bottom, some rows at a time: (first_row, channel -> rows).
+
+        Raises:
+            FileError: a store cannot be read.
+        """
+        if self.stereo.mode in BELOW:
+            yield from self._one_below_the_other()
+            return
+        left, right = (iter(store.bands()) if store else None for store in (self.left, self.right))
+        row = self.region.y
+        while row < self.region.bottom:
+            pair = [next(bands)[1] if bands else {} for bands in (left, right)]
+            planes = compose(self.stereo, pair[0], pair[1], (self.region.x, row))
+            yield row, planes
+            row += len(planes[self.channels[0]])
+
+    def _one_below_the_other(self) -> Bands:
+        row = self.region.y
+        for side in ("right", "left") if _swapped(self.stereo) else ("left", "right"):
+            store = self.left if side == "left" else self.right
+            for _, band in store.bands() if store else ():
+                shown: list[Planes] = [band, {}] if side == "left" else [{}, band]
+                planes = compose(self.stereo, shown[0], shown[1], (self.region.x, row))
+                yield row, planes
+                row += len(planes[self.channels[0]])
+
+    def to_film(self) -> Film:
+        """All of it in memory."""
+        bands = [band for _, band in self.bands()]
+        film = Film(self.channels, self.display, self.region, self.header)
+        whole = np.array([np.concatenate([band[name] for band in bands]) for name in self.channels])
+        for index in range(film.grid.count):
+            tile = film.grid.tile(index)
+            top, left = tile.y - self.region.y, tile.x - self.region.x
+            film.put(index, whole[:, top : top + tile.height, left : left + tile.width])
+        return film
+
+
+def agreed_header(headers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What all of some pictures' headers tell alike."""
+    first, *others = headers
+    return {
+        key: value
+        for key, value in first.items()
+        if all(key in other and np.array_equal(other[key], value) for other in others)
+    }
+
+
+def _swapped(stereo: Stereo) -> bool:
+    return stereo.swap and stereo.mode not in ("left", "right", *APART)
+
+
+def _part(region: Region, from_x: int, from_y: int, width: int, height: int) -> Region | None:
+    """The part of a region that lies in an eye's picture put at (from_x, from_y), in that picture's coordinates."""
+    left, right = max(region.x - from_x, 0), min(region.right - from_x, width)
+    top, bottom = max(region.y - from_y, 0), min(region.bottom - from_y, height)
+    return Region(left, top, right - left, bottom - top) if right > left and bottom > top else None
+
+
+def _picks_first(mode: Mode, shape: tuple[int, ...], origin: tuple[int, int]) -> npt.NDArray[np.bool_]:
+    """For each pixel (row, column) whether it is the first eye's: where its place is even."""
+    y = np.arange(origin[1], origin[1] + shape[0])[:, None]
+    x = np.arange(origin[0], origin[0] + shape[1])[None, :]
+    place = {"rows": y + 0 * x, "columns": x + 0 * y}.get(mode, x + y)
+    even: npt.NDArray[np.bool_] = place % 2 == 0
+    return even
+
+
+def _times(plane: Floats, factor: Floats) -> Floats:
+    """A colour through a filter; what the filter stops is 0, however light it is."""
+    result = np.zeros_like(plane)
+    np.multiply(plane, factor, out=result, where=factor != 0)
+    return result
+
+
+def _anaglyph(stereo: Stereo, left: Planes, right: Planes, channels: Sequence[str]) -> dict[str, Floats]:
+    """Colours mixed by the matrices.
+
+    Covered where either eye's picture is: so no colour becomes lighter than its coverage, and none is lost.
+    """
+    by = matrices(stereo.method, stereo.glasses)
+    first, second = (right, left) if stereo.swap else (left, right)
+    # Planes in memory, and colours along the last axis for whoever looks at them.
+    colors = [np.moveaxis(np.stack([planes[name] for name in "RGB"]), 0, -1) for planes in (first, second)]
+    mixed = mix(colors[0], colors[1], by)
+    result = {name: mixed[..., component] for component, name in enumerate("RGB")}
+    if "A" in channels:
+        result["A"] = np.fmax(left["A"], right["A"])
+    return {name: result[name] for name in channels}
