@@ -67,3 +67,23 @@ def check_channels(names: Iterable[str], where: Where | None = None) -> tuple[st
     if not chosen:
         raise SceneError("a picture needs at least one channel", where)
     return tuple(chosen)
+
+
+VIEWS: tuple[str, ...] = ("left", "right")
+"""The views of a stereo picture by the names that OpenEXR gives them; the first is the default."""
+
+
+def in_view(name: str, view: str) -> str:
+    """What a channel of a view is called in a file of several: `R`, `N.left.X`; `right.R`, `N.right.X`.
+
+    The view stands before the last part of the name. Only in the default view is it left out, and only of a name of one
+    part: "Storing Multi-View Images in OpenEXR Files", section "Channel Naming" (openexr.com).
+    """
+    *layers, last = name.split(".")
+    return name if view == VIEWS[0] and not layers else ".".join([*layers, view, last])
+
+
+def without_view(name: str) -> str:
+    """The channel's own name, of one that `in_view` made or of any other."""
+    parts = name.split(".")
+    return ".".join(part for place, part in enumerate(parts) if place != len(parts) - 2 or part not in VIEWS)

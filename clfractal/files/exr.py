@@ -23,7 +23,7 @@ import OpenEXR
 
 from clfractal.errors import FileError, Where
 from clfractal.files.atomic import atomic_writer, file_error
-from clfractal.files.channels import CHANNELS
+from clfractal.files.channels import CHANNELS, without_view
 from clfractal.files.exr_header import read_header
 from clfractal.files.exr_header import read_scene_text as read_scene_text  # part of this module's interface
 
@@ -58,8 +58,9 @@ def write_exr(
         region: x, y, width, height of the part that `bands` hold (the data window).
         half: the channels stored as half; the others as float. Finite numbers beyond the range of half
             become +-65504, and so do infinite colours; infinite data (depth) stays infinite.
-        header: attribute name -> text, number, or 4 x 4 matrix for row vectors (the translation is the last
-            row), as the standard attributes worldToCamera and worldToNDC want it.
+        header: attribute name -> text, number, sequence of texts (as the standard attribute multiView is), or
+            4 x 4 matrix for row vectors (the translation is the last row), as the standard attributes
+            worldToCamera and worldToNDC want it.
 
     Raises:
         FileError: the file cannot be written.
@@ -71,6 +72,8 @@ def write_exr(
             plain[name] = value.encode()
         elif isinstance(value, bool | int | float | np.number):
             plain[name] = float(value)
+        elif isinstance(value, list | tuple) and all(isinstance(each, str) for each in value):
+            plain[name] = list(value)  # of a tuple the library makes nothing good
         else:
             attributes[name] = _matrix_bytes(value)
     kinds = {name: "chromaticities" if name == "chromaticities" else "m44f" for name in attributes}
@@ -155,7 +158,8 @@ def to_half(values: Floats, *, data: bool) -> npt.NDArray[np.float16]:
 def _as_stored(name: str, planes: Sequence[Floats], half: Collection[str]) -> npt.NDArray[Any]:
     whole = planes[0] if len(planes) == 1 else np.concatenate(planes)
     if name in half:
-        is_data = name in CHANNELS and CHANNELS[name].kind == "data"
+        channel = CHANNELS.get(without_view(name))
+        is_data = channel is not None and channel.kind == "data"
         return np.ascontiguousarray(to_half(whole, data=is_data))
     return np.ascontiguousarray(whole, dtype=np.float32)
 

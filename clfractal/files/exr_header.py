@@ -39,10 +39,12 @@ class Attribute:
     offset: int
 
     def value(self) -> Any:
-        """Text, number, tuple of numbers or 4 x 4 array; the bytes themselves for other types."""
+        """Text, number, tuple of numbers or of texts, or 4 x 4 array; the bytes themselves for other types."""
         data = self.data
         if self.kind == "string":
             return data.decode("utf-8", "replace")
+        if self.kind == "stringvector":
+            return _texts(data)
         shapes = {"int": "<i", "float": "<f", "double": "<d", "compression": "<B", "lineOrder": "<B"}
         shapes |= {"box2i": "<4i", "v2f": "<2f", "v2i": "<2i", "chromaticities": "<8f", "rational": "<iI"}
         if self.kind == "m44f" and len(data) == 64:
@@ -86,6 +88,18 @@ class ExrHeader:
             names.append(name.decode("utf-8", "replace"))
             data = rest[16:]
         return tuple(names)
+
+
+def _texts(data: bytes) -> tuple[str, ...]:
+    """Texts that each begin with their length in bytes; those before the first thing that is wrong."""
+    found, place = [], 0
+    while place + 4 <= len(data):
+        (length,) = struct.unpack_from("<i", data, place)
+        if not 0 <= length <= len(data) - place - 4:
+            break
+        found.append(data[place + 4 : place + 4 + length].decode("utf-8", "replace"))
+        place += 4 + length
+    return tuple(found)
 
 
 class _DamagedError(Exception):

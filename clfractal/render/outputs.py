@@ -11,12 +11,14 @@ import numpy as np
 
 from clfractal.errors import FileError, Where
 from clfractal.files import atomic
-from clfractal.files.channels import CHANNELS
+from clfractal.files.channels import CHANNELS, VIEWS, in_view
 from clfractal.files.png import Bits, stream_png, write_png
 from clfractal.render.tiled import Floats, Picture
 
 # Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
-_FILE_KEYS = {"scene": "clfractal", "worldToCamera": "worldToCamera", "worldToNDC": "worldToNDC"}
+_MATRICES = ("worldToCamera", "worldToNDC")
+_FILE_KEYS = {"scene": "clfractal"} | {name: name for name in (*_MATRICES, "view", "multiView")}
+_FILE_KEYS |= {f"{view}.{name}": f"{view}.{name}" for view in VIEWS for name in _MATRICES}
 
 
 def check_output(path: str | Path, channels: Collection[str] | None = None) -> None:
@@ -94,6 +96,79 @@ def save_outputs(
                 half=half,
                 header=_attributes(whole),
             )
+
+
+def pair_paths(path: str | Path) -> tuple[Path, Path]:
+    """The two files of a pair: `out_L.exr` and `out_R.exr` of `out.exr`."""
+    whole = Path(path)
+    left, right = (whole.with_name(f"{whole.stem}_{letter}{whole.suffix}") for letter in "LR")
+    return left, right
+
+
+def check_views(path: str | Path) -> None:
+    """Makes sure, before anything is rendered, that a picture of both views can be written to `path`.
+
+    Raises:
+        FileError: as of `check_output`, and for a PNG, which has room for one view.
+    """
+    check_output(path)
+    if Path(path).suffix.lower() == ".png":
+        raise FileError("a PNG has room for one view; write both to an EXR", Where(str(path)))
+
+
+def save_views(
+    left: Picture,
+    right: Picture,
+    path: str | Path,
+    *,
+    header: Mapping[str, Any] | None = None,
+    half: Collection[str] | None = None,
+) -> None:
+    """Writes both eyes' pictures to one multi-view EXR, the left one as its default view; memory as of `save_outputs`.
+
+    The standard attributes worldToCamera and worldToNDC are the left eye's. Each eye's are there too, with its view
+    before the name, as in `right.worldToCamera`.
+
+    Args:
+        left, right: pictures of one size and region with the same channels.
+        header: added to `left.header`.
+        half: the channels that are stored as half, without views; by default as `CHANNELS` says.
+
+    Raises:
+        FileError: the file cannot be written, or is a PNG.
+        ValueError: the pictures do not fit each other.
+    """
+    if (left.channels, left.display, left.region) != (right.channels, right.display, right.region):
+        raise ValueError("the views of a picture must have the same size, region and channels")
+    check_views(path)
+    from clfractal.files.exr import write_exr
+
+    pictures = dict(zip(VIEWS, (left, right), strict=True))
+    if half is None:
+        half = {name for name in left.channels if CHANNELS[name].precision == "half"}
+    cameras = {
+        f"{view}.{name}": picture.header[name]
+        for view, picture in pictures.items()
+        for name in _MATRICES
+        if name in picture.header
+    }
+    region = left.region
+    write_exr(
+        path,
+        (
+            {
+                in_view(name, view): planes[name]
+                for view, (_, planes) in zip(VIEWS, pair, strict=True)
+                for name in planes
+            }
+            for pair in zip(left.bands(), right.bands(), strict=True)
+        ),
+        display=left.display,
+        region=(region.x, region.y, region.width, region.height),
+        channels=[in_view(name, view) for view in VIEWS for name in left.channels],
+        half={in_view(name, view) for view in VIEWS for name in half},
+        header=_attributes({**left.header, **cameras, **(header or {}), "view": None, "multiView": VIEWS}),
+    )
 
 
 def png_bytes(store: Picture) -> bytes:
