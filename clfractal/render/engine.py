@@ -12,6 +12,7 @@ from clfractal.render.loop import render_tile as render_tile
 from clfractal.render.plan import Plan
 from clfractal.render.split import render_views
 from clfractal.render.tiled import TiledStore
+from clfractal.render.worker import Shared as Shared
 from clfractal.scene.model import Scene
 
 
@@ -23,14 +24,16 @@ def render(
     progress: ProgressCallback | None = None,
     *,
     on_compile: Callable[[str], None] | None = None,
+    shared: Shared | None = None,
 ) -> Progress:
     """Renders every tile that `store` lacks.
 
     `progress` is called after each batch. An exception in it, or a KeyboardInterrupt, ends the render between two
-    tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first.
+    tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first. `shared` keeps
+    what further renders of the same picture need again.
 
     Raises:
         DeviceError, KernelBuildError: see `TileWorker`.
     """
     way = render_one if scene.layout is None else render_views
-    return way(scene, plan, device, store, progress, on_compile=on_compile)
+    return way(scene, plan, device, store, progress, on_compile=on_compile, shared=shared)

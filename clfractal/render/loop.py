@@ -15,7 +15,7 @@ from clfractal.errors import DeviceError
 from clfractal.render.plan import Plan
 from clfractal.render.tiled import TiledStore
 from clfractal.render.tiles import TILE, Tile
-from clfractal.render.worker import Batch, TileWorker
+from clfractal.render.worker import Batch, Shared, TileWorker
 from clfractal.render.workers import make_worker
 from clfractal.scene.model import Scene
 
@@ -81,11 +81,13 @@ def render_one(
     progress: ProgressCallback | None = None,
     *,
     on_compile: Callable[[str], None] | None = None,
+    shared: Shared | None = None,
 ) -> Progress:
     """Renders every tile that `store` lacks, of a scene with one view.
 
     `progress` is called after each batch. An exception in it, or a KeyboardInterrupt, ends the render between two
     tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first.
+    `shared` keeps what further renders of the same picture need again.
 
     Raises:
         DeviceError, KernelBuildError: see `TileWorker`.
@@ -96,7 +98,8 @@ def render_one(
     state.tiles_before = state.tiles_done
     if len(pending) == 0:
         return state
-    worker = make_worker(scene, plan, device, capacity=min(CAPACITY, len(pending)), on_compile=on_compile)
+    capacity = min(CAPACITY, len(pending))
+    worker = make_worker(scene, plan, device, capacity=capacity, on_compile=on_compile, shared=shared)
     state.build_ms = worker.program.build_ms
     state.started = time.perf_counter()
     _Loop(worker, store, state, progress).run(pending)

@@ -14,6 +14,7 @@ from clfractal.render.loop import Progress, ProgressCallback, render_one
 from clfractal.render.plan import Plan, choose_precision, make_plan
 from clfractal.render.probe import probe_for
 from clfractal.render.tiled import TiledStore
+from clfractal.render.worker import Shared
 from clfractal.scene.model import Scene
 
 
@@ -25,6 +26,7 @@ def render_views(
     progress: ProgressCallback | None = None,
     *,
     on_compile: Callable[[str], None] | None = None,
+    shared: Shared | None = None,
 ) -> Progress:
     """Renders the views of a scene's layout, each with the number type that it needs, and stores the picture's tiles.
 
@@ -45,14 +47,14 @@ def render_views(
     views = scene.views
     total = Progress(store.grid.count, int(np.count_nonzero(store.done)))
     total.tiles_before = total.tiles_done
+    shared = shared if shared is not None else Shared()
     pending = store.grid.count - total.tiles_done
     if pending == 0:
         return total
     for number, (view, place) in enumerate(views):
         wanted = plan.samples if plan.samples != scene.renderer.samples else view.renderer.samples
-        film = _rendered(
-            view, plan, wanted, device, _Share(total, progress, number, len(views), pending), on_compile
-        )
+        share = Share(total, progress, number, len(views), pending)
+        film = _rendered(view, plan, wanted, device, share, on_compile, shared)
         _paste(film, whole, place.x, place.y)
     for index in np.flatnonzero(~store.done).tolist():
         tile = store.grid.tile(index)
@@ -63,7 +65,7 @@ def render_views(
     return total
 
 
-class _Share:
+class Share:
     """Adds what one view takes to what all take, and tells it on."""
 
     def __init__(
@@ -89,8 +91,9 @@ def _rendered(
     plan: Plan,
     samples: int,
     device: Device,
-    share: _Share,
+    share: Share,
     on_compile: Callable[[str], None] | None,
+    shared: Shared,
 ) -> Film:
     precision, _ = choose_precision(view, view.renderer.precision, has_float64=has_float64(device.info))
     lanes = tune.best_lanes(device, precision, probe=probe_for(device.info))
@@ -102,7 +105,7 @@ def _rendered(
         channels=plan.channels,
     )
     film = Film(own.channels, (view.image.width, view.image.height), own.region)
-    render_one(view, own, device, film, share, on_compile=on_compile)
+    render_one(view, own, device, film, share, on_compile=on_compile, shared=shared)
     return film
 
 

@@ -5,7 +5,7 @@ Space is right-handed, z up, in scene units. The plane faces the viewer; an eye 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Placed
+from clfractal.scene.stereo import Eye, Stereo
 
 Vector = npt.NDArray[np.float64]
 
@@ -115,9 +116,89 @@ def plane_view(plane: Placed, width: int, height: int) -> View:
     return View(center, side, up, -normal, shown * width / height, shown, None, center)
 
 
+def middle_view(
+    stereo: Stereo,
+    camera: PerspectiveCamera | OrthographicCamera,
+    width: int,
+    height: int,
+    share: float = 1.0,
+) -> View:
+    """What the cyclopean eye of a viewer sees, who sits `stereo.screen_distance` before the middle of the screen.
+
+    Its plane lies on the screen: the one through the camera's target, as large as the camera sees there, or
+    `stereo.plane`. The scale of the scene follows from its width (thesis, 3.3.1), and so does where the eye is:
+    screen_distance before the plane's middle, in that scale.
+
+    Args:
+        width, height: of the picture, pixels (square ones on the screen).
+        share: the part of the screen's width that the picture takes up.
+    """
+    lens_radius, focus_distance = 0.0, None
+    if isinstance(camera, PerspectiveCamera):
+        lens_radius, focus_distance = camera.lens_radius, camera.focus_distance
+    if stereo.plane is None:
+        mono = camera_view(camera, width, height)
+        center, side, up, axis = mono.center, mono.side, mono.up, mono.axis
+        plane_width, plane_height = mono.width, mono.height
+    else:
+        plane = stereo.plane
+        center, normal = np.array(plane.center, float), np.array(plane.normal, float)
+        axis = -normal / np.linalg.norm(normal)
+        side = np.cross(axis, np.array(plane.up, float))
+        side /= np.linalg.norm(side)
+        up = np.cross(side, axis)
+        plane_width = plane.width
+        plane_height = plane.height if plane.height is not None else plane.width * height / width
+    distance = stereo.screen_distance * plane_width / (stereo.screen_width * share)
+    eye = center - distance * axis
+    focus = focus_distance if focus_distance is not None else distance
+    return View(center, side, up, axis, plane_width, plane_height, eye, eye, lens_radius, focus)
+
+
+def eye_view(middle: View, stereo: Stereo, eye: Eye) -> View:
+    """What one of the viewer's eyes sees, from what the cyclopean one does.
+
+    `off_axis`: both look at the same rectangle, each from its own side, so that it has no parallax. `parallel`: each
+    looks straight on at its own rectangle, so that the infinitely far has none. `toe_in`: each turns to the
+    rectangle's middle, which gives points beside it a vertical parallax.
+    """
+    if eye.name == "middle" or middle.eye is None:
+        return middle
+    distance = float((middle.center - middle.eye) @ middle.axis)
+    relation = distance / stereo.screen_distance
+    half = relation * stereo.interpupillary_distance * stereo.separation / 2
+    offset = (half if eye.name == "right" else -half) * middle.side
+    place = middle.eye + offset
+    if stereo.convergence == "off_axis":
+        return replace(middle, eye=place, origin=place)
+    if stereo.convergence == "parallel":
+        return replace(middle, eye=place, origin=place, center=middle.center + offset)
+    axis = middle.center - place
+    farther = float(np.linalg.norm(axis))
+    axis /= farther
+    side = np.cross(axis, middle.up)
+    side /= np.linalg.norm(side)
+    grown = farther / distance
+    return replace(
+        middle,
+        eye=place,
+        origin=place,
+        axis=axis,
+        side=side,
+        up=np.cross(side, axis),
+        width=middle.width * grown,
+        height=middle.height * grown,
+        focus_distance=middle.focus_distance * grown,
+    )
+
+
 def scene_view(scene: Scene) -> View:
-    """What a scene's picture shows: the plane of the cut-plane renderer, else what its camera sees."""
-    width, height = scene.image.width, scene.image.height
+    """What a scene's picture shows: the plane of the cut-plane renderer, else what its camera or an eye sees."""
+    eye = scene.eye
+    width, height = scene.image.width * eye.wide, scene.image.height * eye.high
     if isinstance(scene.renderer, CutPlaneRenderer):
+        # A flat picture: it lies on the screen for both eyes.
         return plane_view(scene.renderer.plane.placed, width, height)
-    return camera_view(scene.camera, width, height)
+    if scene.stereo is None:
+        return camera_view(scene.camera, width, height)
+    return eye_view(middle_view(scene.stereo, scene.camera, width, height, eye.share), scene.stereo, eye)

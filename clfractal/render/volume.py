@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
@@ -119,7 +120,7 @@ class VolumeWorker(TileWorker):
         scene, plan = self.scene, self.plan
         settings = settings_of(scene)
         width, height = scene.image.width, scene.image.height
-        self.grid = self._fill(settings)
+        self.grid = self.shared.once(self._grid_key(settings), lambda: self._fill(settings))
         four = (0, 1, 2, 3)
         return [
             layout.view_record(scene_view(scene), width, height, plan.region, "float32"),
@@ -134,6 +135,14 @@ class VolumeWorker(TileWorker):
             *(_plane_arguments(scene) if scene.cut_planes else []),
             channel_slots(plan),
         ]
+
+    def _grid_key(self, settings: VolumeRenderer) -> str:
+        """What the grid follows from: the solid, and how it is filled and seen."""
+        plain = settings.model_dump(
+            mode="json", exclude={"samples", "min_samples", "noise", "filter", "filter_width", "seed"}
+        )
+        solid = self.scene.formula.mapping() if self.scene.given is None else self.scene.given.digest()
+        return json.dumps([solid, plain, self.plan.precision])
 
     def _fill(self, settings: VolumeRenderer) -> Grid:
         given = self.scene.given

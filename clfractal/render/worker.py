@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,7 @@ TILE_PIXELS = TILE * TILE
 GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
 
 Floats = npt.NDArray[np.float32]
+T = TypeVar("T")
 KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 
 
@@ -47,6 +48,20 @@ def channel_slots(plan: Plan) -> npt.NDArray[np.int32]:
     """For each channel its place among the wanted ones, or -1."""
     slots = [plan.channels.index(name) if name in plan.channels else -1 for name in CHANNELS]
     return np.array(slots, np.int32)
+
+
+class Shared:
+    """What several renders of one picture have in common: the grid that both eyes see, say. It lives as long as they."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Any] = {}
+
+    def once(self, key: str, make: Callable[[], T]) -> T:
+        """What was made for this key, or is made now."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        found: T = self._kept[key]
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,8 +87,10 @@ class TileWorker(ABC):
         *,
         capacity: int,
         on_compile: Callable[[str], None] | None = None,
+        shared: Shared | None = None,
     ) -> None:
-        """`capacity` is the most tiles of a batch; `on_compile` is told a line if the program is compiled first.
+        """`capacity` is the most tiles of a batch; `on_compile` is told a line if the program is compiled first;
+        `shared` has what other renders of the same picture made.
 
         Raises:
             DeviceError: too little memory (status 2), or the device failed.
@@ -81,6 +98,7 @@ class TileWorker(ABC):
         """
         self.scene, self.plan, self.device = scene, plan, device
         self.on_compile = on_compile
+        self.shared = shared if shared is not None else Shared()
         self.packets = TILE_PIXELS // plan.lanes
         self.group = max(GROUP_PIXELS[plan.lanes] // plan.lanes, 1)
         self.capacity = capacity

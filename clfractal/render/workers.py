@@ -9,7 +9,7 @@ from clfractal.render.cut_plane import CutPlaneWorker
 from clfractal.render.plan import Plan
 from clfractal.render.surface import SurfaceWorker
 from clfractal.render.volume import VolumeWorker
-from clfractal.render.worker import TileWorker
+from clfractal.render.worker import Shared, TileWorker
 from clfractal.scene.model import Scene
 
 WORKERS: dict[str, type[TileWorker]] = {
@@ -26,6 +26,8 @@ def make_worker(
     *,
     capacity: int,
     on_compile: Callable[[str], None] | None = None,
+    shared: Shared | None = None,
 ) -> TileWorker:
     """The worker of the scene's renderer; see `TileWorker`."""
-    return WORKERS[scene.renderer.type](scene, plan, device, capacity=capacity, on_compile=on_compile)
+    kind = WORKERS[scene.renderer.type]
+    return kind(scene, plan, device, capacity=capacity, on_compile=on_compile, shared=shared)

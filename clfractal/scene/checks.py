@@ -9,6 +9,8 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.layout import MAX_LAYOUT_PIXELS
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import OrthographicCamera
+from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
 
@@ -19,8 +21,8 @@ MAX_PLANES = 64
 _MOST_APPLICATIONS = 2_000
 
 
-def check_parts(scene: Scene) -> None:
-    """Raises SceneError, at its dotted path, for what is wrong only together."""
+def check_parts(scene: Scene, *, whole: bool = True) -> None:
+    """Raises SceneError, at its dotted path, for what is wrong only together; a view of a layout is not `whole`."""
     radius = used_bounds(scene)[1]
     _check_step(scene.coloring.step, radius, "coloring.step")
     if isinstance(scene.renderer, SurfaceRenderer):
@@ -29,6 +31,10 @@ def check_parts(scene: Scene) -> None:
     if isinstance(scene.renderer, VolumeRenderer):
         _check_volume(scene, scene.renderer)
     _check_planes(scene)
+    if scene.stereo is not None:
+        _check_eyes(scene)
+        if whole:
+            _check_stereo(scene, scene.stereo)
     if scene.layout is not None:
         _check_views(scene)
     if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
@@ -78,6 +84,34 @@ def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:
     return first, last
 
 
+def _check_eyes(scene: Scene) -> None:
+    """A pair needs two eyes; a cut plane by itself is flat, and has none."""
+    flat = isinstance(scene.renderer, CutPlaneRenderer)
+    if isinstance(scene.camera, OrthographicCamera) and not flat and scene.layout is None:
+        raise SceneError(
+            "must be perspective with stereo: rays from infinity are the same for both eyes; use"
+            " {projection: perspective, position, target, fov}, or remove stereo",
+            Where(path="camera.projection"),
+        )
+
+
+def _check_stereo(scene: Scene, stereo: Stereo) -> None:
+    """Squeezed pictures need a side that can be halved, a fit one view."""
+    squeezed = {"split_half": "width", "over_under_half": "height"}.get(stereo.mode)
+    if squeezed is not None:
+        side = getattr(scene.image, squeezed)
+        if side % 2:
+            raise SceneError(
+                f"must be even for stereo.mode {stereo.mode}, where each eye has half of it, got {side}",
+                Where(path=f"image.{squeezed}"),
+            )
+    if stereo.fit is not None and scene.layout is not None:
+        raise SceneError(
+            "auto cannot suit several views at once; give plane and separation in its place, or remove layout",
+            Where(path="stereo.fit"),
+        )
+
+
 def _check_step(step: float | None, radius: float, path: str) -> None:
     """A step goes neither past the whole object at once nor takes forever."""
     if step is None:
@@ -104,7 +138,7 @@ def _check_views(scene: Scene) -> None:
         )
     for number, (view, _) in enumerate(scene.views):
         try:
-            check_parts(view)
+            check_parts(view, whole=False)
         except SceneError as error:
             raise SceneError(
                 error.message, Where(path=f"layout.views.{number}.{error.where.path}")
