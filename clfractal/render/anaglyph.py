@@ -6,6 +6,7 @@ the display's primaries; every other primary that reaches the eye shows it the o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Literal
 
@@ -126,7 +127,7 @@ def ghosting(
     """How much of the other eye's picture the left and the right eye see.
 
     Of luminance through the filters (see `filtered`): what changes when the other eye's picture is switched off,
-    summed over all pixels without its sign, as a share of all that remains.
+    summed over all pixels without its sign, as a share of all that remains; infinite if nothing does.
 
     Args:
         composed: makes the shown picture of the left and the right eye's, all of shape (..., 3).
@@ -136,6 +137,7 @@ def ghosting(
 
     def share(eye: Literal["left", "right"], own: Floats) -> float:
         seen, alone = (filtered(shown, eye, glasses, filters) @ np.array(LUMINANCE) for shown in (both, own))
-        return float(np.abs(seen - alone).sum() / alone.sum())
+        ghost, light = float(np.abs(seen - alone).sum()), float(alone.sum())
+        return ghost / light if light else (math.inf if ghost else 0.0)
 
     return share("left", composed(left, black)), share("right", composed(black, right))

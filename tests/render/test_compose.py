@@ -1,0 +1,243 @@
+"""The compositor against pixel-by-pixel loops, whole and in regions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from clfractal.errors import SceneError
+from clfractal.render.compose import Composed, compose, composed_channels, eye_regions, eye_size, picture_size
+from clfractal.render.film import Film
+from clfractal.render.tiles import Region
+from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, films, stereo
+
+
+def by_loops(mode: str, swap: bool, left: np.ndarray, right: np.ndarray, x: int, y: int) -> tuple[Any, bool]:
+    """The pixel (x, y) of the finished picture, and whether it lies in the second eye's place."""
+    height, width = left.shape
+    second = {
+        "split": x >= width,
+        "split_half": x >= width,
+        "over_under": y >= height,
+        "over_under_half": y >= height,
+        "rows": y % 2 == 1,
+        "columns": x % 2 == 1,
+        "checkerboard": (x + y) % 2 == 1,
+        "anaglyph_chessboard": (x + y) % 2 == 1,
+    }[mode]
+    beside, below = mode.startswith("split"), mode.startswith("over_under")
+    from_x, from_y = (width if second and beside else 0), (height if second and below else 0)
+    right_eye = second != swap
+    return (right if right_eye else left)[y - from_y, x - from_x], second
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("mode", [*PLACED, *PICKED])
+def test_modes_pixel_by_pixel(mode: str, swap: bool) -> None:
+    scene = stereo(mode, swap=swap, colors=[[0.75, 0.5, 0.0], [0.25, 1.0, 0.125]])
+    image = (46, 38)
+    planes = eyes(eye_size(scene, image))
+    composed = Composed(scene, image, *films(scene, image, None, planes))
+    film = composed.to_film()
+    width, height = picture_size(scene, image)
+    assert (film.width, film.height) == composed.display == (width, height)
+    assert film.channels == CHANNELS
+    for name in CHANNELS:
+        for y in range(height):
+            for x in range(width):
+                found, second = by_loops(mode, swap, planes[0][name], planes[1][name], x, y)
+                if mode == "anaglyph_chessboard" and name in "RGB":
+                    found *= np.float32(scene.colors[int(second)]["RGB".index(name)])
+                assert film[name][y, x] == found, (name, x, y)
+
+
+@pytest.mark.parametrize(
+    ("mode", "size", "eye"),
+    [
+        ("left", (40, 30), (40, 30)),
+        ("right", (40, 30), (40, 30)),
+        ("pair", (40, 30), (40, 30)),
+        ("multi_view", (40, 30), (40, 30)),
+        ("split", (80, 30), (40, 30)),
+        ("over_under", (40, 60), (40, 30)),
+        ("split_half", (40, 30), (20, 30)),
+        ("over_under_half", (40, 30), (40, 15)),
+        ("rows", (40, 30), (40, 30)),
+        ("columns", (40, 30), (40, 30)),
+        ("checkerboard", (40, 30), (40, 30)),
+        ("anaglyph_chessboard", (40, 30), (40, 30)),
+        ("anaglyph", (40, 30), (40, 30)),
+    ],
+)
+def test_sizes(mode: str, size: tuple[int, int], eye: tuple[int, int]) -> None:
+    assert picture_size(stereo(mode), (40, 30)) == size
+    assert eye_size(stereo(mode), (40, 30)) == eye
+
+
+def test_odd_sizes_cannot_be_halved() -> None:
+    assert picture_size(stereo("split_half"), (40, 31)) == (40, 31)
+    assert picture_size(stereo("over_under_half"), (41, 30)) == (41, 30)
+    for mode, image in (("split_half", (41, 30)), ("over_under_half", (40, 31))):
+        with pytest.raises(ValueError, match="cannot be halved"):
+            picture_size(stereo(mode), image)
+
+
+def test_the_chessboard_of_the_thesis() -> None:
+    # Pixel (0, 0) is the top left one; even x + y is the left eye's, times red; odd the right eye's, times cyan.
+    scene = stereo("anaglyph_chessboard")
+    left, right = eyes((3, 3))
+    found = compose(scene, left, right)
+    for x, y in np.ndindex(3, 3):
+        color = [found[name][y, x] for name in "RGB"]
+        if (x + y) % 2 == 0:
+            assert color == [left["R"][y, x], 0, 0]
+        else:
+            assert color == [0, right["G"][y, x], right["B"][y, x]]
+
+
+@pytest.mark.parametrize("mode", COMPOSED)
+def test_swapping_is_exchanging_the_eyes(mode: str) -> None:
+    left, right = eyes((21, 17))
+    plain, swapped = stereo(mode), stereo(mode, swap=True)
+    exchange = (left, right) if mode in ("left", "right") else (right, left)
+    found, wanted = compose(swapped, left, right), compose(plain, *exchange)
+    for name in wanted:
+        assert np.array_equal(found[name], wanted[name])
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.data())
+def test_a_region_is_the_same_part_of_the_whole(data: st.DataObject) -> None:
+    mode = data.draw(st.sampled_from(COMPOSED))
+    scene = stereo(mode, swap=data.draw(st.booleans()))
+    wide, high = scene.squeeze
+    image = (data.draw(st.integers(1, 50)) * wide, data.draw(st.integers(1, 70)) * high)
+    width, height = picture_size(scene, image)
+    x, y = data.draw(st.integers(0, width - 1)), data.draw(st.integers(0, height - 1))
+    region = Region(x, y, data.draw(st.integers(1, width - x)), data.draw(st.integers(1, height - y)))
+    planes = eyes(eye_size(scene, image))
+    whole = Composed(scene, image, *films(scene, image, None, planes)).to_film()
+    part = Composed(scene, image, *films(scene, image, region, planes), region)
+    assert (part.display, part.region) == ((width, height), region)
+    row = region.y
+    for first, band in part.bands():
+        assert first == row
+        rows = len(band["R"])
+        assert tuple(band) == part.channels
+        for name, plane in band.items():
+            assert plane.dtype == np.float32
+            cut = whole[name][row : row + rows, region.x : region.right]
+            assert np.array_equal(plane, cut), name
+        row += rows
+    assert row == region.bottom
+
+
+def test_eyes_that_a_region_does_not_need() -> None:
+    for mode, region, left, right in (
+        ("split", Region(0, 5, 40, 9), Region(0, 5, 40, 9), None),
+        ("split", Region(40, 0, 1, 1), None, Region(0, 0, 1, 1)),
+        ("split", Region(39, 2, 3, 4), Region(39, 2, 1, 4), Region(0, 2, 2, 4)),
+        ("split_half", Region(15, 0, 10, 30), Region(15, 0, 5, 30), Region(0, 0, 5, 30)),
+        ("over_under", Region(3, 20, 5, 20), Region(3, 20, 5, 10), Region(3, 0, 5, 10)),
+        ("over_under_half", Region(0, 15, 40, 15), None, Region(0, 0, 40, 15)),
+        ("rows", Region(0, 4, 40, 1), Region(0, 4, 40, 1), None),
+        ("rows", Region(0, 5, 40, 1), None, Region(0, 5, 40, 1)),
+        ("columns", Region(7, 0, 1, 30), None, Region(7, 0, 1, 30)),
+        ("checkerboard", Region(3, 4, 1, 1), None, Region(3, 4, 1, 1)),
+        ("checkerboard", Region(3, 4, 2, 1), Region(3, 4, 2, 1), Region(3, 4, 2, 1)),
+        ("anaglyph", Region(3, 4, 1, 1), Region(3, 4, 1, 1), Region(3, 4, 1, 1)),
+        ("left", Region(3, 4, 5, 6), Region(3, 4, 5, 6), None),
+        ("right", Region(3, 4, 5, 6), None, Region(3, 4, 5, 6)),
+        ("multi_view", Region(3, 4, 5, 6), Region(3, 4, 5, 6), Region(3, 4, 5, 6)),
+    ):
+        assert eye_regions(stereo(mode), (40, 30), region) == {"left": left, "right": right}, (mode, region)
+        same = mode in ("left", "right", "multi_view")
+        exchanged = {"left": left, "right": right} if same else {"left": right, "right": left}
+        assert eye_regions(stereo(mode, swap=True), (40, 30), region) == exchanged, (mode, region)
+    with pytest.raises(ValueError, match="not inside"):
+        eye_regions(stereo("rows"), (40, 30), Region(0, 0, 41, 30))
+
+
+def test_an_anaglyph_has_colours_and_coverage_only() -> None:
+    scene = stereo("anaglyph", method="color")
+    left, right = eyes((12, 9))
+    found = compose(scene, left, right)
+    assert list(found) == ["R", "G", "B", "A"]
+    assert np.array_equal(found["R"], left["R"])
+    assert np.array_equal(found["G"], right["G"])
+    assert np.array_equal(found["B"], right["B"])
+    assert np.array_equal(found["A"], np.maximum(left["A"], right["A"]))
+    exchanged = compose(stereo("anaglyph", method="color", swap=True), left, right)
+    assert np.array_equal(exchanged["R"], right["R"])
+    assert np.array_equal(exchanged["G"], left["G"])
+    assert composed_channels(scene, ("Z", "B", "G", "R")) == ("B", "G", "R")
+    for mode in ("anaglyph", "anaglyph_chessboard"):
+        with pytest.raises(
+            SceneError, match=rf"output\.channels: {mode} needs the channels R, G, B; G, B not among"
+        ):
+            composed_channels(stereo(mode), ("R", "Z"))
+
+
+def test_premultiplied_colours_stay_within_their_coverage() -> None:
+    left, right = eyes((30, 20))
+    for planes in (left, right):
+        for name in "RGB":
+            planes[name] *= planes["A"]
+    for method in ("color", "half_color", "gray"):
+        found = compose(stereo("anaglyph", method=method), left, right)
+        for name in "RGB":
+            assert (found[name] <= found["A"] * np.float32(1 + 1e-6)).all()
+
+
+def test_odd_numbers_go_through() -> None:
+    odd = np.array([[np.inf, -np.inf, np.nan, 0.0]], np.float32)
+    planes = dict.fromkeys(("R", "G", "B", "A", "Z"), odd)
+    found = compose(stereo("anaglyph_chessboard"), planes, planes)
+    assert found["Z"].tobytes() == odd.tobytes()
+    # A filter stops all of a primary, however light it is.
+    assert found["R"][0].tolist() == [np.inf, 0, pytest.approx(np.nan, nan_ok=True), 0]
+    assert found["G"][0].tolist() == [0, -np.inf, 0, 0]
+    for name, plane in compose(stereo("anaglyph"), planes, planes).items():
+        assert name == "A" or np.isfinite(plane).all()
+
+
+def test_an_eye_alone_is_passed_on_as_it_is() -> None:
+    cameras = {"worldToCamera": np.eye(4), "view": "right", "scene": "version: 1\n"}
+    left, right = eyes((33, 34))
+    film = filled(Film(CHANNELS, (33, 34), header=cameras), right)
+    shown = Composed(stereo("right", swap=True), (33, 34), None, film)
+    assert shown.header.keys() == cameras.keys()
+    for name in CHANNELS:
+        assert np.array_equal(shown.to_film()[name], right[name])
+    # The other eye's picture is not even looked at.
+    other = filled(Film(CHANNELS, (33, 34)), left)
+    assert np.array_equal(Composed(stereo("right"), (33, 34), other, film).to_film()["R"], right["R"])
+
+
+def test_headers_tell_what_both_pictures_do() -> None:
+    common = {"scene": "version: 1\n", "device": "PoCL", "transparent": True}
+    headers = [
+        {**common, "worldToCamera": np.eye(4), "worldToNDC": np.eye(4), "view": view, "seconds": seconds}
+        for view, seconds in (("left", 1.0), ("right", 2.0))
+    ]
+    left, right = (Film(CHANNELS, (8, 8), header=header) for header in headers)
+    composed = Composed(stereo("rows"), (8, 8), left, right, header={"seconds": 3.0})
+    assert composed.header == {**common, "seconds": 3.0}
+
+
+def test_stores_that_do_not_fit_are_mistakes() -> None:
+    scene, image = stereo("split"), (20, 10)
+    left, right = Film(CHANNELS, image), Film(CHANNELS, image)
+    with pytest.raises(ValueError, match="right eye's picture must hold"):
+        Composed(scene, image, left, None)
+    with pytest.raises(ValueError, match="left eye's picture must hold"):
+        Composed(scene, image, Film(CHANNELS, image, Region(0, 0, 20, 9)), right)
+    with pytest.raises(ValueError, match="same channels"):
+        Composed(scene, image, left, Film(("R",), image))
+    for mode in ("pair", "multi_view"):
+        with pytest.raises(ValueError, match="keeps both eyes' pictures"):
+            Composed(stereo(mode), image, left, right)
+        with pytest.raises(ValueError, match="keeps both eyes' pictures"):
+            compose(stereo(mode), {}, {})
