@@ -100,6 +100,7 @@ def test_both_views_in_one_file(tmp_path: Path) -> None:
     assert np.array_equal(found["N.right.X"], planes[1]["N.X"].astype(np.float16))
     assert found["right.Z"].dtype == np.float32
     assert told["multiView"] == ("left", "right")
+    assert "view" not in told  # it would speak of a file of one view
     assert told["dataWindow"] == (20, 10, 69, 49)
     assert told["clfractalSeconds"] == 2
     for number, views in enumerate([["", "left."], ["right."]]):
