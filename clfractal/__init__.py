@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from clfractal.api import escape as escape
     from clfractal.api import load_scene as load_scene
     from clfractal.api import render as render
+    from clfractal.api import render_pair as render_pair
     from clfractal.device.select import devices as devices
     from clfractal.errors import ClfractalError as ClfractalError
     from clfractal.errors import DeviceError as DeviceError
@@ -35,6 +36,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "escape": "clfractal.api",
     "load_scene": "clfractal.api",
+    "render_pair": "clfractal.api",
     "devices": "clfractal.device.select",
     "ClfractalError": "clfractal.errors",
     "DeviceError": "clfractal.errors",

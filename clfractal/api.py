@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FormulaError
+from clfractal.errors import FormulaError, SceneError, Where
 from clfractal.scene.load import load_scene as load_scene
 from clfractal.scene.model import Scene
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from clfractal.render.engine import ProgressCallback
     from clfractal.render.film import Film
 
-__all__ = ["escape", "load_scene", "render"]
+__all__ = ["escape", "load_scene", "render", "render_pair"]
 
 
 def render(
@@ -31,7 +31,7 @@ def render(
     region: tuple[int, int, int, int] | None = None,
     channels: Sequence[str] | None = None,
 ) -> Film:
-    """Renders a scene into memory.
+    """Renders a scene into memory; of a stereo scene what its mode makes of the two pictures (see `render_pair`).
 
     Args:
         scene: a Scene, or what `load_scene` takes: a path, YAML text, or plain data.
@@ -54,12 +54,16 @@ def render(
     """
     import time
 
+    loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+    if loaded.stereo is not None:
+        return _rendered_pair(
+            loaded, device, progress, precision=precision, samples=samples, region=region, channels=channels
+        )[0]
     from clfractal import job as jobs
     from clfractal.device.select import choose
     from clfractal.render import engine
     from clfractal.render.film import Film
 
-    loaded = scene if isinstance(scene, Scene) else load_scene(scene)
     job = jobs.prepare(
         loaded, choose(device), precision=precision, samples=samples, region=region, channels=channels
     )
@@ -69,6 +73,62 @@ def render(
     engine.render(loaded, job.plan, job.device, film, progress)
     film.header["seconds"] = time.perf_counter() - start
     return film
+
+
+def render_pair(
+    scene: Scene | str | Path | Mapping[str, Any],
+    device: str | None = None,
+    progress: ProgressCallback | None = None,
+    *,
+    precision: str | None = None,
+    samples: int | None = None,
+    channels: Sequence[str] | None = None,
+) -> tuple[Film, Film]:
+    """Renders both eyes' pictures of a stereo scene into memory, whatever its `stereo.mode` makes of them.
+
+    Arguments and errors as for `render`.
+
+    Returns:
+        The left eye's film and the right one's, of `image`'s size (of half of it in the squeezed modes).
+    """
+    loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+    if loaded.stereo is None:
+        raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
+    if loaded.stereo.mode in ("left", "right"):
+        loaded = loaded.model_copy(update={"stereo": loaded.stereo.model_copy(update={"mode": "pair"})})
+    films = _rendered_pair(loaded, device, progress, precision=precision, samples=samples, channels=channels)[
+        1
+    ]
+    return films["left"], films["right"]
+
+
+def _rendered_pair(
+    scene: Scene,
+    device: str | None,
+    progress: ProgressCallback | None,
+    *,
+    region: tuple[int, int, int, int] | None = None,
+    **settings: Any,
+) -> tuple[Film, dict[str, Film]]:
+    """What a stereo scene's mode makes of both eyes' films (the left one's where it keeps both), and these."""
+    from clfractal.device.select import choose
+    from clfractal.pair import composed, prepare_pair, render_eyes
+    from clfractal.render.compose import APART
+    from clfractal.render.film import Film
+
+    pair = prepare_pair(scene, choose(device), region=region, **settings)
+    films = {
+        side: Film(
+            job.plan.channels,
+            (job.scene.image.width, job.scene.image.height),
+            job.plan.region,
+            pair.header(side),
+        )
+        for side, job in pair.eyes.items()
+    }
+    render_eyes(pair, films, progress)
+    shown = films["left"] if pair.stereo.mode in APART else composed(pair, films).to_film()
+    return shown, {**films}
 
 
 def escape(

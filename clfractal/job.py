@@ -19,7 +19,7 @@ from clfractal.files.document import write_document
 from clfractal.render.outputs import save_outputs
 from clfractal.render.plan import Plan, PrecisionChoice, choose_precision, make_plan
 from clfractal.render.probe import probe_for
-from clfractal.render.tiled import TiledStore
+from clfractal.render.tiled import Picture
 from clfractal.render.view import scene_view
 from clfractal.scene.model import Scene
 
@@ -80,7 +80,7 @@ class Job:
             "lanes": self.plan.lanes,
         }
 
-    def save(self, store: TiledStore, paths: Sequence[str | Path]) -> None:
+    def save(self, store: Picture, paths: Sequence[str | Path]) -> None:
         """Writes a finished film to files, as the scene's `output` wants them.
 
         Raises:

@@ -256,18 +256,23 @@ def mesh(
 
 @app.command()
 def check(
-    context: typer.Context, scene: Scene, overrides: Overrides = None, verbose: Verbose = False
+    context: typer.Context,
+    scene: Scene,
+    overrides: Overrides = None,
+    parallax: Annotated[
+        bool,
+        typer.Option(
+            "--parallax", help="Of a stereo scene: look at its depth and tell how much the eyes turn."
+        ),
+    ] = False,
+    device: DeviceOption = None,
+    verbose: Verbose = False,
 ) -> Work:
     """Check a scene and print it with every default filled in."""
-    from clfractal.scene.load import dump_scene, load_scene
+    from clfractal.commands.check import check_scene
 
     shell = _shell(context, verbose=verbose)
-
-    def work() -> None:
-        shell.mute_drivers()  # and the library that reads environment maps
-        shell.print(dump_scene(load_scene(Path(scene), overrides=overrides or ())))
-
-    return work
+    return lambda: check_scene(scene, tuple(overrides or ()), shell, parallax=parallax, device=device)
 
 
 @app.command()

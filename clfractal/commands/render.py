@@ -51,6 +51,11 @@ def render_scene(order: Order, shell: Shell) -> None:
     shell.mute_drivers()
     scene = ordered_scene(order)
     outputs = _outputs(order, scene)
+    if scene.stereo is not None:
+        from clfractal.commands.stereo import render_stereo
+
+        render_stereo(order, scene, outputs, region, shell, start)
+        return
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
     from clfractal import job as jobs
     from clfractal.commands import stats
@@ -145,10 +150,20 @@ def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
     from clfractal.render.outputs import check_output as check_picture
 
     for path in outputs:
-        check_picture(path, scene.output.channels)
+        for file in _files(scene, path):
+            check_picture(file, scene.output.channels)
     if order.stats is not None:
         check_output(order.stats, (order.stats.suffix.lower(),))
     return outputs
+
+
+def _files(scene: Scene, path: Path) -> list[Path]:
+    """What is written for an output."""
+    if scene.stereo is None:
+        return [path]
+    from clfractal.pair import output_files
+
+    return output_files(scene.stereo, path)
 
 
 def _interrupted(partial: Path, film: JournalFilm) -> str:

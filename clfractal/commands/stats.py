@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import resource
 import sys
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import clfractal
 from clfractal.files.atomic import atomic_writer
 from clfractal.job import Job
 from clfractal.render.engine import Progress
+from clfractal.render.view import scene_view
+
+if TYPE_CHECKING:
+    from clfractal.comfort import Comfort
+    from clfractal.pair import Pair
 
 
 def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) -> dict[str, Any]:
@@ -45,6 +51,18 @@ def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) ->
         "steps_per_ray": round(state.steps_per_ray, 4),
         "bad_distances": state.bad_distances,
         "peak_memory_mb": round(peak_memory_mb(), 1),
+    }
+
+
+def of_stereo(pair: Pair, comfort: Comfort | None) -> dict[str, Any]:
+    """How a pair was looked at, as plain data; parallax is None where nothing is seen."""
+    middle = scene_view(pair.job.scene)
+    return {
+        "mode": pair.stereo.mode,
+        "separation": pair.stereo.separation,
+        "eye": None if middle.eye is None else middle.eye.tolist(),
+        "plane": {"center": middle.center.tolist(), "width": middle.width, "height": middle.height},
+        "parallax": None if comfort is None else asdict(comfort),
     }
 
 

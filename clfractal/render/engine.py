@@ -29,8 +29,8 @@ def render(
     """Renders every tile that `store` lacks.
 
     `progress` is called after each batch. An exception in it, or a KeyboardInterrupt, ends the render between two
-    tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first. `shared` keeps
-    what further renders of the same picture need again.
+    tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first.
+    `shared` keeps what further renders of the same picture need again.
 
     Raises:
         DeviceError, KernelBuildError: see `TileWorker`.

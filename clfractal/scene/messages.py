@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.errors import SceneError, Where, nearest, unknown_name
 from clfractal.files.marks import Document, dotted
 from clfractal.scene.base import Section
 from clfractal.scene.model import Scene

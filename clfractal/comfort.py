@@ -1,0 +1,251 @@
+"""How much depth a stereo picture asks of its viewer's eyes, and how it is made to ask less.
+
+Eyes that look at a screen stay focused on it while they turn towards what is before or behind it. Up to about one degree
+of difference that is comfortable (M. Lambooij et al., "Visual discomfort and visual fatigue of stereoscopic displays: a
+review", Journal of Imaging Science and Technology 53, 2009).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal import job as jobs
+from clfractal.device.select import Device
+from clfractal.errors import SceneError, Where
+from clfractal.render import engine
+from clfractal.render.film import Film
+from clfractal.render.stereo import degrees, eye_views, parallax
+from clfractal.render.view import View, camera_view, scene_view
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.stereo import Stereo, StereoPlane
+
+Floats = npt.NDArray[np.float64]
+
+LIMIT_DEGREES = 1.0
+"""Parallax past which the viewer is warned."""
+
+# The quick look at the depth is that many pixels wide at most.
+_QUICK_SIDE = 160
+# It misses the finest spikes: what is fitted is fitted to this part of the budget.
+_MARGIN = 0.95
+# The eye moves with the plane, and sees a little more or less for it.
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Comfort:
+    """The range of parallax in a picture: on the screen, in its units, and in degrees. Negative: before the screen."""
+
+    nearest: float
+    farthest: float
+    nearest_degrees: float
+    farthest_degrees: float
+
+    @classmethod
+    def joined(cls, parts: Sequence[Comfort]) -> Comfort | None:
+        """The range over several pictures; None of none."""
+        if not parts:
+            return None
+        return cls(
+            min(each.nearest for each in parts),
+            max(each.farthest for each in parts),
+            min(each.nearest_degrees for each in parts),
+            max(each.farthest_degrees for each in parts),
+        )
+
+    @property
+    def worst_degrees(self) -> float:
+        """The largest of either side, without its sign."""
+        return max(abs(self.nearest_degrees), abs(self.farthest_degrees))
+
+    def sentence(self) -> str:
+        """The range as one line."""
+        return (
+            f"parallax {self.nearest:+.4g} to {self.farthest:+.4g} of the screen's units, "
+            f"{self.nearest_degrees:+.2f} to {self.farthest_degrees:+.2f} degrees"
+        )
+
+    def warning(self) -> str:
+        """A line for the user where the picture asks for more than is comfortable, else empty."""
+        if self.worst_degrees <= LIMIT_DEGREES:
+            return ""
+        return (
+            f"parallax reaches {self.worst_degrees:.2f} degrees, and beyond {LIMIT_DEGREES:g} eyes tire; "
+            "stereo.fit: auto, a smaller separation or a plane nearer to the object helps"
+        )
+
+
+def comfort_of(scene: Scene, points: Floats) -> Comfort:
+    """The range of parallax of points of a stereo scene, shape (n, 3), n at least 1, scene units."""
+    assert scene.stereo is not None
+    across = parallax(scene.stereo, eye_views(scene), points)[:, 0]
+    nearest, farthest = float(across.min()), float(across.max())
+    ends = degrees(scene.stereo, [nearest, farthest])
+    return Comfort(nearest, farthest, float(ends[0]), float(ends[1]))
+
+
+def measured(
+    scene: Scene,
+    device: Device,
+    *,
+    shared: engine.Shared | None = None,
+    on_compile: Callable[[str], None] | None = None,
+) -> Comfort | None:
+    """The range of parallax in a stereo scene's picture, by a quick look at its depth; None where nothing is seen.
+
+    Raises:
+        DeviceError, KernelBuildError: as of a render.
+    """
+    views = [view for view, _ in scene.views] if scene.layout is not None else [scene]
+    found = []
+    for view in views:
+        if isinstance(view.renderer, CutPlaneRenderer):
+            found.append(Comfort(0.0, 0.0, 0.0, 0.0))
+            continue
+        points = seen_points(view, device, shared=shared, on_compile=on_compile)
+        if len(points):
+            found.append(comfort_of(view, points))
+    return Comfort.joined(found)
+
+
+def seen_points(
+    scene: Scene,
+    device: Device,
+    *,
+    shared: engine.Shared | None = None,
+    on_compile: Callable[[str], None] | None = None,
+) -> Floats:
+    """What the cyclopean eye sees, as points: shape (n, 3), scene units; of a picture at most 160 pixels wide and high.
+
+    Raises:
+        DeviceError, KernelBuildError: as of a render.
+    """
+    scale = min(1.0, _QUICK_SIDE / max(scene.image.width, scene.image.height))
+    sides = {
+        "width": max(round(scene.image.width * scale), 1),
+        "height": max(round(scene.image.height * scale), 1),
+    }
+    small = scene.model_copy(update={"image": sides})
+    job = jobs.prepare(small, device, samples=1, channels=("Z",))
+    film = Film(job.plan.channels, (small.image.width, small.image.height))
+    engine.render(small, job.plan, device, film, on_compile=on_compile, shared=shared)
+    return points_of_depth(scene_view(small), film["Z"], film.display)
+
+
+def points_of_depth(
+    view: View, depth: npt.NDArray[np.float32], size: tuple[int, int], origin: tuple[int, int] = (0, 0)
+) -> Floats:
+    """The points that a picture's pixels show, shape (n, 3), scene units.
+
+    Args:
+        depth: channel Z of some of its pixels, shape (rows, columns), scene units.
+        size: width and height of the whole picture, pixels.
+        origin: x and y of the first of them.
+    """
+    assert view.eye is not None
+    width, height = size
+    rows, columns = np.nonzero(np.isfinite(depth))
+    across = ((origin[0] + columns + 0.5) / width - 0.5) * view.width
+    rise = (0.5 - (origin[1] + rows + 0.5) / height) * view.height
+    rays = view.center + across[:, None] * view.side + rise[:, None] * view.up - view.eye
+    along = depth[rows, columns].astype(np.float64) / (rays @ view.axis)
+    points: Floats = view.eye + rays * along[:, None]
+    return points
+
+
+def fitted(
+    scene: Scene,
+    device: Device,
+    *,
+    shared: engine.Shared | None = None,
+    on_compile: Callable[[str], None] | None = None,
+) -> Scene:
+    """The scene with a plane and a separation that keep its depth within `stereo.budget`; as it is without `fit`.
+
+    The plane is placed between the nearest and the farthest that the camera sees, so that both have the same parallax in
+    degrees; the camera keeps its place and field of view as far as the screen lets it. If that is still too much, the
+    eyes come closer to each other. A plane that the scene gives stays where it is.
+
+    Raises:
+        SceneError: nothing is seen.
+        DeviceError, KernelBuildError: as of a render.
+    """
+    stereo = scene.stereo
+    if stereo is None or stereo.fit is None:
+        return scene
+    current = _with(scene, fit=None)
+    for _ in range(_ROUNDS):
+        points = seen_points(current, device, shared=shared, on_compile=on_compile)
+        if not len(points):
+            raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))
+        if stereo.plane is None:
+            current = _with(current, plane=_balanced_plane(scene, points))
+        current = _with(current, separation=_separation(current, stereo, points))
+        if stereo.plane is not None:
+            break
+    return current
+
+
+def _with(scene: Scene, **changes: object) -> Scene:
+    assert scene.stereo is not None
+    return scene.model_copy(update={"stereo": scene.stereo.model_copy(update=changes)})
+
+
+def _balanced_plane(scene: Scene, points: Floats) -> StereoPlane:
+    """The plane across the camera's view at which the nearest and the farthest point have the same parallax."""
+    stereo, camera = scene.stereo, scene.camera
+    assert stereo is not None
+    assert isinstance(camera, PerspectiveCamera)
+    mono = camera_view(camera, scene.image.width, scene.image.height)
+    eye = mono.origin
+    depths = (points - eye) @ mono.axis
+    near, far = float(depths.min()), float(depths.max())
+    target = float((mono.center - eye) @ mono.axis)
+
+    def plane(distance: float) -> StereoPlane:
+        return StereoPlane(
+            center=_triple(eye + distance * mono.axis),
+            normal=_triple(-mono.axis),
+            up=_triple(mono.up),
+            width=mono.width * distance / target,
+            height=None,
+        )
+
+    def excess(distance: float) -> float:
+        """How much more the nearest point asks than the farthest: it falls as the plane comes nearer."""
+        seen = comfort_of(_with(scene, fit=None, separation=1.0, plane=plane(distance)), points)
+        return -seen.nearest_degrees - seen.farthest_degrees
+
+    low, high = max(near, 1e-6 * target), max(far, 2e-6 * target)
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (low, middle) if excess(middle) > 0 else (middle, high)
+    return plane((low + high) / 2)
+
+
+def _separation(scene: Scene, wanted: Stereo, points: Floats) -> float:
+    """The largest separation up to the wanted one that keeps the points within the budget."""
+    seen = comfort_of(_with(scene, separation=1.0), points)
+    eyes, distance = wanted.interpupillary_distance, wanted.screen_distance
+    on_screen = 2 * np.arctan(eyes / 2 / distance)
+    budget = np.radians(_MARGIN * wanted.budget)
+    # The parallax on the screen that the budget allows, before it and behind it; it grows with the separation.
+    least = eyes - 2 * distance * np.tan((on_screen + budget) / 2)
+    most = eyes - 2 * distance * np.tan((on_screen - budget) / 2)
+    found = wanted.separation
+    if seen.nearest < 0:
+        found = min(found, float(least) / seen.nearest)
+    if seen.farthest > 0:
+        found = min(found, float(most) / seen.farthest)
+    return found
+
+
+def _triple(vector: Floats) -> tuple[float, float, float]:
+    x, y, z = (float(each) for each in vector)
+    return x, y, z

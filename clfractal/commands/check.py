@@ -1,0 +1,87 @@
+"""`clfractal check`: the scene with every default filled in, and where the eyes of a stereo scene are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clfractal.errors import SceneError, Where
+from clfractal.scene.load import dump_scene, load_scene
+from clfractal.scene.model import Scene
+from clfractal.shell import Shell
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+
+def check_scene(
+    source: str, overrides: tuple[str, ...], shell: Shell, *, parallax: bool, device: str | None
+) -> None:
+    """Prints a scene as it was understood; what is told of its stereo comes first, as comments, so that it still loads.
+
+    Args:
+        parallax: of a stereo scene, whether to look at its depth (which needs a device) and tell the range of parallax.
+
+    Raises:
+        ClfractalError: the scene is wrong; or `parallax` of a scene without stereo, or without a device.
+    """
+    shell.mute_drivers()  # and the library that reads environment maps
+    scene = load_scene(Path(source), overrides=overrides)
+    if parallax and scene.stereo is None:
+        raise SceneError("needs a scene with a stereo section", Where("--parallax", path=""))
+    lines, warning = [], ""
+    if parallax:
+        scene, told, warning = _parallax(scene, device, shell)
+        lines.append(told)
+    if scene.stereo is not None and scene.stereo.fit is None:
+        lines = [*_eyes(scene), *lines]
+    shell.print("".join(f"# {line}\n" for line in lines) + dump_scene(scene))
+    if warning:
+        shell.say(f"{source}: {warning}")
+
+
+def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, str, str]:
+    """The scene as it is rendered, the range of its parallax, and a warning or nothing."""
+    from clfractal.comfort import fitted, measured
+    from clfractal.device.select import choose
+    from clfractal.render.engine import Shared
+
+    device, shared = choose(wanted), Shared()
+    found = fitted(scene, device, shared=shared, on_compile=shell.say)
+    comfort = measured(found, device, shared=shared, on_compile=shell.say)
+    if comfort is None:
+        return found, "parallax: nothing is seen", ""
+    return found, comfort.sentence(), comfort.warning()
+
+
+def _eyes(scene: Scene) -> list[str]:
+    """Where the viewer's eyes are in the scene, which moves the camera, and what lies on the screen."""
+    from clfractal.render.stereo import eye_views, relation
+    from clfractal.scene.cut_plane import CutPlaneRenderer
+
+    views = (
+        [(f"layout.views.{number}: ", view) for number, (view, _) in enumerate(scene.views)]
+        if scene.layout
+        else []
+    )
+    lines = []
+    for name, view in views or [("", scene)]:
+        assert view.stereo is not None
+        if isinstance(view.renderer, CutPlaneRenderer):
+            lines.append(f"{name}stereo: a cut plane by itself is flat; both eyes see it on the screen")
+            continue
+        seen = eye_views(view)
+        middle, left, right = (seen[eye] for eye in ("middle", "left", "right"))
+        moved = f", moved from {_point(view.camera.position)}" if view.stereo.plane is None else ""
+        lines += [
+            f"{name}stereo: the camera is at {_point(middle.origin)}{moved}; the left eye at {_point(left.origin)}, "
+            f"the right at {_point(right.origin)}",
+            f"{name}stereo: on the screen lies the plane around {_point(middle.center)}, {middle.width:.6g} x "
+            f"{middle.height:.6g} scene units; one unit of the screen's is {relation(view.stereo, middle):.6g} of them",
+        ]
+    return lines
+
+
+def _point(place: npt.NDArray[np.float64] | tuple[float, float, float]) -> str:
+    return "[" + ", ".join(f"{float(value) + 0.0:.6g}" for value in place) + "]"
