@@ -15,6 +15,8 @@ from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
     from clfractal.device.structs import Precision
+    from clfractal.pair import Pair
+    from clfractal.render.compose import Side
     from clfractal.render.engine import ProgressCallback
     from clfractal.render.film import Film
 
@@ -56,9 +58,17 @@ def render(
 
     loaded = scene if isinstance(scene, Scene) else load_scene(scene)
     if loaded.stereo is not None:
-        return _rendered_pair(
+        from clfractal.pair import composed
+
+        if loaded.stereo.mode in ("pair", "multi_view"):
+            raise SceneError(
+                f"{loaded.stereo.mode} keeps both eyes' pictures; use render_pair, or another mode",
+                Where(path="stereo.mode"),
+            )
+        pair, films = _rendered_pair(
             loaded, device, progress, precision=precision, samples=samples, region=region, channels=channels
-        )[0]
+        )
+        return composed(pair, films).to_film()
     from clfractal import job as jobs
     from clfractal.device.select import choose
     from clfractal.render import engine
@@ -94,11 +104,15 @@ def render_pair(
     loaded = scene if isinstance(scene, Scene) else load_scene(scene)
     if loaded.stereo is None:
         raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
-    if loaded.stereo.mode in ("left", "right"):
+    if loaded.stereo.mode not in (
+        "pair",
+        "split_half",
+        "over_under_half",
+    ):  # the others may need less of a pair
         loaded = loaded.model_copy(update={"stereo": loaded.stereo.model_copy(update={"mode": "pair"})})
-    films = _rendered_pair(loaded, device, progress, precision=precision, samples=samples, channels=channels)[
-        1
-    ]
+    _, films = _rendered_pair(
+        loaded, device, progress, precision=precision, samples=samples, channels=channels
+    )
     return films["left"], films["right"]
 
 
@@ -109,15 +123,14 @@ def _rendered_pair(
     *,
     region: tuple[int, int, int, int] | None = None,
     **settings: Any,
-) -> tuple[Film, dict[str, Film]]:
-    """What a stereo scene's mode makes of both eyes' films (the left one's where it keeps both), and these."""
+) -> tuple[Pair, dict[Side, Film]]:
+    """How a stereo scene was rendered, and the films of the eyes that its mode needs."""
     from clfractal.device.select import choose
-    from clfractal.pair import composed, prepare_pair, render_eyes
-    from clfractal.render.compose import APART
+    from clfractal.pair import prepare_pair, render_eyes
     from clfractal.render.film import Film
 
     pair = prepare_pair(scene, choose(device), region=region, **settings)
-    films = {
+    films: dict[Side, Film] = {
         side: Film(
             job.plan.channels,
             (job.scene.image.width, job.scene.image.height),
@@ -127,8 +140,7 @@ def _rendered_pair(
         for side, job in pair.eyes.items()
     }
     render_eyes(pair, films, progress)
-    shown = films["left"] if pair.stereo.mode in APART else composed(pair, films).to_film()
-    return shown, {**films}
+    return pair, films
 
 
 def escape(

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from clfractal.errors import SceneError, Where
 from clfractal.render.anaglyph import matrices, mix
@@ -21,6 +20,7 @@ from clfractal.scene.stereo import Mode, Stereo
 
 Side = Literal["left", "right"]
 Planes = Mapping[str, Floats]
+Place = tuple[slice, slice]
 
 BESIDE: tuple[Mode, ...] = ("split", "split_half")
 BELOW: tuple[Mode, ...] = ("over_under", "over_under_half")
@@ -85,10 +85,9 @@ def eye_regions(stereo: Stereo, image: tuple[int, int], region: Region) -> dict[
     elif mode in BELOW:
         first, second = (_part(region, 0, from_y, width, height) for from_y in (0, height))
     elif mode in PICKED:
-        # One row and column of every parity tells it.
-        few = (min(region.height, 2), min(region.width, 2))
-        picked = _picks_first(mode, few, (region.x, region.y))
-        first, second = region if picked.any() else None, None if picked.all() else region
+        few = (min(region.height, 2), min(region.width, 2))  # rows and columns of every parity
+        places = _places(mode, (region.x, region.y), few)
+        first, second = (region if of_eye else None for of_eye in places)
     else:
         first = second = region
     if _swapped(stereo):
@@ -119,15 +118,7 @@ def compose(
     if mode == "anaglyph":
         return _anaglyph(stereo, left, right, channels)
     if mode in PICKED:
-        picked = _picks_first(mode, next(iter((first or second).values())).shape, origin)
-        result = {
-            name: np.where(picked, (first or second)[name], (second or first)[name]) for name in channels
-        }
-        if mode == "anaglyph_chessboard":
-            for component, name in enumerate("RGB"):
-                of_first, of_second = (np.float32(color[component]) for color in stereo.colors)
-                result[name] = _times(result[name], np.where(picked, of_first, of_second))
-        return result
+        return {name: _picked(stereo, name, first, second, origin) for name in channels}
     axis = 1 if mode in BESIDE else 0
     shown = [planes for planes in (first, second) if planes]
     return {name: np.concatenate([planes[name] for planes in shown], axis=axis) for name in channels}
@@ -238,19 +229,43 @@ def _part(region: Region, from_x: int, from_y: int, width: int, height: int) -> 
     return Region(left, top, right - left, bottom - top) if right > left and bottom > top else None
 
 
-def _picks_first(mode: Mode, shape: tuple[int, ...], origin: tuple[int, int]) -> npt.NDArray[np.bool_]:
-    """For each pixel (row, column) whether it is the first eye's: where its place is even."""
-    y = np.arange(origin[1], origin[1] + shape[0])[:, None]
-    x = np.arange(origin[0], origin[0] + shape[1])[None, :]
-    place = {"rows": y + 0 * x, "columns": x + 0 * y}.get(mode, x + y)
-    even: npt.NDArray[np.bool_] = place % 2 == 0
-    return even
+def _places(mode: Mode, origin: tuple[int, int], shape: tuple[int, ...]) -> tuple[list[Place], list[Place]]:
+    """Where the first and the second eye's pixels are in an array (rows, columns) that begins at the origin, x and y.
+
+    The first eye's are those of even rows, columns, or sums of both.
+    """
+    x, y = origin
+    every, halves = slice(None), (slice(0, None, 2), slice(1, None, 2))
+    if mode == "rows":
+        places = [(halves[y % 2], every)], [(halves[1 - y % 2], every)]
+    elif mode == "columns":
+        places = [(every, halves[x % 2])], [(every, halves[1 - x % 2])]
+    else:
+        same = (x + y) % 2
+        places = (
+            [(halves[0], halves[same]), (halves[1], halves[1 - same])],
+            [(halves[0], halves[1 - same]), (halves[1], halves[same])],
+        )
+    first, second = ([place for place in of_eye if _holds_pixels(place, shape)] for of_eye in places)
+    return first, second
 
 
-def _times(plane: Floats, factor: Floats) -> Floats:
-    """A colour through a filter; what the filter stops is 0, however light it is."""
-    result = np.zeros_like(plane)
-    np.multiply(plane, factor, out=result, where=factor != 0)
+def _holds_pixels(place: Place, shape: tuple[int, ...]) -> bool:
+    return all(len(range(*part.indices(length))) for part, length in zip(place, shape, strict=True))
+
+
+def _picked(stereo: Stereo, name: str, first: Planes, second: Planes, origin: tuple[int, int]) -> Floats:
+    """One channel of a picture in which each pixel is one of either eye's."""
+    result = np.empty_like((first or second)[name])
+    places = _places(stereo.mode, origin, result.shape)
+    colored = stereo.mode == "anaglyph_chessboard" and name in "RGB"
+    for planes, of_eye, color in zip((first, second), places, stereo.colors, strict=True):
+        passed = np.float32(color["RGB".index(name)] if colored else 1.0)
+        for place in of_eye:
+            if passed == 0:  # what a filter stops is black, however light it is
+                result[place] = 0
+            else:
+                np.multiply(planes[name][place], passed, out=result[place])
     return result
 
 

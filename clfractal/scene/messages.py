@@ -202,7 +202,15 @@ def _word(details: ErrorDetails) -> Problem:
     allowed = details["ctx"]["expected"].replace("'", "")
     if place.models:
         allowed += f" or a mapping with {' and '.join(place.keys())}"
-    return Problem(tuple(place.path), f"must be {allowed}, got {shown_value(details['input'])}")
+    guess = _nearest_word(details["input"], allowed)
+    return Problem(tuple(place.path), f"must be {allowed}, got {shown_value(details['input'])}{guess}")
+
+
+def _nearest_word(given: Any, allowed: str) -> str:
+    """A guess at what was meant, where there is much to choose from."""
+    words = allowed.replace(" or ", ", ").split(", ")
+    guess = nearest(given, words) if isinstance(given, str) and len(words) > 3 else None
+    return f"; did you mean {guess!r}?" if guess else ""
 
 
 _SPECIAL: Mapping[str, Callable[[ErrorDetails], Problem | None]] = {
