@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import os
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clfractal.commands.order import PARTIAL as PARTIAL
+from clfractal.commands.order import Order as Order
 from clfractal.commands.progress import Reporter
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.atomic import check_output
@@ -18,25 +20,6 @@ from clfractal.shell import Shell
 
 if TYPE_CHECKING:
     from clfractal.render.store import JournalFilm
-
-PARTIAL = ".partial"
-"""What is added to the first output's name for the file that keeps unfinished work."""
-
-
-@dataclass(frozen=True, slots=True)
-class Order:
-    """The options of `clfractal render`, as they were given."""
-
-    scene: str
-    outputs: tuple[Path, ...] = ()
-    device: str | None = None
-    precision: str | None = None
-    size: str | None = None
-    overrides: tuple[str, ...] = ()
-    region: str | None = None
-    samples: int | None = None
-    resume: bool = False
-    stats: Path | None = None
 
 
 def render_scene(order: Order, shell: Shell) -> None:

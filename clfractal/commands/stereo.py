@@ -8,8 +8,8 @@ from pathlib import Path
 
 from clfractal.comfort import Comfort, comfort_of, measured, points_of_depth
 from clfractal.commands import stats
+from clfractal.commands.order import PARTIAL, Order
 from clfractal.commands.progress import Reporter
-from clfractal.commands.render import PARTIAL, Order
 from clfractal.device.select import choose
 from clfractal.pair import Pair, output_files, prepare_pair, render_eyes, save_pair
 from clfractal.render.compose import Side
