@@ -66,9 +66,11 @@ class Pair:
         scene = {**whole["scene"], "stereo": stereo, "image": image.model_dump()}
         return {**whole, "scene": scene, "eye": side}
 
-    def header_of_both(self) -> dict[str, Any]:
-        """What files tell about a picture made of both: it has no camera of its own."""
-        return {key: value for key, value in self.job.header().items() if not key.startswith("worldTo")}
+    def header_of_both(self, stores: Mapping[Side, Picture]) -> dict[str, Any]:
+        """What files tell about a picture made of both: it has no camera of its own, and took the time of two."""
+        seconds = sum(store.header.get("seconds", 0.0) for store in stores.values())
+        common = {key: value for key, value in self.job.header().items() if not key.startswith("worldTo")}
+        return {**common, "seconds": seconds}
 
 
 def prepare_pair(
@@ -150,7 +152,7 @@ def composed(pair: Pair, stores: Mapping[Side, Picture]) -> Composed:
         stores.get("left"),
         stores.get("right"),
         pair.region,
-        None if alone else pair.header_of_both(),
+        None if alone else pair.header_of_both(stores),
     )
 
 
