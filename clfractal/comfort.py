@@ -18,14 +18,15 @@ from clfractal.device.select import Device
 from clfractal.errors import SceneError, Where
 from clfractal.render import engine
 from clfractal.render.film import Film
-from clfractal.render.stereo import degrees, eye_views, parallax
-from clfractal.render.view import View, camera_view, scene_view
+from clfractal.render.stereo import degrees, eye_distance, eye_views, parallax
+from clfractal.render.view import View, scene_view
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Stereo, StereoPlane
 
 Floats = npt.NDArray[np.float64]
+Ends = tuple[float, float]
+"""The nearest and the farthest of something."""
 
 LIMIT_DEGREES = 1.0
 """Parallax past which the viewer is warned."""
@@ -34,8 +35,8 @@ LIMIT_DEGREES = 1.0
 _QUICK_SIDE = 160
 # It misses the finest spikes: what is fitted is fitted to this part of the budget.
 _MARGIN = 0.95
-# The eye moves with the plane, and sees a little more or less for it.
-_ROUNDS = 3
+# An angle whose tangent is large but no more than that: the eyes of no viewer turn so far.
+_NEARLY_RIGHT = np.radians(89.9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +151,8 @@ def points_of_depth(
     """
     assert view.eye is not None
     width, height = size
-    rows, columns = np.nonzero(np.isfinite(depth))
+    # (What an eye inside the solid sees is where it is itself.)
+    rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))
     across = ((origin[0] + columns + 0.5) / width - 0.5) * view.width
     rise = (0.5 - (origin[1] + rows + 0.5) / height) * view.height
     rays = view.center + across[:, None] * view.side + rise[:, None] * view.up - view.eye
@@ -168,9 +170,9 @@ def fitted(
 ) -> Scene:
     """The scene with a plane and a separation that keep its depth within `stereo.budget`; as it is without `fit`.
 
-    The plane is placed between the nearest and the farthest that the camera sees, so that both have the same parallax in
-    degrees; the camera keeps its place and field of view as far as the screen lets it. If that is still too much, the
-    eyes come closer to each other. A plane that the scene gives stays where it is.
+    The eye between the two stays where it is, so what it sees does not change: the screen is placed between the nearest
+    and the farthest of it, where both have the same parallax in degrees. If that is still too much, the eyes come closer
+    to each other. A plane that the scene gives stays where it is.
 
     Raises:
         SceneError: nothing is seen.
@@ -179,17 +181,17 @@ def fitted(
     stereo = scene.stereo
     if stereo is None or stereo.fit is None:
         return scene
-    current = _with(scene, fit=None)
-    for _ in range(_ROUNDS):
-        points = seen_points(current, device, shared=shared, on_compile=on_compile)
-        if not len(points):
-            raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))
-        if stereo.plane is None:
-            current = _with(current, plane=_balanced_plane(scene, points))
-        current = _with(current, separation=_separation(current, stereo, points))
-        if stereo.plane is not None:
-            break
-    return current
+    plain = _with(scene, fit=None)
+    points = seen_points(plain, device, shared=shared, on_compile=on_compile)
+    if not len(points):
+        raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))
+    view = scene_view(plain)
+    depths = (points - view.origin) @ view.axis
+    ends = (float(depths.min()), float(depths.max()))
+    if stereo.plane is not None:
+        return _with(plain, separation=_separation(stereo, ends, eye_distance(view)))
+    distance = _balanced(stereo, ends)
+    return _with(plain, plane=_plane_at(view, distance), separation=_separation(stereo, ends, distance))
 
 
 def _with(scene: Scene, **changes: object) -> Scene:
@@ -197,53 +199,57 @@ def _with(scene: Scene, **changes: object) -> Scene:
     return scene.model_copy(update={"stereo": scene.stereo.model_copy(update=changes)})
 
 
-def _balanced_plane(scene: Scene, points: Floats) -> StereoPlane:
-    """The plane across the camera's view at which the nearest and the farthest point have the same parallax."""
-    stereo, camera = scene.stereo, scene.camera
-    assert stereo is not None
-    assert isinstance(camera, PerspectiveCamera)
-    mono = camera_view(camera, scene.image.width, scene.image.height)
-    eye = mono.origin
-    depths = (points - eye) @ mono.axis
-    near, far = float(depths.min()), float(depths.max())
-    target = float((mono.center - eye) @ mono.axis)
+def _at_depths(stereo: Stereo, depths: Ends, distance: float) -> Ends:
+    """Parallax (screen units) at the nearest and the farthest depth, of eyes as far apart as the viewer's.
 
-    def plane(distance: float) -> StereoPlane:
-        return StereoPlane(
-            center=_triple(eye + distance * mono.axis),
-            normal=_triple(-mono.axis),
-            up=_triple(mono.up),
-            width=mono.width * distance / target,
-            height=None,
-        )
+    By similar triangles of a point at depth z and of a screen at distance d from the eyes: e (1 - d / z), e between them.
+    """
+    nearest, farthest = (stereo.interpupillary_distance * (1 - distance / depth) for depth in depths)
+    return nearest, farthest
+
+
+def _balanced(stereo: Stereo, depths: Ends) -> float:
+    """How far from the eyes the screen is where the nearest and the farthest depth have the same parallax, degrees."""
 
     def excess(distance: float) -> float:
-        """How much more the nearest point asks than the farthest: it falls as the plane comes nearer."""
-        seen = comfort_of(_with(scene, fit=None, separation=1.0, plane=plane(distance)), points)
-        return -seen.nearest_degrees - seen.farthest_degrees
+        """How much more the nearest asks than the farthest: it grows with the screen's distance."""
+        apart = _separation(stereo, depths, distance)
+        ends = degrees(stereo, [apart * each for each in _at_depths(stereo, depths, distance)])
+        return float(-ends[0] - ends[1])
 
-    low, high = max(near, 1e-6 * target), max(far, 2e-6 * target)
+    low, high = depths
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (low, middle) if excess(middle) > 0 else (middle, high)
-    return plane((low + high) / 2)
+    return (low + high) / 2
 
 
-def _separation(scene: Scene, wanted: Stereo, points: Floats) -> float:
-    """The largest separation up to the wanted one that keeps the points within the budget."""
-    seen = comfort_of(_with(scene, separation=1.0), points)
-    eyes, distance = wanted.interpupillary_distance, wanted.screen_distance
-    on_screen = 2 * np.arctan(eyes / 2 / distance)
-    budget = np.radians(_MARGIN * wanted.budget)
+def _separation(stereo: Stereo, depths: Ends, distance: float) -> float:
+    """The largest separation up to the scene's own that keeps depths within the budget, of a screen at a distance."""
+    eyes, screen = stereo.interpupillary_distance, stereo.screen_distance
+    on_screen = 2 * np.arctan(eyes / 2 / screen)
+    budget = np.radians(_MARGIN * stereo.budget)
     # The parallax on the screen that the budget allows, before it and behind it; it grows with the separation.
-    least = eyes - 2 * distance * np.tan((on_screen + budget) / 2)
-    most = eyes - 2 * distance * np.tan((on_screen - budget) / 2)
-    found = wanted.separation
-    if seen.nearest < 0:
-        found = min(found, float(least) / seen.nearest)
-    if seen.farthest > 0:
-        found = min(found, float(most) / seen.farthest)
+    least = eyes - 2 * screen * np.tan(min((on_screen + budget) / 2, _NEARLY_RIGHT))
+    most = eyes - 2 * screen * np.tan((on_screen - budget) / 2)
+    nearest, farthest = _at_depths(stereo, depths, distance)
+    found = stereo.separation
+    if nearest < 0:
+        found = min(found, float(least) / nearest)
+    if farthest > 0:
+        found = min(found, float(most) / farthest)
     return found
+
+
+def _plane_at(view: View, distance: float) -> StereoPlane:
+    """The plane across a view at another distance from its eye, as large as the eye sees there."""
+    return StereoPlane(
+        center=_triple(view.origin + distance * view.axis),
+        normal=_triple(-view.axis),
+        up=_triple(view.up),
+        width=view.width * distance / eye_distance(view),
+        height=None,
+    )
 
 
 def _triple(vector: Floats) -> tuple[float, float, float]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 # Exit statuses of the shell (sysexits are not used: scripts only need to tell "fix the input" from "fix the machine").
 STATUS_BAD_INPUT = 2
@@ -48,6 +49,17 @@ class ClfractalError(Exception):
 
 class SceneError(ClfractalError):
     """A scene file, or an override of one of its keys, is wrong."""
+
+
+@contextmanager
+def speaking_of(file: str) -> Iterator[None]:
+    """What is found wrong with a scene only while it is worked on is told with the name of its file."""
+    try:
+        yield
+    except SceneError as error:
+        if error.where.file is not None:
+            raise
+        raise SceneError(error.message, replace(error.where, file=file), details=error.details) from error
 
 
 class FormulaError(ClfractalError):

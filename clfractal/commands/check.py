@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clfractal.errors import SceneError, Where
+from clfractal.errors import SceneError, Where, speaking_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.shell import Shell
@@ -32,7 +32,8 @@ def check_scene(
         raise SceneError("needs a scene with a stereo section", Where("--parallax", path=""))
     lines, warning = [], ""
     if parallax:
-        scene, told, warning = _parallax(scene, device, shell)
+        with speaking_of(source):
+            scene, told, warning = _parallax(scene, device, shell)
         lines.append(told)
     if scene.stereo is not None and scene.stereo.fit is None:
         lines = [*_eyes(scene), *lines]

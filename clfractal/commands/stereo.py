@@ -11,6 +11,7 @@ from clfractal.commands import stats
 from clfractal.commands.order import PARTIAL, Order
 from clfractal.commands.progress import Reporter
 from clfractal.device.select import choose
+from clfractal.errors import speaking_of
 from clfractal.pair import Pair, output_files, prepare_pair, render_eyes, save_pair
 from clfractal.render.compose import Side
 from clfractal.render.store import JournalFilm
@@ -37,7 +38,9 @@ def render_stereo(
     Raises:
         ClfractalError: anything wrong with the input, the files or the device.
     """
-    pair = prepare_pair(scene, choose(order.device), region=region, on_start=shell.say, on_compile=shell.say)
+    device = choose(order.device)
+    with speaking_of(order.scene):
+        pair = prepare_pair(scene, device, region=region, on_start=shell.say, on_compile=shell.say)
     job = pair.job
     if job.remark:
         shell.say(f"{order.scene}: {job.remark}")

@@ -11,7 +11,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clfractal.errors import SceneError, Where
 from clfractal.render.anaglyph import matrices, mix
 from clfractal.render.film import Film
 from clfractal.render.tiled import Bands, Floats, Picture
@@ -57,15 +56,10 @@ def composed_channels(stereo: Stereo, channels: Sequence[str]) -> tuple[str, ...
     Raises:
         SceneError: an anaglyph of pictures without R, G and B.
     """
-    if stereo.mode not in ("anaglyph", "anaglyph_chessboard"):
+    stereo.check_channels(channels)
+    if not stereo.mixes_colors or stereo.mode in PICKED:
         return tuple(channels)
-    missing = [name for name in "RGB" if name not in channels]
-    if missing:
-        raise SceneError(
-            f"{stereo.mode} needs the channels R, G, B; {', '.join(missing)} not among them",
-            Where(path="output.channels"),
-        )
-    return tuple(channels) if stereo.mode in PICKED else tuple(name for name in channels if name in "RGBA")
+    return tuple(name for name in channels if name in "RGBA")
 
 
 def eye_regions(stereo: Stereo, image: tuple[int, int], region: Region) -> dict[Side, Region | None]:

@@ -96,7 +96,7 @@ def _check_eyes(scene: Scene) -> None:
 
 
 def _check_stereo(scene: Scene, stereo: Stereo) -> None:
-    """Squeezed pictures need a side that can be halved, a fit one view."""
+    """Squeezed pictures need a side that can be halved, anaglyphs colours, a fit one view with depth."""
     squeezed = {"split_half": "width", "over_under_half": "height"}.get(stereo.mode)
     if squeezed is not None:
         side = getattr(scene.image, squeezed)
@@ -105,11 +105,22 @@ def _check_stereo(scene: Scene, stereo: Stereo) -> None:
                 f"must be even for stereo.mode {stereo.mode}, where each eye has half of it, got {side}",
                 Where(path=f"image.{squeezed}"),
             )
-    if stereo.fit is not None and scene.layout is not None:
-        raise SceneError(
-            "auto cannot suit several views at once; give plane and separation in its place, or remove layout",
-            Where(path="stereo.fit"),
+    stereo.check_channels(scene.output.channels)
+    if stereo.fit is None:
+        return
+    problem = ""
+    if scene.layout is not None:
+        problem = (
+            "cannot suit several views at once; give plane and separation in its place, or remove layout"
         )
+    elif isinstance(scene.renderer, CutPlaneRenderer):
+        problem = "has no depth to fit where renderer.type is cut_plane, which is flat; remove it"
+    elif stereo.convergence != "off_axis":
+        problem = (
+            f"needs convergence off_axis, where parallax follows from depth alone, got {stereo.convergence}"
+        )
+    if problem:
+        raise SceneError(f"auto {problem}", Where(path="stereo.fit"))
 
 
 def _check_step(step: float | None, radius: float, path: str) -> None:

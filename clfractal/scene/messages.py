@@ -166,7 +166,9 @@ def _missing(details: ErrorDetails) -> Problem:
 def _tuple(details: ErrorDetails, place: _Place | None = None) -> Problem:
     place = place or _place(details["loc"])
     fixed = next((t for t in place.types if get_origin(t) is tuple and ... not in get_args(t)), None)
-    what = f"a list of {len(get_args(fixed))} numbers" if fixed else "a list"
+    entries = [option for item in get_args(fixed) for option in _options(item)]
+    of = "lists" if any(get_origin(entry) is tuple for entry in entries) else "numbers"
+    what = f"a list of {len(get_args(fixed))} {of}" if fixed else "a list"
     if str in place.types:
         what = f"text or {what}"
     return Problem(tuple(place.path), f"must be {what}, got {shown_value(details['input'])}")

@@ -1,11 +1,16 @@
 """Stereo: a real screen, the viewer before it, and how the two pictures are shown."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Position, Reflectance, Section, cross, length, problem
+
+# Screen, distance and eyes are measured in one unit: no viewer's differ by more than this.
+MAX_RATIO = 10_000
 
 Positive = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 EyeName = Literal["left", "right", "middle"]
@@ -101,6 +106,18 @@ class Stereo(Section):
         description="of anaglyph_chessboard: the left and the right eye's filter, linear Rec. 709",
     )
 
+    @model_validator(mode="after")
+    def _of_one_viewer(self) -> Self:
+        for key in ("screen_distance", "interpupillary_distance"):
+            measure = getattr(self, key)
+            if not 1 / MAX_RATIO <= measure / self.screen_width <= MAX_RATIO:
+                raise problem(
+                    f"must be within a factor of {MAX_RATIO:,} of screen_width ({self.screen_width:g}), in the same unit,"
+                    f" got {measure:g}",
+                    key,
+                )
+        return self
+
     @property
     def eyes(self) -> tuple[EyeName, ...]:
         """The eyes whose pictures are shown."""
@@ -112,3 +129,17 @@ class Stereo(Section):
     def squeeze(self) -> tuple[int, int]:
         """How many of the finished picture's pixels an eye's pixel is wide and high."""
         return (2 if self.mode == "split_half" else 1, 2 if self.mode == "over_under_half" else 1)
+
+    @property
+    def mixes_colors(self) -> bool:
+        """Whether the finished picture has other colours than the eyes' own."""
+        return self.mode in ("anaglyph", "anaglyph_chessboard")
+
+    def check_channels(self, channels: Collection[str]) -> None:
+        """Raises SceneError, at `output.channels`, if colours that are to be mixed are not among the channels."""
+        missing = [name for name in "RGB" if name not in channels]
+        if missing and self.mixes_colors:
+            raise SceneError(
+                f"{self.mode} needs the channels R, G, B; {', '.join(missing)} not among them",
+                Where(path="output.channels"),
+            )
