@@ -1,0 +1,497 @@
+"""The geometry of stereo against the thesis's section 3.3.1, done step by step with NumPy, and against plain trigonometry.
+
+Every array of points has shape (n, 3), scene units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given as given_any
+from hypothesis import settings as limits
+from hypothesis import strategies as st
+
+from clfractal.errors import SceneError
+from clfractal.render.stereo import (
+    NEAREST,
+    attitude,
+    degrees,
+    eye_views,
+    frustum,
+    parallax,
+    relation,
+)
+from clfractal.render.view import View, camera_view, eye_view, middle_view, scene_view
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.stereo import Eye, EyeName, Stereo
+from tests.render.shots import BALL, ORTHOGRAPHIC, scene_of
+
+Floats = npt.NDArray[np.float64]
+Views = dict[EyeName, View]
+
+SIDES: tuple[EyeName, EyeName] = ("left", "right")
+CAMERA: dict[str, Any] = {
+    "position": [1.0, -4.0, 2.0],
+    "target": [0.2, 0.1, -0.3],
+    "up": [0.1, 0.0, 1.0],
+    "fov": 50.0,
+}
+
+
+def given(*strategies: st.SearchStrategy[Any]) -> Callable[[Any], Any]:
+    """As hypothesis's own; there are many of these, and each is about smooth functions."""
+    return lambda test: limits(max_examples=25)(given_any(*strategies)(test))
+
+
+def dot(a: Floats, b: Floats) -> float:
+    return float((a * b).sum())
+
+
+@dataclass
+class Setting:
+    """A camera, a viewer and the size of a picture."""
+
+    camera: dict[str, Any]
+    stereo: dict[str, Any]
+    size: tuple[int, int]
+
+    def section(self, **changes: Any) -> Stereo:
+        return Stereo.model_validate({**self.stereo, **changes})
+
+    def views(self, **changes: Any) -> Views:
+        stereo = self.section(**changes)
+        middle = middle_view(stereo, PerspectiveCamera.model_validate(self.camera), *self.size)
+        return {name: eye_view(middle, stereo, Eye(name)) for name in ("left", "right", "middle")}
+
+
+def unit(vector: Any) -> Floats:
+    found: Floats = np.array(vector, float) / np.linalg.norm(vector)
+    return found
+
+
+def apart(camera: dict[str, Any]) -> bool:
+    """Whether the camera looks somewhere, and not along its `up`."""
+    toward = np.subtract(camera["target"], camera["position"])
+    distance = float(np.linalg.norm(toward))
+    return distance > 0.1 and float(np.linalg.norm(np.cross(toward / distance, unit(camera["up"])))) > 0.1
+
+
+coordinate = st.floats(-8, 8)
+vector = st.tuples(coordinate, coordinate, coordinate)
+cameras = st.fixed_dictionaries(
+    {
+        "position": vector,
+        "target": vector,
+        "up": vector.filter(lambda v: sum(x * x for x in v) > 1),
+        "fov": st.floats(5, 150),
+    }
+).filter(apart)
+viewers = st.fixed_dictionaries(
+    {
+        "screen_width": st.floats(0.05, 20),
+        "screen_distance": st.floats(0.1, 30),
+        "interpupillary_distance": st.floats(0.01, 0.2),
+    }
+)
+settings = st.builds(Setting, cameras, viewers, st.tuples(st.integers(1, 4000), st.integers(1, 4000)))
+seeds = st.integers(0, 2**32 - 1)
+DESK = Setting(
+    CAMERA, {"screen_width": 0.52, "screen_distance": 0.6, "interpupillary_distance": 0.063}, (96, 54)
+)
+
+
+def points_before(view: View, seed: int, count: int = 50) -> Floats:
+    """Points that an eye sees in and around its picture, from a tenth of the plane's distance to ten times that."""
+    chance = np.random.default_rng(seed)
+    assert view.eye is not None
+    across, rise = chance.uniform(-0.7, 0.7, (2, count))
+    on_plane = view.center + np.outer(across * view.width, view.side) + np.outer(rise * view.height, view.up)
+    found: Floats = view.eye + (on_plane - view.eye) * 10.0 ** chance.uniform(-1, 1, (count, 1))
+    return found
+
+
+def ten_steps(setting: Setting, side: str, front: float, back: float) -> dict[str, Any]:
+    """The thesis's 3.3.1 by hand: from camera and screen to one eye's frustum."""
+    camera, stereo = setting.camera, setting.stereo
+    position, target = np.array(camera["position"]), np.array(camera["target"])
+    aspect = setting.size[0] / setting.size[1]
+    # 1, 2: the view plane through the target, facing the camera, as large as that sees there.
+    distance = np.linalg.norm(position - target)
+    normal = (position - target) / distance
+    plane_width = 2 * distance * np.tan(np.radians(camera["fov"]) / 2) * aspect
+    plane_height = plane_width / aspect
+    across = unit(np.cross(camera["up"], normal))
+    up = np.cross(normal, across)
+    # 3: how large the scene is on the real screen.
+    scale = plane_width / stereo["screen_width"]
+    # 4 to 6: the cyclopean eye and the two beside it.
+    cyclopean = target + normal * scale * stereo["screen_distance"]
+    half = across * scale * stereo["interpupillary_distance"] / 2
+    eye = cyclopean - half if side == "left" else cyclopean + half
+    # 7: the eye's distance from the plane; 8, 9: how near and far it sees.
+    eye_distance = dot(eye - target, normal)
+    near = max(eye_distance - front, NEAREST * eye_distance)
+    far = eye_distance + back
+    # 10: the plane's edges, seen from the foot of the perpendicular, scaled to the near plane.
+    foot = eye - normal * eye_distance
+    shift = np.array([dot(target - foot, across), dot(target - foot, up)])
+    low, high = (
+        (shift + sign * np.array([plane_width, plane_height]) / 2) * near / eye_distance for sign in (-1, 1)
+    )
+    return {
+        "relation": scale,
+        "eye": eye,
+        "frame": np.stack([across, up, normal]),
+        "planes": (low[0], high[0], low[1], high[1], near, far),
+    }
+
+
+def gl_frustum(l: float, r: float, b: float, t: float, n: float, f: float) -> Floats:  # noqa: E741
+    """glFrustum's matrix as its reference page prints it."""
+    return np.array(
+        [
+            [2 * n / (r - l), 0, (r + l) / (r - l), 0],
+            [0, 2 * n / (t - b), (t + b) / (t - b), 0],
+            [0, 0, -(f + n) / (f - n), -2 * f * n / (f - n)],
+            [0, 0, -1, 0],
+        ]
+    )
+
+
+def homogeneous(points: Floats) -> Floats:
+    return np.concatenate([points, np.ones((len(points), 1))], axis=-1)
+
+
+class TestOffAxis:
+    @given(settings, st.sampled_from(SIDES), st.floats(0, 100), st.floats(0.01, 100))
+    def test_the_ten_steps(self, setting: Setting, side: EyeName, front: float, back: float) -> None:
+        expected = ten_steps(setting, side, front, back)
+        views = setting.views()
+        size = float(np.linalg.norm(expected["eye"])) + views["middle"].width
+        np.testing.assert_allclose(views[side].origin, expected["eye"], atol=1e-11 * size)
+        assert relation(setting.section(), views["middle"]) == pytest.approx(expected["relation"])
+        frame = np.stack([views[side].side, views[side].up, -views[side].axis])
+        np.testing.assert_allclose(frame, expected["frame"], atol=1e-11)
+        found = frustum(views[side], front=front, back=back)
+        planes = (found.left, found.right, found.bottom, found.top, found.near, found.far)
+        np.testing.assert_allclose(planes, expected["planes"], rtol=1e-8, atol=1e-10 * size)
+        np.testing.assert_allclose(found.matrix(), gl_frustum(*planes), rtol=1e-12)
+
+    def test_a_screen_by_numbers(self) -> None:
+        """A plane 4 wide on a screen 0.5 wide: 8 scene units are one of the screen's. So the eye is 0.75 * 8 = 6 before
+        it, and each of the two 0.0625 * 8 / 2 = 0.25 beside that. The plane's edges at -2 and 2 are -1.75 and 2.25 from
+        the left eye's foot, and a third of that at distance 2 of 6."""
+        camera = {"position": [0, -2, 0], "target": [0, 0, 0], "fov": 90}  # 2 * 2 * tan 45 = 4
+        viewer = {"screen_width": 0.5, "screen_distance": 0.75, "interpupillary_distance": 0.0625}
+        views = Setting(camera, viewer, (64, 64)).views()
+        np.testing.assert_allclose(views["middle"].origin, [0, -6, 0])
+        np.testing.assert_allclose(views["left"].origin, [-0.25, -6, 0])
+        np.testing.assert_allclose(views["right"].origin, [0.25, -6, 0])
+        found = frustum(views["left"], front=4, back=5)
+        expected = [-1.75 / 3, 2.25 / 3, -2 / 3, 2 / 3, 2, 11]
+        np.testing.assert_allclose(
+            [found.left, found.right, found.bottom, found.top, found.near, found.far], expected
+        )
+
+    @given(settings, st.sampled_from(SIDES), seeds)
+    def test_opengl_shows_a_point_where_the_picture_does(
+        self, setting: Setting, side: EyeName, seed: int
+    ) -> None:
+        """Eq. 11 and glFrustum lead to the normalized device coordinates that picture files tell (whose y goes down)."""
+        view = setting.views()[side]
+        points = points_before(view, seed)
+        lens = frustum(view, front=1e9, back=1e9)
+        clip = homogeneous(points) @ (lens.matrix() @ attitude(view)).T
+        from_gl = clip[:, :2] / clip[:, 3:]
+        told = homogeneous(points) @ view.world_to_ndc()
+        from_file = told[:, :2] / told[:, 3:]
+        np.testing.assert_allclose((1 + from_gl * [1, -1]) / 2, from_file, atol=1e-7)
+        assert (clip[:, 3] > 0).all()
+
+    @given(settings, st.sampled_from(SIDES), st.floats(0.1, 0.9))
+    def test_depth_goes_from_the_near_to_the_far_plane(
+        self, setting: Setting, side: EyeName, part: float
+    ) -> None:
+        view = setting.views()[side]
+        distance = dot(view.center - view.origin, view.axis)
+        lens = frustum(view, front=part * distance, back=3 * distance)
+        ends = np.stack([view.origin + depth * view.axis for depth in (lens.near, lens.far)])
+        clip = homogeneous(ends) @ (lens.matrix() @ attitude(view)).T
+        np.testing.assert_allclose(clip[:, 2] / clip[:, 3], [-1, 1], atol=1e-6)
+
+    @given(settings)
+    def test_the_attitude_is_a_rigid_motion(self, setting: Setting) -> None:
+        """The eye comes to the origin, the picture's right, up and the viewer's side to x, y and z."""
+        view = setting.views()["right"]
+        matrix = attitude(view)
+        np.testing.assert_allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(matrix) == pytest.approx(1)
+        axes = np.stack([view.origin, *(view.origin + each for each in (view.side, view.up, -view.axis))])
+        expected = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+        size = float(np.linalg.norm(view.origin))
+        np.testing.assert_allclose((homogeneous(axes) @ matrix.T)[:, :3], expected, atol=1e-12 * (1 + size))
+
+    def test_near_is_kept_before_the_eye(self) -> None:
+        view = DESK.views()["left"]
+        distance = dot(view.center - view.origin, view.axis)
+        assert frustum(view, front=0.5 * distance, back=1).near == pytest.approx(0.5 * distance)
+        assert frustum(view, front=7 * distance, back=1).near == pytest.approx(NEAREST * distance)
+
+    def test_eyes_that_see_nothing_of_the_plane(self) -> None:
+        view = DESK.views()["left"]
+        distance = dot(view.center - view.origin, view.axis)
+        for beyond in (0.0, distance):
+            place = view.center + beyond * view.axis
+            behind = View(view.center, view.side, view.up, view.axis, view.width, view.height, place, place)
+            for function in (lambda v: frustum(v, front=1, back=1), attitude):
+                with pytest.raises(SceneError, match="the eye must be before the view plane, got a distance"):
+                    function(behind)
+        with pytest.raises(SceneError, match=r"camera\.projection: stereo needs an eye"):
+            frustum(camera_view(scene_of(BALL, ORTHOGRAPHIC).camera, 8, 8), front=1, back=1)
+        with pytest.raises(SceneError, match="back: must leave something between near"):
+            frustum(view, front=0, back=-1)
+
+
+class TestParallax:
+    @given(settings, seeds)
+    def test_it_is_what_lines_through_the_screen_say(self, setting: Setting, seed: int) -> None:
+        """Each eye's line to a point meets the view plane somewhere: the way from the left eye's place to the right's."""
+        views, stereo = setting.views(), setting.section()
+        middle = views["middle"]
+        points = points_before(middle, seed)
+        places = []
+        for name in SIDES:
+            eye = views[name].eye
+            assert eye is not None
+            along = ((middle.center - eye) @ middle.axis) / ((points - eye) @ middle.axis)
+            places.append(eye + (points - eye) * along[:, None])
+        frame = np.stack([middle.side, middle.up], axis=1)
+        expected = (places[1] - places[0]) @ frame * stereo.screen_width / middle.width
+        found = parallax(stereo, views, points)
+        np.testing.assert_allclose(found, expected, atol=1e-8 * stereo.screen_width)
+        # Similar triangles: e (1 - d / z) for a point at depth z and a plane at d.
+        depth = (points - middle.origin) @ middle.axis
+        distance = dot(middle.center - middle.origin, middle.axis)
+        eyes = stereo.interpupillary_distance
+        np.testing.assert_allclose(found[:, 0], eyes * (1 - distance / depth), atol=1e-8 * eyes)
+
+    @given(settings, seeds, st.floats(0, 3))
+    def test_none_on_the_view_plane(self, setting: Setting, seed: int, separation: float) -> None:
+        views = setting.views(separation=separation)
+        middle = views["middle"]
+        chance = np.random.default_rng(seed).uniform(-1, 1, (20, 2)) * [middle.width, middle.height]
+        points = middle.center + chance[:, :1] * middle.side + chance[:, 1:] * middle.up
+        found = parallax(setting.section(separation=separation), views, points)
+        np.testing.assert_allclose(found, 0, atol=1e-10 * setting.stereo["screen_width"])
+
+    @given(settings, seeds, st.floats(0, 3))
+    def test_the_eyes_distance_at_infinity(self, setting: Setting, seed: int, separation: float) -> None:
+        views = setting.views(separation=separation)
+        middle = views["middle"]
+        points = points_before(middle, seed)
+        assert middle.eye is not None
+        points = middle.eye + 1e9 * (points - middle.eye)
+        across, rise = parallax(setting.section(separation=separation), views, points).T
+        eyes = setting.stereo["interpupillary_distance"] * separation
+        np.testing.assert_allclose(across, eyes, rtol=1e-6, atol=1e-6 * setting.stereo["screen_width"])
+        np.testing.assert_allclose(rise, 0, atol=1e-6 * setting.stereo["screen_width"])
+
+    @given(settings, seeds, st.sampled_from(["off_axis", "parallel"]))
+    def test_none_is_vertical(self, setting: Setting, seed: int, convergence: str) -> None:
+        """In the picture too: both eyes show a point in the same row."""
+        views = setting.views(convergence=convergence)
+        points = points_before(views["middle"], seed)
+        rise = parallax(setting.section(convergence=convergence), views, points)[:, 1]
+        np.testing.assert_allclose(rise, 0, atol=1e-8 * setting.stereo["screen_width"])
+        rows = []
+        for name in SIDES:
+            told = homogeneous(points) @ views[name].world_to_ndc()
+            rows.append(told[:, 1] / told[:, 3])
+        np.testing.assert_allclose(rows[0], rows[1], atol=1e-8)
+
+    @given(settings, seeds)
+    def test_parallel_eyes_agree_at_infinity(self, setting: Setting, seed: int) -> None:
+        """And what is on the plane, as far as they are apart from each other, the left to the right."""
+        stereo, views = setting.section(convergence="parallel"), setting.views(convergence="parallel")
+        middle = views["middle"]
+        for name in SIDES:
+            np.testing.assert_array_equal(views[name].axis, middle.axis)
+            # Each looks straight at the middle of its own rectangle.
+            beside = np.cross(views[name].center - views[name].origin, middle.axis)
+            np.testing.assert_allclose(
+                beside, 0, atol=1e-10 * float(np.linalg.norm(middle.origin - middle.center))
+            )
+        points = points_before(middle, seed)
+        assert middle.eye is not None
+        far = middle.eye + 1e9 * (points - middle.eye)
+        tolerance = 1e-6 * stereo.screen_width
+        np.testing.assert_allclose(parallax(stereo, views, far), 0, atol=tolerance)
+        on_plane = parallax(stereo, views, middle.center[None, :])
+        np.testing.assert_allclose(on_plane, [[-stereo.interpupillary_distance, 0]], atol=tolerance)
+
+    def test_eyes_that_toe_in(self) -> None:
+        """They agree in the middle, and only there: the left eye's picture of the plane is a trapezium whose right side is
+        the shorter one (it is farther from that eye), the right eye's the other way round."""
+        stereo, views = DESK.section(convergence="toe_in"), DESK.views(convergence="toe_in")
+        middle = views["middle"]
+        corners = np.stack(
+            [
+                middle.center + x * middle.width / 2 * middle.side + y * middle.height / 2 * middle.up
+                for x in (-1, 1)
+                for y in (1, -1)
+            ]
+        )
+        rise = parallax(stereo, views, corners)[:, 1].reshape(2, 2)
+        least = 1e-4 * stereo.screen_width
+        assert rise[0, 0] < -least < least < rise[0, 1]
+        assert rise[1, 1] < -least < least < rise[1, 0]
+        np.testing.assert_allclose(parallax(stereo, views, middle.center[None, :]), 0, atol=1e-12)
+        for name in SIDES:
+            view = views[name]
+            frame = np.stack([view.side, view.up, -view.axis])
+            np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-12)
+            assert np.linalg.det(frame) == pytest.approx(1)
+            np.testing.assert_allclose(np.cross(view.center - view.origin, view.axis), 0, atol=1e-12)
+            assert view.height / view.width == pytest.approx(middle.height / middle.width)
+            # As wide an angle as between the eyes.
+            wide = view.width / np.linalg.norm(view.center - view.origin)
+            assert wide == pytest.approx(middle.width / np.linalg.norm(middle.center - middle.origin))
+            assert view.focus_distance == pytest.approx(np.linalg.norm(view.center - view.origin))
+
+    @given(settings, st.floats(-5, 5))
+    def test_degrees_by_the_angle_between_two_lines(self, setting: Setting, part: float) -> None:
+        """The eyes' lines of sight through their places on the screen, the difference to those that meet on it."""
+        stereo = setting.section()
+        eyes, distance = stereo.interpupillary_distance, stereo.screen_distance
+        across = part * eyes
+
+        def turned(shift: float) -> float:
+            """The angle that the lines of sight come together by; below 0 if they go apart."""
+            left, right = (
+                np.arctan2(sign * (shift - eyes) / 2, distance) for sign in (-1, 1)
+            )  # of each eye, inwards positive
+            return float(np.degrees(left - right))
+
+        assert degrees(stereo, across) == pytest.approx(turned(0.0) - turned(across), abs=1e-9)
+
+    def test_degrees_by_numbers(self) -> None:
+        """Eyes 2 apart at a distance of 1 see the middle of a screen under 90 degrees, and the infinitely far under 0."""
+        stereo = Stereo.model_validate(
+            {"screen_width": 1, "screen_distance": 1, "interpupillary_distance": 2}
+        )
+        np.testing.assert_allclose(degrees(stereo, [0, 2, 4]), [0, 90, 180])
+        # What is half as far: x from -1 to 0 and back, so a parallax of -2 and an angle of 2 atan 2.
+        assert degrees(stereo, -2) == pytest.approx(90 - np.degrees(2 * np.arctan(2)))
+        # One degree of a viewer at a desk is about a hundredth of the distance.
+        assert degrees(DESK.section(), 0.6 * np.radians(1)) == pytest.approx(1, abs=0.02)
+
+
+# Neither of length 1 nor perpendicular.
+PLANE: dict[str, Any] = {
+    "center": [0.3, -0.1, 0.2],
+    "normal": [0.5, -2, 1],
+    "up": [0.3, 0.1, 2],
+    "width": 3.0,
+}
+
+
+class TestScenes:
+    @pytest.mark.parametrize(("size", "height"), [((64, 48), 1.2), ((48, 64), 5.0), ((64, 64), 3.0)])
+    def test_a_plane_of_its_own(self, size: tuple[int, int], height: float) -> None:
+        """Its corners are the picture's, whatever its proportions, for both eyes."""
+        plane = {**PLANE, "height": height}
+        scene = scene_of(BALL, CAMERA, size, stereo={"plane": plane})
+        normal = unit(plane["normal"])
+        across = unit(np.cross(plane["up"], normal))
+        up = np.cross(normal, across)
+        views = eye_views(scene)
+        distance = 0.6 * 3.0 / 0.52
+        np.testing.assert_allclose(views["middle"].origin, np.array(plane["center"]) + distance * normal)
+        for name, offset in zip(SIDES, (-1, 1), strict=True):
+            view = views[name]
+            expected = views["middle"].origin + offset * across * 0.063 / 2 * 3.0 / 0.52
+            np.testing.assert_allclose(view.origin, expected)
+            for x, y in ((-1, 1), (1, 1), (-1, -1), (1, -1)):
+                corner = np.array(plane["center"]) + x * 1.5 * across + y * height / 2 * up
+                told = np.append(corner, 1) @ view.world_to_ndc()
+                np.testing.assert_allclose(told[:2] / told[3], [(1 + x) / 2, (1 - y) / 2], atol=1e-12)
+
+    def test_a_plane_without_height_has_square_pixels(self) -> None:
+        view = scene_view(scene_of(BALL, CAMERA, (64, 48), stereo={"plane": PLANE}))
+        assert view.height == pytest.approx(3.0 * 48 / 64)
+
+    def test_the_camera_moves_to_where_the_viewer_is(self) -> None:
+        """Nothing of a mono scene's camera stays but the direction and what it sees at its target."""
+        scene = scene_of(BALL, CAMERA, (96, 54), stereo={})
+        mono, middle = camera_view(scene.camera, 96, 54), scene_view(scene)
+        for name in ("center", "side", "up", "axis"):
+            np.testing.assert_array_equal(getattr(mono, name), getattr(middle, name))
+        assert (mono.width, mono.height) == (middle.width, middle.height)
+        distance = dot(middle.center - middle.origin, middle.axis)
+        assert distance / middle.width == pytest.approx(0.6 / 0.52)
+
+    def test_the_camera_stays_if_it_sees_as_wide_as_the_viewer(self) -> None:
+        fov = np.degrees(2 * np.arctan(0.52 * 54 / 96 / 2 / 0.6))
+        scene = scene_of(BALL, {**CAMERA, "fov": fov}, (96, 54), stereo={})
+        np.testing.assert_allclose(scene_view(scene).origin, CAMERA["position"], atol=1e-12)
+
+    @pytest.mark.parametrize("mode", ["split_half", "over_under_half"])
+    def test_squeezed_eyes_see_the_whole_screen(self, mode: str) -> None:
+        whole = scene_of(BALL, CAMERA, (96, 54), stereo={"mode": "split"})
+        squeezed = scene_of(BALL, CAMERA, (96, 54), stereo={"mode": mode})
+        size = (48, 54) if mode == "split_half" else (96, 27)
+        for name in SIDES:
+            small = squeezed.seen_by(name)
+            assert (small.image.width, small.image.height) == size
+            same_view(scene_view(small), scene_view(whole.seen_by(name)))
+
+    def test_a_view_of_a_layout_takes_up_a_part_of_the_screen(self) -> None:
+        """Half of the screen's pixels are half of its width: the viewer sits twice as many of its widths before it."""
+        stereo = {"screen_width": 0.5, "mode": "split"}
+        views: list[dict[str, Any]] = [{}, {"camera": {**CAMERA, "fov": 20}}]
+        scene = scene_of(BALL, CAMERA, (96, 54), stereo=stereo, layout={"views": views})
+        for number, fov in ((0, 50), (1, 20)):
+            alone = scene_of(BALL, {**CAMERA, "fov": fov}, (48, 54), stereo={**stereo, "screen_width": 0.25})
+            for name in SIDES:
+                same_view(scene_view(scene.seen_by(name).views[number][0]), scene_view(alone.seen_by(name)))
+
+    @pytest.mark.parametrize("mode", ["split_half", "over_under_half"])
+    def test_squeezed_views_of_a_layout(self, mode: str) -> None:
+        layout: dict[str, Any] = {"views": [{}, {}]}
+        scenes = [
+            scene_of(BALL, CAMERA, (96, 54), stereo={"mode": m}, layout=layout) for m in (mode, "split")
+        ]
+        for name in SIDES:
+            found, expected = (scene_view(scene.seen_by(name).views[1][0]) for scene in scenes)
+            same_view(found, expected)
+
+    def test_the_lens_stays_sharp_where_it_was_told_to_be(self) -> None:
+        """On the screen, unless the camera says how far from the eye."""
+        lens = {**CAMERA, "f_number": 2.0}
+        scene = scene_of(BALL, lens, (96, 54), stereo={})
+        for name in SIDES:
+            view = scene_view(scene.seen_by(name))
+            assert view.focus_distance == pytest.approx(dot(view.center - view.origin, view.axis))
+            assert view.lens_radius == camera_view(scene.camera, 96, 54).lens_radius != 0
+        told = scene_of(BALL, {**lens, "focus_distance": 1.5}, (96, 54), stereo={})
+        assert scene_view(told.seen_by("left")).focus_distance == 1.5
+
+    def test_copies_show_the_same_eye(self) -> None:
+        scene: Scene = scene_of(BALL, CAMERA, (96, 54), stereo={}).seen_by("left")
+        lit = scene.model_copy(update={"lights": scene.lights})
+        same_view(scene_view(lit), scene_view(scene))
+        assert lit.eye == scene.eye == Eye("left")
+
+
+def same_view(found: View, expected: View) -> None:
+    """To the last digits: two ways to one number may round differently."""
+    for name in View.__slots__:
+        np.testing.assert_allclose(
+            getattr(found, name), getattr(expected, name), rtol=1e-13, atol=1e-13, err_msg=name
+        )
