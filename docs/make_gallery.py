@@ -22,6 +22,8 @@ from clfractal import resources
 from clfractal.api import load_scene, render
 from clfractal.files.srgb import encode8
 from clfractal.formulas import catalog
+from clfractal.render.compose import APART
+from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
@@ -89,14 +91,14 @@ def page() -> str:
 def make_picture(path: Path) -> None:
     """Renders a scene and writes its reduced picture."""
     scene = load_scene(path)
-    film = render(scene, channels=["R", "G", "B", "A"])
+    film = render(beside(scene), channels=["R", "G", "B", "A"])
     linear = np.stack([film["R"], film["G"], film["B"]], axis=-1)
     # What is brighter than the screen can show is cut before it is averaged, as in the full picture.
     linear = np.clip(linear * np.float32(2.0**scene.output.exposure), 0, 1)
     coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
     target = PICTURES / f"{path.stem}.png"
     for reduction in REDUCTIONS:
-        if scene.image.width % reduction or scene.image.height % reduction:
+        if film.width % reduction or film.height % reduction:
             continue
         shown = picture(reduced(linear, reduction), reduced(coverage, reduction))
         shown.save(target, optimize=True)
@@ -104,6 +106,13 @@ def make_picture(path: Path) -> None:
         if size <= LARGEST_FILE:
             break
     print(f"{target}: {size // 1000} kB, {film.header['seconds']:.1f} s", flush=True)
+
+
+def beside(scene: Scene) -> Scene:
+    """The scene, with two eyes' pictures that would go to two files, or to one as two views, beside each other."""
+    if scene.stereo is None or scene.stereo.mode not in APART:
+        return scene
+    return scene.model_copy(update={"stereo": scene.stereo.model_copy(update={"mode": "split"})})
 
 
 def picture(linear: Floats, coverage: Floats) -> Image.Image:

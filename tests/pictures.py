@@ -18,7 +18,8 @@ import numpy.typing as npt
 from PIL import Image
 
 from clfractal import resources
-from clfractal.api import load_scene, render
+from clfractal.api import load_scene, render, render_pair
+from clfractal.render.compose import APART, Composed
 from clfractal.render.film import Film
 from clfractal.scene.model import Scene
 from clfractal.scene.renderer import Renderer
@@ -53,14 +54,29 @@ def small_scene(path: Path) -> Scene:
 
 
 @cache
+def small_films(path: Path) -> tuple[Film, ...]:
+    """The scene rendered small, for each eye; once for all tests, because building its program takes seconds."""
+    scene = small_scene(path)
+    channels = ["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "iterations"]
+    if scene.stereo is not None:
+        return render_pair(scene, channels=channels)
+    return (render(scene, channels=channels),)
+
+
 def small_film(path: Path) -> Film:
-    """The scene rendered small; once for all tests, because building its program takes seconds."""
-    return render(small_scene(path), channels=["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "iterations"])
+    """The scene rendered small; of a stereo scene what the left eye sees."""
+    return small_films(path)[0]
 
 
 def small_picture(path: Path) -> Picture:
-    """What a screen would show of `small_film`: sRGB, shape (HEIGHT, WIDTH, 3)."""
-    return small_film(path).to_rgb8(small_scene(path).output.exposure)
+    """What a screen would show of `small_films`: sRGB, shape (HEIGHT, WIDTH, 3); twice as wide for two eyes apart."""
+    scene, films = small_scene(path), small_films(path)
+    if scene.stereo is None:
+        return films[0].to_rgb8(scene.output.exposure)
+    apart = scene.stereo.mode in APART
+    stereo = scene.stereo.model_copy(update={"mode": "split"}) if apart else scene.stereo
+    left, right = films
+    return Composed(stereo, (WIDTH, HEIGHT), left, right).to_film().to_rgb8(scene.output.exposure)
 
 
 def golden_path(path: Path) -> Path:
