@@ -13,7 +13,7 @@ from pydantic import Field
 
 from clfractal.scene.base import Section
 from clfractal.scene.coloring import Coloring
-from clfractal.scene.cut_plane import CutPlanes
+from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
@@ -124,8 +124,11 @@ class Scene(Section):
                     f"there is no room for it in a picture of {self.image.width} x {self.image.height} pixels",
                     Where(path=f"layout.views.{number}"),
                 )
-            image = Image(width=place.width, height=place.height)
-            found.append((self.model_copy(update={**view.changes(), "image": image, "layout": None}), place))
+            own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}
+            if isinstance(view.renderer, CutPlaneRenderer):
+                # The scene's planes stand in pictures of its object, and a plane by itself is none.
+                own["cut_planes"] = ()
+            found.append((self.model_copy(update={**own, **view.changes()}), place))
         return found
 
     @property

@@ -89,6 +89,20 @@ class TestMandelbrot:
         assert same.mean() > 0.999
 
 
+class TestIterations:
+    @pytest.mark.parametrize("curve", ["linear", "log"])
+    def test_the_plane_has_a_limit_of_its_own(self, device: Device, curve: str) -> None:
+        """Counts, the inside and the colours are those of a formula with that limit."""
+        colors = {"mode": "stepped", "curve": curve}
+        own = plane_scene(size=(48, 48), iterations=9, plane=WHOLE, colors=colors, plane_iterations=70)
+        whole = plane_scene(size=(48, 48), iterations=70, plane=WHOLE, colors=colors)
+        film = shoot(own, device)
+        assert stacked(film).tobytes() == stacked(shoot(whole, device)).tobytes()
+        assert film["iterations"].max() == 70
+        short = shoot(plane_scene(size=(48, 48), iterations=9, plane=WHOLE, colors=colors), device)
+        assert short["iterations"].max() == 9
+
+
 class TestChannels:
     def test_they_tell_of_the_plane(self, device: Device) -> None:
         plane = {
