@@ -80,7 +80,7 @@ def distances(
     """Distances to the solid at points of shape (n, 3), with normals; see `escape` for the errors."""
     result = _run(chain, points, iterations, "distances", 7, device, lanes, precision, None)
     inside = result[6] > 0
-    # Inside the kernel's gradient is that of |z| after the last application, and not of the distance, which is 0 all around.
+    # Inside the kernel's gradient is that of |z| after the last application; the distance is 0 all around.
     normal = np.where(inside[:, None], 0.0, result[2:5].T)
     return Distances(result[0], result[1], normal, result[5], inside)
 
