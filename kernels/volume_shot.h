@@ -112,7 +112,7 @@ INLINE void sight_quads(sight *s, real until, mask active, const plane_hits *hit
         const mask here = active & less(next->distance, until);
         if (!any_lane(here)) return;
         sight_add(s, next->tint, next->alpha, next->distance, next->count, next->normal, here, here);
-        *next = planes_next(hits, pick(here, next->distance, next->before), set);
+        *next = planes_next(hits, pick(here, next->distance, next->before), pick(here, next->index, next->after), set);
     }
 }
 #endif
@@ -143,7 +143,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     mask found = nowhere;
 #elif PLANES > 0
     const plane_hits hits = planes_met(r, wanted, w.planes);
-    plane_hit next = planes_next(&hits, R(-1.0), w.planes);
+    plane_hit next = planes_next(&hits, R(-1.0), R(-1.0), w.planes);
 #endif
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;

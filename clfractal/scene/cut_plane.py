@@ -64,7 +64,10 @@ class CutPlane(Section):
     colors: EscapeColors = Field(
         default_factory=dict, validate_default=True, description="colours by escape counts"
     )
-    opacity: Fraction = Field(0.8, description="of the plane outside the set; 0: not shown there")
+    opacity: Fraction = Field(0.8, description="of the rectangle; 0: not shown")
+    inside_opacity: Fraction | None = Field(
+        None, description="of the rectangle where the plane is in the set; opacity if null"
+    )
     cut: bool = Field(False, description="whether the object in front of the plane is removed")
     iterations: Iterations | None = Field(
         None, description="most applications of the formula on the plane; formula.iterations if null"

@@ -14,6 +14,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.formulas import reference
+from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import named_table
@@ -106,6 +107,12 @@ def escape_tint(scene: Scene, points: Floats, limit: int = BALL_ITERATIONS) -> t
     return tint.reshape(points.shape), rim.reshape(points.shape[:-1])
 
 
+def alpha_of(each: CutPlane, tint: Floats) -> Floats:
+    """A quad's opacity at points of these colours."""
+    inside = (tint == np.array(COLORS["inside"])).all(-1)
+    return np.where(inside & (each.inside_opacity is not None), each.inside_opacity or 0.0, each.opacity)
+
+
 def met(scene: Scene, index: int, number: int = 0) -> tuple[npt.NDArray[np.bool_], Floats, Floats]:
     """Which rays meet a plane's rectangle, at which distance; and how near to its rim, scene units."""
     origin, direction, _ = rays(scene)
@@ -136,9 +143,9 @@ def layered(scene: Scene, renderer: str) -> tuple[Floats, Floats, npt.NDArray[np
             limit = each.iterations or BALL_ITERATIONS
             tint, rim = escape_tint(scene, origin + t[..., None] * direction, limit)
             sure &= (~seen | (rim > 1e-4)) & (room > 1e-4) & (~seen | (np.abs(t - ball) > slack))
-            layers.append((np.where(seen, t, 1e9), seen * each.opacity, tint))
+            layers.append((np.where(seen, t, 1e9), seen * alpha_of(each, tint), tint))
     depth = np.stack([layer[0] for layer in layers])
-    order = np.argsort(depth, axis=0)
+    order = np.argsort(depth, axis=0, kind="stable")
     through, color = np.ones(nearest.shape), np.zeros((*nearest.shape, 3))
     for rank in order:
         alpha = np.take_along_axis(np.stack([layer[1] for layer in layers]), rank[None], 0)[0]
@@ -198,6 +205,54 @@ def test_several_quads_by_depth(device: Device, renderer: str, side: int) -> Non
     np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
     np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
     assert len(np.unique(np.round(coverage[sure], 4))) >= 4
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize("opacities", [(0.3, 0.9), (0.0, 1.0), (0.6, 0.0)])
+def test_the_set_on_a_plane_has_its_own_opacity(
+    device: Device, renderer: str, opacities: tuple[float, float]
+) -> None:
+    """A disc of the ball's planes on the glass: opaque in clear glass, alone, or a hole."""
+    outside, inside = opacities
+    planes = [plane([0.0, -1.0, 0.05], [0.1, -1, 0.1], outside, inside_opacity=inside, iterations=2)]
+    scene = picture(renderer, PERSPECTIVE, planes, iterations=BALL_ITERATIONS)
+    film = shoot(scene, device)
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > 0.8
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    # A quad that stops half of the light or more is what the data channels tell of, where it does.
+    seen, t, _ = met(scene, 0)
+    origin, direction, _ = rays(scene)
+    tint, _ = escape_tint(scene, origin + t[..., None] * direction, 2)
+    front = seen & (t < to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)[0])
+    disc = front & sure & (tint == np.array(COLORS["inside"])).all(-1)
+    assert disc.sum() > 100
+    on_plane = np.abs(film["iterations"] - 2) < 1e-6
+    if outside < 0.5:
+        assert on_plane[disc].all()
+        assert not on_plane[~seen & sure & np.isfinite(film["Z"])].any()
+    else:
+        assert not on_plane[disc].any()
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_quads_at_one_distance(device: Device, renderer: str) -> None:
+    """All are seen, the list's first in front."""
+    place = ([0.0, -1.3, 0.1], [0.1, -1, 0.1])
+    planes = [
+        plane(*place, 0.5, iterations=3),
+        plane(*place, 0.4, iterations=5, width=1.2),
+        plane(*place, 0.7, iterations=8),
+        plane([0, 1.3, 0], [0, -1, 0.2], 1.0),
+    ]
+    scene = picture(renderer, PERSPECTIVE, planes)
+    film = shoot(scene, device)
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > 0.7
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    assert {0.85, 0.91, 1.0} <= set(np.round(coverage[sure], 4).tolist())
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
