@@ -74,6 +74,8 @@ class Grid:
             none), and 255 inside, 0 outside. `least_squares` and `exact` ones are those of samples of a brick's cells
             that the surface goes through: of a sample that bricks share, a copy may still be by differences.
         solid_slot: the slot that all bricks share which are inside as a whole; None where each has its own.
+        outside_slot: the slot that bricks share which are outside as a whole, where that can be seen; None where they are
+            not stored, or each has its own.
         background: value of what is not stored.
         stats: what filling took.
     """
@@ -88,6 +90,7 @@ class Grid:
     values: tuple[cl.Buffer, ...]
     normals: tuple[cl.Buffer, ...]
     solid_slot: int | None
+    outside_slot: int | None = None
     background: float = 0.0
     stats: GridStats = field(default_factory=GridStats)
 

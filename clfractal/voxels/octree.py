@@ -80,6 +80,20 @@ def levels(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
     return np.where(found >= 0, -1 - found.astype(np.int32), table)
 
 
+def touched(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Which bricks are flagged, or touch one that is, if only at a corner."""
+    for axis in range(3):
+        before, after = (
+            tuple(slice(start, stop) if axis == a else slice(None) for a in range(3))
+            for start, stop in ((None, -1), (1, None))
+        )
+        grown = flags.copy()
+        grown[before] |= flags[after]
+        grown[after] |= flags[before]
+        flags = grown
+    return flags
+
+
 def _eighth(empty: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     """Whether all of each 2 x 2 x 2 are empty."""
     for axis in range(3):
