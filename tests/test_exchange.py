@@ -159,6 +159,24 @@ def test_a_volume_of_others(shell: InProcess) -> None:
     assert shell("mesh", "theirs.nrrd", "-o", "open.ply", "--level=-2000", "--no-close").status == 2
 
 
+def test_the_level_of_the_scene(shell: InProcess) -> None:
+    """Of smooth counts, which are log2(log R / log r) at the radius r; also in a volume that was made before."""
+    bailout = load_scene(BALL).chain.distance_bailout
+    radius = bailout ** (2.0**-4.5)
+    settings = ("--set", "renderer.value=iterations", "--set", "renderer.level=4.5", "-q")
+    box = ("--resolution", "40", "--set", "renderer.box={size: 4}")
+    for store in ("float", "byte"):
+        more = (*box, *settings, "--set", f"renderer.store={store}")
+        assert works(shell("mesh", "ball.yaml", "-o", "level.ply", *more))
+        away = np.linalg.norm(load("level.ply").vertices, axis=1)
+        assert np.abs(away - radius).max() < 0.02
+        assert works(shell("voxelize", "ball.yaml", "-o", "level.nrrd", *more))
+        assert works(shell("mesh", "level.nrrd", "-o", "again.ply", "-q"))
+        assert Path("again.ply").read_bytes() == Path("level.ply").read_bytes()
+    assert works(shell("mesh", "level.nrrd", "-o", "other.ply", "-q", "--level", "127.5"))
+    assert len(load("other.ply").vertices) != len(load("level.ply").vertices)
+
+
 def test_what_the_box_cuts_keeps_its_flat_faces(shell: InProcess) -> None:
     half = "renderer.box={center: [0, 0, 1], size: [2.5, 2.5, 2]}"
     assert works(shell("mesh", "ball.yaml", "-o", "half.ply", "--resolution", "30", "--set", half, "-q"))

@@ -161,16 +161,13 @@ def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
     """The value up to which a grid's voxels cannot be seen; None if the least can."""
     stops = settings.transfer.opacity
     if stops is None:
-        return float(np.nextafter(np.float32(surface_level(given.low, given.high)), np.float32(-np.inf)))
+        return float(
+            np.nextafter(np.float32(settings.used_level(given.low, given.high)), np.float32(-np.inf))
+        )
     for before, stop in pairwise(stops):
         if before.opacity == 0 and stop.opacity > 0:
             return before.at if stops[0].opacity == 0 else None
     return None if stops[0].opacity > 0 else stops[-1].at
-
-
-def surface_level(low: float, high: float) -> float:
-    """The value of the surface of a grid with values from `low` to `high`, however they are coloured."""
-    return (low + high) / 2
 
 
 def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
@@ -203,7 +200,7 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
     width = settings.filter_width
     values = {
         "step": step,
-        "level": (surface_level(least, most) - grid.range[0]) / per_sample,
+        "level": (settings.used_level(least, most) - grid.range[0]) / per_sample,
         "low": low,
         "range": 1 / (high - low),
         "value_scale": per_sample,

@@ -97,14 +97,19 @@ class Scene(Section):
 
         Raises:
             FileError: its file is missing or wrong; the path says where.
+            SceneError: the renderer's level is beyond its values.
         """
         from clfractal.scene.volume import VolumeRenderer
 
         if not isinstance(self.renderer, VolumeRenderer) or self.renderer.file is None:
             return None
+        from clfractal.scene.checks import check_level
         from clfractal.scene.given import read_given
 
-        return read_given(self.renderer, self.folder)
+        given = read_given(self.renderer, self.folder)
+        if self.renderer.level is not None:
+            check_level(self.renderer.level, given.low, given.high)
+        return given
 
     @cached_property
     def views(self) -> "list[tuple[Scene, Place]]":

@@ -241,7 +241,7 @@ class TestSamples:
 
     def test_noise_sends_samples_to_the_edge(self, device: Device) -> None:
         plane = {"center": [0, 0, 0.6], "width": 2, "height": 2}
-        keys = {"samples": 256, "noise": 0.02, "min_samples": 8, "filter": "tent"}
+        keys: dict[str, Any] = {"samples": 256, "noise": 0.02, "min_samples": 8, "filter": "tent"}
         film = shoot(
             plane_scene(BALL, (40, 40), iterations=4, plane=plane, colors=WHITE_DISK, **keys), device
         )
