@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clfractal.commands.voxelize import COLORING_KEY, Order, Teller, fill, grid_volume, painted, volume_scene
+from clfractal.commands.voxelize import (
+    COLORING_KEY,
+    Order,
+    Teller,
+    fill,
+    given_volume,
+    grid_volume,
+    painted,
+    volume_scene,
+)
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
@@ -100,9 +109,24 @@ def _check_library() -> None:
 def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
     """The scene's grid, filled; a level is in the value's own numbers, and the scene's if not given."""
     scene, coloring = volume_scene(order), painted(order)
+    volume = given_volume(order, scene)
+    if volume is not None:
+        return _of_given(order, scene, volume, level, shell)
     grid, job = fill(order, scene, shell)
     volume = grid_volume(grid, job, coloring)
     return _Found(volume, _stored(level, volume, job.scene), _Made(job, coloring), False)
+
+
+def _of_given(order: Order, scene: Scene, volume: Volume, level: float | None, shell: Shell) -> _Found:
+    """The grid of others that a scene shows; a level is in its numbers, and the scene's if not given."""
+    assert isinstance(scene.renderer, VolumeRenderer)
+    assert scene.given is not None
+    wanted = scene.renderer.used_level(scene.given.low, scene.given.high) if level is None else level
+    z, y, x = volume.values.shape
+    shell.say(
+        f"{order.source}: {x} x {y} x {z} voxels, {memory.shown(volume.values.nbytes)}, level {wanted:g}"
+    )
+    return _Found(volume, wanted, None, True)
 
 
 def _stored(level: float | None, volume: Volume, scene: Scene) -> float:
@@ -165,7 +189,9 @@ def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
     except ClfractalError as error:
         shell.say(f"{order.source}: its scene is of no use, normals are those of the values: {error}")
         return None
-    if not isinstance(scene.renderer, VolumeRenderer) or not _is_along_axes(volume):
+    if not isinstance(scene.renderer, VolumeRenderer) or scene.renderer.file is not None:
+        return None
+    if not _is_along_axes(volume):
         return None
     return _Made(jobs.prepare(scene, choose(order.device), on_start=shell.say), coloring)
 
