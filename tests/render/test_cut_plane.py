@@ -53,7 +53,7 @@ class TestMandelbrot:
     ) -> None:
         if precision == "float64" and not has_float64(device.info):
             return
-        size = (192, 192) if iterations < 1000 else (64, 64)
+        size = (96, 96) if iterations < 1000 else (40, 40)
         scene = plane_scene(size=size, iterations=iterations, plane=plane, colors=STEPPED)
         film = shoot(scene, device, precision)
         points = pixel_points(scene).astype(np.longdouble)
