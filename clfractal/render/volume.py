@@ -12,7 +12,7 @@ import pyopencl as cl
 
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText, flatten
-from clfractal.device.structs import Field, Struct
+from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
 from clfractal.render import layout
 from clfractal.render.plan import Plan
@@ -80,8 +80,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
     settings = settings_of(scene)
     defines = {
         **tile_defines(plan),
-        # The grid is looked at in a measure of its own, whatever it was filled with.
-        "REAL_IS_DOUBLE": 0,
+        "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
         "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
         "TRANSFER_SIZE": TRANSFER_SIZE,
@@ -106,6 +105,14 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
     return flatten("volume.cl", generated=generated, defines=defines, user=["formula.h"])
 
 
+def ray_precision(scene: Scene, plan: Plan) -> Precision:
+    """The number type of rays: the grid is looked at in a measure of its own, whatever it was filled with.
+
+    Only cut planes evaluate the formula where a zoom has led, and want what filling wants.
+    """
+    return plan.precision if scene.cut_planes else "float32"
+
+
 class VolumeWorker(TileWorker):
     """Fills a scene's grid, then renders tiles of its picture."""
 
@@ -119,19 +126,20 @@ class VolumeWorker(TileWorker):
         scene, plan = self.scene, self.plan
         settings = settings_of(scene)
         width, height = scene.image.width, scene.image.height
+        precision = ray_precision(scene, plan)
         self.grid = self._fill(settings)
         four = (0, 1, 2, 3)
         return [
-            layout.view_record(scene_view(scene), width, height, plan.region, "float32"),
+            layout.view_record(scene_view(scene), width, height, plan.region, precision),
             volume_record(scene, plan, self.grid),
-            grid_record(scene, self.grid),
-            layout.material_record(scene, "float32"),
-            layout.light_records(scene, "float32"),
+            grid_record(scene, self.grid, precision),
+            layout.material_record(scene, precision),
+            layout.light_records(scene, precision),
             transfer_table(scene, value_range(scene, self.grid)),
             self.grid.table,
             *(_one_of(self.grid.values, pool) for pool in four),
             *(_one_of(self.grid.normals, pool) for pool in four),
-            *(_plane_arguments(scene) if scene.cut_planes else []),
+            *(_plane_arguments(scene, precision) if scene.cut_planes else []),
             channel_slots(plan),
         ]
 
@@ -170,7 +178,7 @@ def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
     return None if stops[0].opacity > 0 else stops[-1].at
 
 
-def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
+def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
     """Where the grid lies in the picture: in the first box, whatever is zoomed to."""
     shown, _ = used_boxes(scene, settings_of(scene))
     middle = np.array(shown.center)
@@ -185,7 +193,7 @@ def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
         "bricks": grid.bricks,
         "pool_bricks": grid.layout.part_slots,
     }
-    return GRID.value("float32", values)
+    return GRID.value(precision, values)
 
 
 def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
@@ -216,7 +224,7 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
         "seed": settings.seed,
         "light_count": len(scene.lights),
     }
-    return VOLUME.value("float32", values)
+    return VOLUME.value(ray_precision(scene, plan), values)
 
 
 def full_sample(grid: Grid) -> float:
@@ -262,13 +270,13 @@ def _mixed(
     return np.stack([np.interp(values, at, column) for column in columns], axis=1)
 
 
-def _plane_arguments(scene: Scene) -> list[KernelArgument]:
+def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
     """The cut planes, and the formula that they show, in the kernel's order."""
-    own = layout.orbit_record(scene.chain, scene.formula.iterations, "float32")
+    own = layout.orbit_record(scene.chain, scene.formula.iterations, precision)
     return [
-        plane_records(scene, "float32"),
-        np.stack([own, *plane_orbits(scene, "float32")]),
-        np.array(write_formula(scene.chain).constants, np.float32),
+        plane_records(scene, precision),
+        np.stack([own, *plane_orbits(scene, precision)]),
+        np.array(write_formula(scene.chain).constants, precision),
         plane_palettes(scene),
     ]
 

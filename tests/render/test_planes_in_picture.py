@@ -12,12 +12,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device
+from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
+from clfractal.render.plan import choose_precision
 from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import named_table
+from tests.render.planes import mandelbrot, sure
 from tests.render.shots import (
     BALL,
     BALL_ITERATIONS,
@@ -266,6 +268,41 @@ def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> N
     hit = np.isfinite(without["Z"])
     np.testing.assert_array_equal(np.isfinite(with_planes["Z"]), hit)
     np.testing.assert_allclose(with_planes["Z"][hit], without["Z"][hit], atol=1e-5)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_a_plane_in_a_deep_zoom(device: Device, cut: bool) -> None:
+    """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count."""
+    if not has_float64(device.info):
+        return
+    x, y = -0.743643887037151, 0.131825904205330
+    scene = load_scene(
+        {
+            "version": 1,
+            "formula": {"name": "hast", "iterations": 3000},
+            "image": {"width": 40, "height": 40},
+            "camera": {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 4},
+            "renderer": {
+                "type": "volume",
+                "box": {"size": 4},
+                "resolution": 4,
+                "zoom": [{"center": [x, y, 0], "scale": 4e8}],
+                "transfer": {"opacity": [{"at": 0, "opacity": 0}]},
+            },
+            "cut_planes": [
+                {"plane": {"width": 4, "height": 4}, "opacity": 1, "cut": cut, "colors": {"mode": "stepped"}}
+            ],
+        }
+    )
+    precision, remark = choose_precision(scene, "auto", has_float64=True)
+    assert (precision, remark) == ("float64", "")
+    film = shoot(scene, device, precision)
+    points = (rays(scene)[0] / 4e8 + np.array([x, y, 0])).astype(np.longdouble)
+    certain = sure(points[..., 0], points[..., 1], 3000, 4 * 2.0**-52)
+    count, _ = mandelbrot(points[..., 0], points[..., 1], 3000)
+    assert certain.mean() > 0.9
+    np.testing.assert_array_equal(film["iterations"][certain], count[certain])
+    assert len(np.unique(count[certain])) > 20
 
 
 CUT_CENTER, CUT_NORMAL = np.array([0.1, -0.35, 0.15]), np.array([0.3, -1.0, 0.4])

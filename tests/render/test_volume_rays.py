@@ -247,7 +247,13 @@ def test_fog_outside_of_a_filled_grid(device: Device, camera: str, value: str) -
 
 def test_fog_outside_is_lit_as_that_of_a_file(device: Device, tmp_path: Path) -> None:
     """The same voxels, all of them stored: the same normals, if a brick has surface or only touches one that has."""
-    look: dict[str, Any] = {"value": "coverage", "resolution": 60, "box": {"size": 3}, "normal_radius": 2, "step": 1}
+    look: dict[str, Any] = {
+        "value": "coverage",
+        "resolution": 60,
+        "box": {"size": 3},
+        "normal_radius": 2,
+        "step": 1,
+    }
     fog = [{"at": 0, "opacity": 0.05}, {"at": 1, "opacity": 0}]
     scene = volume_scene(PERSPECTIVE, look=LIT, transfer={"opacity": fog}, **look)
     own = shoot(scene, device)
