@@ -55,20 +55,11 @@ def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
                 Where(path="renderer.level"),
             )
         if renderer.file is None:
-            check_level(renderer.level, *renderer.value_range(scene.formula.iterations))
+            renderer.check_level(*renderer.value_range(scene.formula.iterations))
     if scene.coloring.by not in ("solid", "normal"):
         raise SceneError(
             f"must be solid or normal for a volume, got {scene.coloring.by}; renderer.transfer.color colours values",
             Where(path="coloring.by"),
-        )
-
-
-def check_level(level: float, low: float, high: float) -> None:
-    """Raises SceneError for the level of a surface that a grid with values from `low` to `high` cannot have."""
-    if not low < level <= high:
-        raise SceneError(
-            f"must be above {low:g} and at most {high:g}, the ends of the grid's values, got {level:g}",
-            Where(path="renderer.level"),
         )
 
 

@@ -103,12 +103,10 @@ class Scene(Section):
 
         if not isinstance(self.renderer, VolumeRenderer) or self.renderer.file is None:
             return None
-        from clfractal.scene.checks import check_level
         from clfractal.scene.given import read_given
 
         given = read_given(self.renderer, self.folder)
-        if self.renderer.level is not None:
-            check_level(self.renderer.level, given.low, given.high)
+        self.renderer.check_level(given.low, given.high)
         return given
 
     @cached_property

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
+from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
 from clfractal.scene.sampled import Sampled
 
@@ -137,6 +138,14 @@ class VolumeRenderer(Sampled):
     def used_level(self, low: float, high: float) -> float:
         """The value of the surface of a grid with values from `low` to `high`."""
         return (low + high) / 2 if self.level is None else self.level
+
+    def check_level(self, low: float, high: float) -> None:
+        """Raises SceneError for a level that a grid with values from `low` to `high` cannot have."""
+        if self.level is not None and not low < self.level <= high:
+            raise SceneError(
+                f"must be above {low:g} and at most {high:g}, the ends of the grid's values, got {self.level:g}",
+                Where(path="renderer.level"),
+            )
 
     @property
     def magnification(self) -> float:
