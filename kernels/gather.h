@@ -23,7 +23,9 @@
 typedef mask ints;
 #if LANES == 1
 #define pick_ints(m, yes, no) ((m) ? (yes) : (no))
+#define equal_ints(a, b) (-((a) == (b)))
 #else
+#define equal_ints(a, b) ((a) == (b))
 #define pick_ints(m, yes, no) select((ints)(no), (ints)(yes), m)
 #endif
 

@@ -24,6 +24,7 @@ from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.blocks import seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
@@ -88,6 +89,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "VALUE_IS_FLOAT": int(grid.kind == "float"),
         "NEAREST": int(settings.interpolation == "nearest"),
         "POOLS": len(grid.values),
+        "TINTED": int(settings.transfer.color is not None),
         "HAS_SHADOWS": int(settings.shadows and any(light.shadow for light in scene.lights)),
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
@@ -137,6 +139,7 @@ class VolumeWorker(TileWorker):
             layout.light_records(scene, precision),
             transfer_table(scene, value_range(scene, self.grid)),
             self.grid.table,
+            seen_blocks(self.grid, unseen_sample(scene, plan, self.grid), self.on_compile),
             *(_one_of(self.grid.values, pool) for pool in four),
             *(_one_of(self.grid.normals, pool) for pool in four),
             *(_plane_arguments(scene, precision) if scene.cut_planes else []),
@@ -230,6 +233,24 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
 def full_sample(grid: Grid) -> float:
     """The sample that stands for `grid.range[1]`."""
     return 255.0 if grid.kind == "byte" else grid.range[1]
+
+
+def unseen_sample(scene: Scene, plan: Plan, grid: Grid) -> float:
+    """The sample at and below which nothing is seen; not a number where the least is seen."""
+    record = volume_record(scene, plan, grid)
+    if settings_of(scene).transfer.opacity is None:
+        return float(np.nextafter(np.float32(record["level"]), np.float32(-np.inf)))
+    seen = np.flatnonzero(transfer_table(scene, value_range(scene, grid))[:, 0])
+    if not len(seen):
+        return float(np.inf)
+    if seen[0] == 0:
+        return float(np.nan)
+    # Up to the last entry before the first that is seen, as a kernel finds places in the table.
+    low, scale = np.float32(record["low"]), np.float32(record["range"]) * np.float32(TRANSFER_SIZE - 1)
+    sample = low + np.float32(seen[0] - 1.01) / scale
+    while (sample - low) * scale > seen[0] - 1:
+        sample = np.nextafter(sample, np.float32(-np.inf))
+    return float(sample)
 
 
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:

@@ -13,6 +13,11 @@ from clfractal.voxels.lattice import BRICK, Lattice, Places, Shape, all_places, 
 # Nodes to begin with: too few leave a device idle, and large nodes are seldom empty.
 MOST_FIRST_NODES = 4096
 FIRST_LEVEL = 3
+# The octants of directions in which z, y or x falls, a bit each.
+FALLING = (np.uint8(0xF0), np.uint8(0xCC), np.uint8(0xAA))
+# Three bits, 1 where an octant's bit is set.
+SPREAD = np.array([sum((octants >> i & 1) << 3 * i for i in range(8)) for octants in range(256)], np.int32)
+MOST_SIDE = 7
 # As in `kernels/voxels_nodes.cl`.
 UNDECIDED, EMPTY, FULL = 0, 1, 2
 
@@ -56,28 +61,36 @@ def descend(lattice: Lattice, classify: Callable[[Places, int], npt.NDArray[np.u
         nodes, full = (_children(each, _halved(bricks, level)) for each in (nodes, full))
 
 
-def levels(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """The table with how far there is nothing: -(1 + level) in place of each negative entry.
+def empty_cubes(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """The table with how far there is nothing: -(1 + sides) in place of each negative entry.
+
+    Rays of an octant of directions never turn back, so that only what lies ahead of them counts.
 
     Args:
         table: entries of bricks, shape (bz, by, bx); a negative one is of a brick that cannot be seen.
 
     Returns:
-        A new table. `level` is the largest for which all bricks of the node of 1 << level bricks a side that the brick
-        is in cannot be seen; nodes are aligned to multiples of their size, and nothing is past the grid's ends.
+        A new table. `sides` has three bits for each octant of directions (bits 3 i to 3 i + 2; of i the lowest bit is set
+        where x falls, then y, then z): the largest k <= 7 for which no brick can be seen of the cube of 1 << k bricks a
+        side that begins with the brick and lies in these directions. Nothing is past the grid's ends.
     """
-    pyramid = [table < 0]
-    while max(pyramid[-1].shape) > 1 and pyramid[-1].any():
-        pyramid.append(_eighth(pyramid[-1]))
-    found = np.full(pyramid[-1].shape, -1, np.int8)
-    for level in range(len(pyramid) - 1, -1, -1):
-        here = pyramid[level]
-        if level < len(pyramid) - 1:
-            for axis in range(3):
-                found = np.repeat(found, 2, axis=axis)
-            found = found[tuple(slice(n) for n in here.shape)]
-        found = np.where(found >= 0, found, np.where(here, np.int8(level), np.int8(-1)))
-    return np.where(found >= 0, -1 - found.astype(np.int32), table)
+    # A bit for each octant: whether the cube is empty. Eight cubes of half its side make up the next.
+    empty = np.where(table < 0, np.uint8(255), np.uint8(0))
+    sides = np.zeros(table.shape, np.int32)
+    for level in range(MOST_SIDE):
+        half = 1 << level
+        if half >= max(table.shape) or not empty.any():
+            break
+        for axis, falling in enumerate(FALLING):
+            if half >= table.shape[axis]:
+                continue
+            lower = tuple(slice(None, -half) if a == axis else slice(None) for a in range(3))
+            upper = tuple(slice(half, None) if a == axis else slice(None) for a in range(3))
+            before = empty[lower] | ~falling
+            empty[lower] &= empty[upper] | falling
+            empty[upper] &= before
+        sides += SPREAD[empty]
+    return np.where(table < 0, -1 - sides, table)
 
 
 def touched(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -92,19 +105,6 @@ def touched(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         grown[after] |= flags[before]
         flags = grown
     return flags
-
-
-def _eighth(empty: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Whether all of each 2 x 2 x 2 are empty."""
-    for axis in range(3):
-        first, second = (
-            empty[tuple(slice(start, None, 2) if axis == a else slice(None) for a in range(3))]
-            for start in (0, 1)
-        )
-        whole = first.copy()
-        whole[tuple(slice(n) for n in second.shape)] &= second
-        empty = whole
-    return empty
 
 
 def _halved(bricks: Shape, level: int) -> Shape:

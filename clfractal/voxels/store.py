@@ -14,7 +14,7 @@ from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import BRICK_STRIDE, EXTENT, Lattice, Places, pack_places
-from clfractal.voxels.octree import levels, touched
+from clfractal.voxels.octree import empty_cubes, touched
 from clfractal.voxels.pool import allocate, plan_pools
 from clfractal.voxels.programs import Built
 
@@ -116,7 +116,7 @@ def store(
         entries[z, y, x] = first_slot + len(places) + np.arange(len(x), dtype=np.int32)
         places = np.append(places, pack_places(x, y, z))
         entries[entries < 0] = outside_slot
-    entries = levels(entries)
+    entries = empty_cubes(entries)
 
     count = len(places)
     slots = first_slot + count
