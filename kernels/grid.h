@@ -1,6 +1,7 @@
 // A grid of voxels in bricks: 8 x 8 x 8 cells between the middles of voxels, 9 x 9 x 9 samples, so that what lies in a cell is
 // found in one brick. `table` tells for each brick where it is stored, or, if nothing in it can be seen, -(1 + sides): for each
-// octant of directions three bits that tell how far there is nothing, a cube of 1 << bits bricks that begins with this one.
+// octant of directions three digits, 8 bits apart, that tell how far there is nothing: a cube of 1 << digits bricks a side that
+// begins with this one.
 // `blocks` tells of stored bricks which blocks of 2 x 2 x 2 cells may be seen.
 #define BRICK_CELLS 8
 #define BRICK_SIDE 9

@@ -17,7 +17,7 @@ typedef struct {
     vec first, step;
     vec per_step, passed;   // 1 / step and -first / step: a coordinate has the number coordinate * per_step + passed
     ints back[3];           // -1 where a coordinate falls, 0 where it grows
-    ints octant;            // three times the number of its directions' octant
+    ints octant;            // the number of its directions' octant, 0 to 7
     real near, far;         // distances along the ray; it ends before `far`
 } grid_ray;
 
@@ -45,7 +45,7 @@ INLINE mask enter(ray r, world w, grid_ray *g) {
     g->back[0] = less_equal(direction.x, R(0.0));
     g->back[1] = less_equal(direction.y, R(0.0));
     g->back[2] = less_equal(direction.z, R(0.0));
-    g->octant = 3 * ((g->back[0] & 1) + (g->back[1] & 2) + (g->back[2] & 4));
+    g->octant = (g->back[0] & 1) + (g->back[1] & 2) + (g->back[2] & 4);
     return less(g->near, g->far);
 }
 
@@ -73,7 +73,8 @@ INLINE mask look(grid_ray r, real number, mask *moving, world w, cell *c, ints *
     *c = cell_at(place_of(r, number), w.grid.about);
     *entry = brick_at(*c, w.grid);
     const mask stored = is_stored(*entry);
-    ints shift = (ints)(3), side = (ints)(1) << ((~*entry >> r.octant) & 7);
+    const ints digits = (~*entry >> r.octant) & 0x010101;
+    ints shift = (ints)(3), side = (ints)(1) << ((digits | digits >> 7 | digits >> 14) & 7);
     mask seen = stored & ~stored;
     if (any_lane(stored)) {
         const ints octant = octant_at(*c, *entry, stored, w.grid, &seen);

@@ -15,8 +15,6 @@ MOST_FIRST_NODES = 4096
 FIRST_LEVEL = 3
 # The octants of directions in which z, y or x falls, a bit each.
 FALLING = (np.uint8(0xF0), np.uint8(0xCC), np.uint8(0xAA))
-# Three bits, 1 where an octant's bit is set.
-SPREAD = np.array([sum((octants >> i & 1) << 3 * i for i in range(8)) for octants in range(256)], np.int32)
 MOST_SIDE = 7
 # As in `kernels/voxels_nodes.cl`.
 UNDECIDED, EMPTY, FULL = 0, 1, 2
@@ -70,13 +68,15 @@ def empty_cubes(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         table: entries of bricks, shape (bz, by, bx); a negative one is of a brick that cannot be seen.
 
     Returns:
-        A new table. `sides` has three bits for each octant of directions (bits 3 i to 3 i + 2; of i the lowest bit is set
-        where x falls, then y, then z): the largest k <= 7 for which no brick can be seen of the cube of 1 << k bricks a
-        side that begins with the brick and lies in these directions. Nothing is past the grid's ends.
+        A new table. `sides` tells for each octant of directions the largest k <= 7 for which no brick can be seen of the
+        cube of 1 << k bricks a side that begins with the brick and lies in these directions: bits i, i + 8 and i + 16 are
+        its lowest, middle and highest digit, where of i the lowest bit is set if x falls, then y, then z. Nothing is past
+        the grid's ends.
     """
     # A bit for each octant: whether the cube is empty. Eight cubes of half its side make up the next.
     empty = np.where(table < 0, np.uint8(255), np.uint8(0))
-    sides = np.zeros(table.shape, np.int32)
+    digits = [np.zeros_like(empty) for _ in range(3)]
+    beside = np.empty_like(empty)
     for level in range(MOST_SIDE):
         half = 1 << level
         if half >= max(table.shape) or not empty.any():
@@ -84,13 +84,26 @@ def empty_cubes(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
         for axis, falling in enumerate(FALLING):
             if half >= table.shape[axis]:
                 continue
-            lower = tuple(slice(None, -half) if a == axis else slice(None) for a in range(3))
-            upper = tuple(slice(half, None) if a == axis else slice(None) for a in range(3))
-            before = empty[lower] | ~falling
-            empty[lower] &= empty[upper] | falling
-            empty[upper] &= before
-        sides += SPREAD[empty]
-    return np.where(table < 0, -1 - sides, table)
+            # Shifted as a whole, which is quick; what comes from other rows is past the grid's ends.
+            shift = half * int(np.prod(table.shape[axis + 1 :]))
+            flat, other = empty.reshape(-1), beside.reshape(-1)
+            before = empty.copy()
+            other[:-shift] = flat[shift:]
+            np.swapaxes(beside, 0, axis)[-half:] = 255
+            beside |= falling
+            empty &= beside
+            other[shift:] = before.reshape(-1)[:-shift]
+            np.swapaxes(beside, 0, axis)[:half] = 255
+            beside |= ~falling
+            empty &= beside
+        carry = empty.copy()
+        for digit in digits:
+            digit ^= carry
+            carry &= ~digit
+    sides = digits[0].astype(np.int32)
+    sides |= digits[1].astype(np.int32) << 8
+    sides |= digits[2].astype(np.int32) << 16
+    return np.where(table < 0, ~sides, table)
 
 
 def touched(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

@@ -126,19 +126,22 @@ def test_empty_cubes_against_their_definition(table: npt.NDArray[np.int32]) -> N
             # Of the array's axes the last is x, the lowest bit.
             while side < max(table.shape):
                 cube = tuple(
-                    slice(max(p + 1 - 2 * side, 0), p + 1) if octant >> (2 - axis) & 1 else slice(p, p + 2 * side)
+                    slice(max(p + 1 - 2 * side, 0), p + 1)
+                    if octant >> (2 - axis) & 1
+                    else slice(p, p + 2 * side)
                     for axis, p in enumerate(place)
                 )
                 if (table[cube] >= 0).any():
                     break
                 side, expected = 2 * side, expected + 1
-            assert sides >> 3 * octant & 7 == expected
+            digits = [sides >> (octant + 8 * i) & 1 for i in range(3)]
+            assert sum(digit << i for i, digit in enumerate(digits)) == expected
 
 
 def test_empty_cubes_of_a_long_grid() -> None:
     """A side has three bits: at most 128 bricks."""
     found = empty_cubes(np.full((1, 1, 700), -1, np.int32))
-    assert (found == -1 - 0o77777777).all()
+    assert (found == -1 - 0xFFFFFF).all()
 
 
 def test_empty_cubes_are_quick() -> None:
