@@ -93,6 +93,7 @@ INLINE real pool_value(__global const sample *values, cell c, ints at) {
 INLINE vec pool_normal(__global const uchar *normals, cell c, ints at) {
     vec sum = vec_of(R(0.0), R(0.0), R(0.0));
     real all = R(0.0);
+    #pragma unroll
     for (int i = 0; i < 8; ++i) {
         const real across = (i & 1) ? c.u : R(1.0) - c.u, up = (i & 2) ? c.v : R(1.0) - c.v, deep = (i & 4) ? c.w : R(1.0) - c.w;
         const int further = (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
