@@ -5,20 +5,31 @@
 #define to_reals(a) ((real)(a))
 #define ints_load(array) ((array)[0])
 #define ints_store(value, array) ((array)[0] = (value))
+#define floats_load(array) ((array)[0])
+#elif REAL_IS_DOUBLE
+// As wide as masks are; in memory they are ints and floats all the same.
+#define to_ints(a) JOIN(convert_long, LANES)(a)
+#define to_reals(a) JOIN(convert_double, LANES)(a)
+#define ints_load(array) to_ints(JOIN(vload, LANES)(0, array))
+#define ints_store(value, array) JOIN(vstore, LANES)(JOIN(convert_int, LANES)(value), 0, array)
+#define floats_load(array) to_reals(JOIN(vload, LANES)(0, array))
 #else
 #define to_ints(a) JOIN(convert_int, LANES)(a)
 #define to_reals(a) JOIN(convert_float, LANES)(a)
 #define ints_load(array) JOIN(vload, LANES)(0, array)
 #define ints_store(value, array) JOIN(vstore, LANES)(value, 0, array)
+#define floats_load(array) JOIN(vload, LANES)(0, array)
 #endif
 typedef mask ints;
 #if LANES == 1
 #define pick_ints(m, yes, no) ((m) ? (yes) : (no))
+#define equal_ints(a, b) (-((a) == (b)))
 #else
+#define equal_ints(a, b) ((a) == (b))
 #define pick_ints(m, yes, no) select((ints)(no), (ints)(yes), m)
 #endif
 
-#if defined(__has_builtin) && !defined(INTERPRETED)
+#if !REAL_IS_DOUBLE && defined(__has_builtin) && !defined(INTERPRETED)
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_gathersiv16si)
 #define gather_at(base, index, scale) \
     __builtin_ia32_gathersiv16si((int16)(0), (const void *)(size_t)(base), index, (ushort)(0xffff), scale)
@@ -48,7 +59,7 @@ INLINE real gather_floats(__global const float *base, ints index) {
     float found[LANES];
     ints_store(index, where);
     for (int lane = 0; lane < LANES; ++lane) found[lane] = base[where[lane]];
-    return lanes_load(found);
+    return floats_load(found);
 #endif
 }
 

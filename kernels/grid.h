@@ -1,5 +1,8 @@
 // A grid of voxels in bricks: 8 x 8 x 8 cells between the middles of voxels, 9 x 9 x 9 samples, so that what lies in a cell is
-// found in one brick. `table` tells for each brick where it is stored, or, below 0, how large the empty octree node around it is.
+// found in one brick. `table` tells for each brick where it is stored, or, if nothing in it can be seen, -(1 + sides): for each
+// octant of directions three digits, 8 bits apart, that tell how far there is nothing: a cube of 1 << digits bricks a side that
+// begins with this one.
+// `blocks` tells of stored bricks which blocks of 2 x 2 x 2 cells may be seen.
 #define BRICK_CELLS 8
 #define BRICK_SIDE 9
 #define BRICK_STRIDE 736   // samples from one brick to the next
@@ -9,6 +12,7 @@
 typedef struct {
     __constant const struct Grid *about;
     __global const int *table;
+    __global const int *blocks;   // of each stored brick two words, for its lower and upper half
     __global const sample *values[4];
     __global const uchar *normals[4];
 } grid;
@@ -19,11 +23,11 @@ typedef struct {
     real u, v, w;
 } cell;
 
-// The cell that holds a point, given in voxels from the grid's corner; beyond the outermost middles the nearest goes on.
+// The cell that holds a point, given in voxels from the middle of the first; beyond the outermost middles the nearest goes on.
 INLINE cell cell_at(vec p, __constant const struct Grid *about) {
-    const real x = clamp(p.x - R(0.5), R(0.0), (real)((scalar)(about->sides[0] - 1)));
-    const real y = clamp(p.y - R(0.5), R(0.0), (real)((scalar)(about->sides[1] - 1)));
-    const real z = clamp(p.z - R(0.5), R(0.0), (real)((scalar)(about->sides[2] - 1)));
+    const real x = least(most(p.x, R(0.0)), (real)((scalar)(about->sides[0] - 1)));
+    const real y = least(most(p.y, R(0.0)), (real)((scalar)(about->sides[1] - 1)));
+    const real z = least(most(p.z, R(0.0)), (real)((scalar)(about->sides[2] - 1)));
     cell c;
     c.x = min(to_ints(x), (ints)(max(about->sides[0] - 2, 0)));
     c.y = min(to_ints(y), (ints)(max(about->sides[1] - 2, 0)));
@@ -36,7 +40,19 @@ INLINE cell cell_at(vec p, __constant const struct Grid *about) {
 
 // The table's entry for a cell's brick.
 INLINE ints brick_at(cell c, grid g) {
-    return gather_ints(g.table, ((c.z >> 3) * g.about->bricks[1] + (c.y >> 3)) * g.about->bricks[0] + (c.x >> 3));
+    const int row = g.about->bricks[0], layer = row * g.about->bricks[1];
+    return gather_ints(g.table, (c.z >> 3) * layer + ((c.y >> 3) * row + (c.x >> 3)));
+}
+
+// Lanes whose brick is stored.
+INLINE mask is_stored(ints entry) { return ~(entry >> 31); }
+
+// The blocks around a cell of a stored brick: its octant's, eight bits, x fastest, and the bit of its own.
+INLINE ints octant_at(cell c, ints entry, mask stored, grid g, mask *seen) {
+    const ints word = gather_ints(g.blocks, 2 * (entry & stored) + ((c.z >> 2) & 1));
+    const ints octant = (word >> (((c.y & 4) << 2) + ((c.x & 4) << 1))) & 255;
+    *seen = stored & -((octant >> (((c.z & 2) << 1) + (c.y & 2) + ((c.x & 2) >> 1))) & 1);
+    return octant;
 }
 
 // Where a cell's first corner lies in its stored brick.
@@ -73,25 +89,21 @@ INLINE real pool_value(__global const sample *values, cell c, ints at) {
 #endif
 }
 
-// Adds a corner's normal, in 127.5ths, with a weight.
-INLINE void normal_add(__global const uchar *normals, ints at, real weight, vec *sum) {
-    const ints found = gather_ints((__global const int *)normals, at);
-    // 128 in all three says that there is none.
-    const mask none = equal(to_reals(found & 0xffffff), R(8421504.0));
-    weight = pick(none, R(0.0), weight);
-    sum->x += weight * (to_reals(found & 255) - R(127.5));
-    sum->y += weight * (to_reals((found >> 8) & 255) - R(127.5));
-    sum->z += weight * (to_reals((found >> 16) & 255) - R(127.5));
-}
-
+// The sum of the corners' normals, each with its share of the cell.
 INLINE vec pool_normal(__global const uchar *normals, cell c, ints at) {
     vec sum = vec_of(R(0.0), R(0.0), R(0.0));
+    real all = R(0.0);
+    #pragma unroll
     for (int i = 0; i < 8; ++i) {
         const real across = (i & 1) ? c.u : R(1.0) - c.u, up = (i & 2) ? c.v : R(1.0) - c.v, deep = (i & 4) ? c.w : R(1.0) - c.w;
         const int further = (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
-        normal_add(normals, at + further, across * up * deep, &sum);
+        const ints found = gather_ints((__global const int *)normals, at + further);
+        // 128 in all three says that there is none.
+        const real weight = pick(equal_ints(found & 0xffffff, (ints)(0x808080)), R(0.0), across * up * deep);
+        sum = vec_along(sum, weight, vec_of(to_reals(found & 255), to_reals((found >> 8) & 255), to_reals((found >> 16) & 255)));
+        all += weight;
     }
-    return sum;
+    return vec_sub(sum, vec_scale(vec_of(R(1.0), R(1.0), R(1.0)), R(127.5) * all));
 }
 
 // The value at a place of stored bricks.

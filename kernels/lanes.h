@@ -67,6 +67,10 @@ typedef JOIN(int, LANES) mask;
 #define lanes_load(array) JOIN(vload, LANES)(0, array)
 #endif
 
+// The smaller and the larger one, where neither is NaN: as one instruction, which fmin and fmax are not.
+#define least(a, b) pick(less(a, b), a, b)
+#define most(a, b) pick(less(a, b), b, a)
+
 // The processor's own estimate of 1/sqrt(a), where the compiler generates x86 code directly and names the instruction.
 #if !REAL_IS_DOUBLE && defined(__has_builtin) && !defined(INTERPRETED)
 #if LANES == 16 && defined(__AVX512F__) && __has_builtin(__builtin_ia32_rsqrt14ps512_mask)

@@ -71,9 +71,10 @@ typedef struct {
     color tint[PLANES];
 } plane_hits;
 
-// The nearest quad past the distance `before`.
+// The nearest quad past the one at the distance `before` and place `after` in the list: of quads at one distance the list's
+// first is in front.
 typedef struct {
-    real before, distance, alpha, count;
+    real before, after, distance, index, alpha, count;
     color tint;
     vec normal;
 } plane_hit;
@@ -90,7 +91,7 @@ INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
         const mask met = active & less(R(0.0), t) &
                          less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
                          less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
-                         less(R(0.0), (real)(plane->opacity));
+                         less(R(0.0), (real)(fmax(plane->opacity, plane->inside_opacity)));
         hits.distance[i] = pick(met, t, (real)(REAL_LARGEST));
         hits.alpha[i] = R(0.0);
         hits.count[i] = R(0.0);
@@ -98,23 +99,28 @@ INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
         if (!any_lane(met)) continue;
         const escaped e = plane_look(vec_along(r.origin, t, r.direction), met, i, set);
         hits.tint[i] = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
-        hits.alpha[i] = pick(met, (real)(plane->opacity), R(0.0));
+        hits.alpha[i] = pick(met, pick(e.inside, (real)(plane->inside_opacity), (real)(plane->opacity)), R(0.0));
         hits.count[i] = e.count;
     }
     return hits;
 }
 
-INLINE plane_hit planes_next(const plane_hits *hits, real before, plane_set set) {
+INLINE plane_hit planes_next(const plane_hits *hits, real before, real after, plane_set set) {
     plane_hit next;
     next.before = before;
+    next.after = after;
     next.distance = (real)(REAL_LARGEST);
+    next.index = R(-1.0);
     next.alpha = R(0.0);
     next.count = R(0.0);
     next.tint = color_of(R(0.0), R(0.0), R(0.0));
     next.normal = vec_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < PLANES; ++i) {
-        const mask nearer = less(before, hits->distance[i]) & less(hits->distance[i], next.distance);
+        const real index = (real)((scalar)i);
+        const mask further = less(before, hits->distance[i]) | (equal(before, hits->distance[i]) & less(after, index));
+        const mask nearer = further & less(hits->distance[i], next.distance);
         next.distance = pick(nearer, hits->distance[i], next.distance);
+        next.index = pick(nearer, index, next.index);
         next.alpha = pick(nearer, hits->alpha[i], next.alpha);
         next.count = pick(nearer, hits->count[i], next.count);
         next.tint = color_pick(nearer, hits->tint[i], next.tint);
@@ -134,11 +140,12 @@ INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) 
     layers.nearest = (real)(REAL_LARGEST);
     layers.normal = vec_scale(r.direction, R(-1.0));
     layers.count = R(0.0);
-    real before = R(-1.0);
+    real before = R(-1.0), after = R(-1.0);
     for (int pass = 0; pass < PLANES; ++pass) {
-        const plane_hit next = planes_next(&hits, before, set);
+        const plane_hit next = planes_next(&hits, before, after, set);
         if (!any_lane(less(next.distance, (real)(REAL_LARGEST)))) break;
         before = next.distance;
+        after = next.index;
         const mask in_front = less(next.distance, object);
         const real front = pick(in_front, next.alpha * layers.front_through, R(0.0));
         const real behind = pick(in_front, R(0.0), next.alpha * layers.behind_through);

@@ -34,7 +34,8 @@ __kernel void escape_counts(__global const scalar *points, __global scalar *resu
     store_plane(result, stride + first, pick(end.inside, R(1.0), R(0.0)));
 }
 
-// result: the marching distance, the Jacobian's distance, the Jacobian's gradient x, y, z (length 1), smooth count, inside.
+// result: the marching distance, the Jacobian's distance, the Jacobian's gradient x, y, z (length 1; inside it is that of |z|
+// after the last application), smooth count, inside.
 __kernel void distances(__global const scalar *points, __global scalar *result, int stride,
                         __constant const struct Orbit *orbit, __constant const scalar *k) {
     const int first = (int)get_global_id(0) * LANES;

@@ -26,6 +26,18 @@ INLINE incidence light_at(__constant const struct Light *light, vec point) {
     return in;
 }
 
+// x^shininess for 0 <= x: whole exponents by squaring, which loses no more than x itself has lost.
+INLINE real highlight_of(real x, scalar shininess) {
+    const int whole = (int)shininess;
+    if (whole > 1024 || (scalar)whole != shininess) return pow(x, (real)(shininess));
+    real power = R(1.0);
+    for (int rest = whole; rest != 0; rest >>= 1) {
+        if (rest & 1) power *= x;
+        x *= x;
+    }
+    return power;
+}
+
 // What one light adds. `lit` is s of Eq. 5; `open` is the part of the hemisphere that is free, which the ambient part is worth;
 // `to_viewer` has length 1.
 INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
@@ -36,7 +48,7 @@ INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask 
     // R = 2 (N.L) N - L, the light's direction mirrored at the normal.
     const vec mirrored = vec_sub(vec_scale(normal, R(2.0) * facing), in.toward);
     const real toward_viewer = fmax(vec_dot(mirrored, to_viewer), R(0.0));
-    const real highlight = (real)(material->specular) * pow(toward_viewer, (real)(material->shininess));
+    const real highlight = (real)(material->specular) * highlight_of(toward_viewer, material->shininess);
     const real specular = pick(front & less(R(0.0), toward_viewer), highlight, R(0.0));
     const real body = (real)(material->ambient) * open + diffuse;
     return color_of(in.strength * (real)(light->color[0]) * (body * surface.r + specular),

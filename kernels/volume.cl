@@ -37,7 +37,7 @@ typedef uchar sample;
 __kernel void volume(__global float *film, __global uint *statistics, __global const int2 *corners,
                      __constant const struct View *view, __constant const struct Volume *settings,
                      __constant const struct Grid *about, __constant const struct Material *material,
-                     __constant const struct Light *lights, __global const float *transfer, __global const int *table,
+                     __constant const struct Light *lights, __global const float *transfer, __global const int *table, __global const int *blocks,
                      __global const sample *values0, __global const sample *values1, __global const sample *values2,
                      __global const sample *values3, __global const uchar *normals0, __global const uchar *normals1,
                      __global const uchar *normals2, __global const uchar *normals3,
@@ -49,7 +49,7 @@ __kernel void volume(__global float *film, __global uint *statistics, __global c
     const int packet = (int)get_global_id(0) + first_packet;
     const int tile = (int)get_global_id(1);
     const world w = {view, settings, material, lights, transfer,
-                     {about, table, {values0, values1, values2, values3}, {normals0, normals1, normals2, normals3}}
+                     {about, table, blocks, {values0, values1, values2, values3}, {normals0, normals1, normals2, normals3}}
 #if PLANES > 0
                      , {planes, orbits, k, plane_palettes}
 #endif

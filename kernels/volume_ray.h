@@ -11,56 +11,111 @@ typedef struct {
 #endif
 } world;
 
-// A ray in the grid's own measure: voxels from its corner, per scene unit of the ray.
+// The places of a ray, a step apart from where it enters the grid on: first + number * step, in voxels from the middle of the
+// grid's first voxel.
 typedef struct {
-    vec origin, direction, inverse;
-    real near, far;
+    vec first, step;
+    vec per_step, passed;   // 1 / step and -first / step: a coordinate has the number coordinate * per_step + passed
+    ints back[3];           // -1 where a coordinate falls, 0 where it grows
+    ints octant;            // the number of its directions' octant, 0 to 7
+    real near, far;         // distances along the ray; it ends before `far`
 } grid_ray;
 
 INLINE real safe_inverse(real a) { return R(1.0) / pick(less(fabs(a), R(1e-20)), R(1e-20), a); }
 
 // The part of a ray within the grid; lanes that miss it are not in the result.
-INLINE mask enter(ray r, __constant const struct Grid *about, grid_ray *g) {
+INLINE mask enter(ray r, world w, grid_ray *g) {
+    __constant const struct Grid *about = w.grid.about;
     const vec scale = vec_splat(about->scale);
     const vec offset = vec_sub(r.origin, vec_splat(about->corner));
-    g->origin = vec_of(offset.x * scale.x, offset.y * scale.y, offset.z * scale.z);
-    g->direction = vec_of(r.direction.x * scale.x, r.direction.y * scale.y, r.direction.z * scale.z);
-    g->inverse = vec_of(safe_inverse(g->direction.x), safe_inverse(g->direction.y), safe_inverse(g->direction.z));
-    const vec first = vec_of(-g->origin.x * g->inverse.x, -g->origin.y * g->inverse.y, -g->origin.z * g->inverse.z);
-    const vec last = vec_of(((real)((scalar)about->sides[0]) - g->origin.x) * g->inverse.x,
-                            ((real)((scalar)about->sides[1]) - g->origin.y) * g->inverse.y,
-                            ((real)((scalar)about->sides[2]) - g->origin.z) * g->inverse.z);
+    const vec origin = vec_of(offset.x * scale.x, offset.y * scale.y, offset.z * scale.z);
+    const vec direction = vec_of(r.direction.x * scale.x, r.direction.y * scale.y, r.direction.z * scale.z);
+    const vec inverse = vec_of(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
+    const vec first = vec_of(-origin.x * inverse.x, -origin.y * inverse.y, -origin.z * inverse.z);
+    const vec last = vec_of(((real)((scalar)about->sides[0]) - origin.x) * inverse.x,
+                            ((real)((scalar)about->sides[1]) - origin.y) * inverse.y,
+                            ((real)((scalar)about->sides[2]) - origin.z) * inverse.z);
     g->near = fmax(fmax(fmin(first.x, last.x), fmin(first.y, last.y)), fmax(fmin(first.z, last.z), r.near));
     g->far = fmin(fmin(fmax(first.x, last.x), fmax(first.y, last.y)), fmin(fmax(first.z, last.z), r.far));
+    const real step = (real)(w.settings->step), steps = R(1.0) / step;
+    g->first = vec_sub(vec_along(origin, g->near, direction), vec_of(R(0.5), R(0.5), R(0.5)));
+    g->step = vec_scale(direction, step);
+    g->per_step = vec_scale(inverse, steps);
+    g->passed = vec_of(-g->first.x * g->per_step.x, -g->first.y * g->per_step.y, -g->first.z * g->per_step.z);
+    g->back[0] = less_equal(direction.x, R(0.0));
+    g->back[1] = less_equal(direction.y, R(0.0));
+    g->back[2] = less_equal(direction.z, R(0.0));
+    g->octant = (g->back[0] & 1) + (g->back[1] & 2) + (g->back[2] & 4);
     return less(g->near, g->far);
 }
 
-// Where the ray leaves the empty node of 8 << level cells around a cell.
-INLINE real leave(grid_ray r, cell c, ints level) {
-    const ints shift = level + 3;
-    const ints size = (ints)(1) << shift;
-    const vec low = vec_of(to_reals((c.x >> shift) << shift), to_reals((c.y >> shift) << shift), to_reals((c.z >> shift) << shift));
-    const real side = to_reals(size);
-    // Cells begin at the middles of voxels.
-    const real x = (low.x + R(0.5) + pick(less(R(0.0), r.direction.x), side, R(0.0)) - r.origin.x) * r.inverse.x;
-    const real y = (low.y + R(0.5) + pick(less(R(0.0), r.direction.y), side, R(0.0)) - r.origin.y) * r.inverse.y;
-    const real z = (low.z + R(0.5) + pick(less(R(0.0), r.direction.z), side, R(0.0)) - r.origin.z) * r.inverse.z;
-    return fmin(x, fmin(y, z));
+INLINE vec place_of(grid_ray r, real number) { return vec_along(r.first, number, r.step); }
+INLINE real distance_of(grid_ray r, real number, world w) { return r.near + number * (real)(w.settings->step); }
+
+// The number of the first place past a cube that begins at the node of 1 << shift cells around a cell, and goes `side` such
+// nodes in the ray's directions; but at least the next one. (What lies on the cube's far side belongs to it.)
+INLINE real leave(grid_ray r, real number, cell c, ints shift, ints side) {
+    // `side` where the coordinate grows, 1 - side where it falls.
+    const ints x = (c.x >> shift) + (side ^ r.back[0]) - 2 * r.back[0];
+    const ints y = (c.y >> shift) + (side ^ r.back[1]) - 2 * r.back[1];
+    const ints z = (c.z >> shift) + (side ^ r.back[2]) - 2 * r.back[2];
+    const real first = least(to_reals(x << shift) * r.per_step.x + r.passed.x,
+                             least(to_reals(y << shift) * r.per_step.y + r.passed.y,
+                                   to_reals(z << shift) * r.per_step.z + r.passed.z));
+    return to_reals(to_ints(most(first, number))) + R(1.0);
 }
 
-// The number of the first place at or past `t`, but at least the next.
-INLINE real next_place(real t, real near, real steps, real number) {
-    return fmax(ceil((t - near) * steps), number + R(1.0));
+// Looks at the place of each moving lane: those in the result are where something may be seen, the others of `moving` can go
+// on to the place `onward`; lanes past the ray's end move no more.
+INLINE mask look(grid_ray r, real number, mask *moving, world w, cell *c, ints *entry, real *onward, real *steps) {
+    *moving &= less(distance_of(r, number, w), r.far);
+    *steps += pick(*moving, R(1.0), R(0.0));
+    *c = cell_at(place_of(r, number), w.grid.about);
+    *entry = brick_at(*c, w.grid);
+    const mask stored = is_stored(*entry);
+    const ints digits = (~*entry >> r.octant) & 0x010101;
+    ints shift = (ints)(3), side = (ints)(1) << ((digits | digits >> 7 | digits >> 14) & 7);
+    mask seen = stored & ~stored;
+    if (any_lane(stored)) {
+        const ints octant = octant_at(*c, *entry, stored, w.grid, &seen);
+        shift = pick_ints(stored, pick_ints(equal_ints(octant, (ints)(0)), (ints)(2), (ints)(1)), shift);
+        side = pick_ints(stored, (ints)(1), side);
+    }
+    *onward = leave(r, number, *c, shift, side);
+    return *moving & seen;
 }
 
-// What a value looks like: the opacity of a step, and a colour.
-INLINE color transfer_at(real value, __constant const struct Volume *settings, __global const float *transfer, real *opacity) {
+// A place in the transfer table.
+typedef struct {
+    ints first;
+    real share;
+} transfer_place;
+
+INLINE transfer_place transfer_at(real value, __constant const struct Volume *settings) {
     const real place = clamp((value - (real)(settings->low)) * (real)(settings->range), R(0.0), R(1.0));
     const real at = place * (real)((scalar)(TRANSFER_SIZE - 1));
-    const ints first = min(to_ints(at), (ints)(TRANSFER_SIZE - 2));
-    const real share = at - to_reals(first);
-    *opacity = between(gather_floats(transfer, 4 * first), gather_floats(transfer, 4 * first + 4), share);
-    return color_of(between(gather_floats(transfer, 4 * first + 1), gather_floats(transfer, 4 * first + 5), share),
-                    between(gather_floats(transfer, 4 * first + 2), gather_floats(transfer, 4 * first + 6), share),
-                    between(gather_floats(transfer, 4 * first + 3), gather_floats(transfer, 4 * first + 7), share));
+    transfer_place p;
+    p.first = min(to_ints(at), (ints)(TRANSFER_SIZE - 2));
+    p.share = at - to_reals(p.first);
+    return p;
+}
+
+INLINE real transfer_column(transfer_place p, int column, __global const float *transfer) {
+    const ints at = 4 * p.first + column;
+    return between(gather_floats(transfer, at), gather_floats(transfer, at + 4), p.share);
+}
+
+// The opacity of a step where the value is this.
+INLINE real opacity_of(real value, world w) { return transfer_column(transfer_at(value, w.settings), 0, w.transfer); }
+
+// The colour of a value, or that of a normal: the thesis's (n + 1) / 2.
+INLINE color tint_of(real value, vec normal, world w) {
+#if COLOR_BY_NORMAL
+    return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
+#elif TINTED
+    const transfer_place p = transfer_at(value, w.settings);
+    return color_of(transfer_column(p, 1, w.transfer), transfer_column(p, 2, w.transfer), transfer_column(p, 3, w.transfer));
+#else
+    return color_of((real)((scalar)w.transfer[1]), (real)((scalar)w.transfer[2]), (real)((scalar)w.transfer[3]));
+#endif
 }

@@ -4,7 +4,6 @@
 #if HAS_SHADOWS
 // The part of a light that gets through to a point.
 INLINE real light_through(vec point, vec normal, vec toward, real distance, mask active, world w, real *steps) {
-    __constant const struct Grid *about = w.grid.about;
     ray r;
     r.origin = vec_along(point, (real)(w.settings->shadow_lift), normal);
     r.direction = toward;
@@ -15,33 +14,25 @@ INLINE real light_through(vec point, vec normal, vec toward, real distance, mask
     active &= planes_cut(&r, &side, w.planes);
 #endif
     grid_ray g;
-    active &= enter(r, about, &g);
-    const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
+    active &= enter(r, w, &g);
     real number = R(0.0), through = R(1.0);
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;
-        const real t = g.near + number * step;
-        active &= less(t, g.far);
-        const cell c = cell_at(vec_along(g.origin, t, g.direction), about);
-        const ints entry = brick_at(c, w.grid);
-        const mask stored = active & less(R(-0.5), to_reals(entry));
-        *steps += pick(active, R(1.0), R(0.0));
-        real onward = number + R(1.0);
-        if (any_lane(active & ~stored)) {
-            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, steps_per_unit, number));
-        }
-        if (any_lane(stored)) {
-            const real value = grid_value(c, entry, stored, w.grid);
+        cell c;
+        ints entry;
+        real onward;
+        const mask seen = look(g, number, &active, w, &c, &entry, &onward, steps);
+        if (any_lane(seen)) {
+            onward = pick(seen, number + R(1.0), onward);
+            const real value = grid_value(c, entry, seen, w.grid);
 #if SURFACE
-            through = pick(stored & less((real)(w.settings->level), value), R(0.0), through);
+            through = pick(seen & less((real)(w.settings->level), value), R(0.0), through);
 #else
-            real opacity;
-            transfer_at(value, w.settings, w.transfer, &opacity);
-            through = pick(stored, through * (R(1.0) - opacity), through);
+            through = pick(seen, through * (R(1.0) - opacity_of(value, w)), through);
 #endif
             active &= less(R(1.0) - (real)(w.settings->opacity_limit), through);
         }
-        number = pick(active, onward, number);
+        number = onward;
     }
     return through;
 }
@@ -53,15 +44,17 @@ INLINE color lit(vec point, vec normal, color tint, vec to_viewer, mask active, 
     for (int i = 0; i < w.settings->light_count; ++i) {
         __constant const struct Light *light = w.lights + i;
         const incidence in = light_at(light, point);
-        real share = R(1.0);
-#if HAS_SHADOWS
-        const mask facing = active & less(R(0.0), vec_dot(normal, in.toward));
-        if (light->shadow && any_lane(facing)) share = light_through(point, normal, in.toward, in.distance, facing, w, steps);
-#endif
         const mask all_lanes = equal(R(0.0), R(0.0));
         const color open = phong(tint, normal, to_viewer, in, all_lanes, R(1.0), light, w.material);
+#if HAS_SHADOWS
+        real share = R(1.0);
+        const mask facing = active & less(R(0.0), vec_dot(normal, in.toward));
+        if (light->shadow && any_lane(facing)) share = light_through(point, normal, in.toward, in.distance, facing, w, steps);
         const color dark = phong(tint, normal, to_viewer, in, ~all_lanes, R(1.0), light, w.material);
         sum = color_add(sum, color_mix(dark, open, share));
+#else
+        sum = color_add(sum, open);
+#endif
     }
     return sum;
 }
@@ -91,18 +84,27 @@ typedef struct {
     color light;
     real through, t, value;
     vec normal;
-    mask found, on_plane;
+    mask found, on_plane, half_way;   // the last: where it was met by what came last
 } sight;
 
-INLINE void sight_add(sight *s, color light, real opacity, real t, real value, vec normal, mask of_plane, mask adds) {
-    s->light = color_pick(adds, color_add(s->light, color_scale(light, s->through * opacity)), s->light);
+// What stops a part `opacity` of the light comes into sight; gives the part of its own light that arrives.
+INLINE real sight_pass(sight *s, real opacity, real t, real value, mask adds) {
+    const real weight = pick(adds, s->through * opacity, R(0.0));
     s->through = pick(adds, s->through * (R(1.0) - opacity), s->through);
     const mask half_way = adds & ~s->found & less_equal(s->through, R(0.5));
     s->t = pick(half_way, t, s->t);
     s->value = pick(half_way, value, s->value);
-    s->normal = vec_pick(half_way, normal, s->normal);
-    s->on_plane |= half_way & of_plane;
     s->found |= half_way;
+    s->half_way = half_way;
+    return weight;
+}
+
+// The same with its light and normal.
+INLINE void sight_add(sight *s, color light, real opacity, real t, real value, vec normal, mask of_plane, mask adds) {
+    const real weight = sight_pass(s, opacity, t, value, adds);
+    s->light = color_pick(adds, color_add(s->light, color_scale(light, weight)), s->light);
+    s->normal = vec_pick(s->half_way, normal, s->normal);
+    s->on_plane |= s->half_way & of_plane;
 }
 
 #if PLANES > 0 && !SURFACE
@@ -112,9 +114,17 @@ INLINE void sight_quads(sight *s, real until, mask active, const plane_hits *hit
         const mask here = active & less(next->distance, until);
         if (!any_lane(here)) return;
         sight_add(s, next->tint, next->alpha, next->distance, next->count, next->normal, here, here);
-        *next = planes_next(hits, pick(here, next->distance, next->before), set);
+        *next = planes_next(hits, pick(here, next->distance, next->before), pick(here, next->index, next->after), set);
     }
 }
+#endif
+
+#if !SURFACE
+// A place that is seen, not lit yet.
+#define PENDING 4
+typedef struct {
+    real number, value, weight;
+} pending;
 #endif
 
 INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, world w, real *steps) {
@@ -133,93 +143,109 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     active &= ~bare;
 #endif
     grid_ray g;
-    active &= enter(kept, about, &g);
-    const real step = (real)(w.settings->step), steps_per_unit = R(1.0) / step;
+    active &= enter(kept, w, &g);
     const vec zero = vec_of(R(0.0), R(0.0), R(0.0));
     const mask nowhere = active & ~active;
     real number = R(0.0), looked = R(0.0);
-    sight e = {color_of(R(0.0), R(0.0), R(0.0)), R(1.0), R(0.0), R(0.0), zero, nowhere, nowhere};
+    sight e = {color_of(R(0.0), R(0.0), R(0.0)), R(1.0), R(0.0), R(0.0), zero, nowhere, nowhere, nowhere};
 #if SURFACE
     mask found = nowhere;
-#elif PLANES > 0
-    const plane_hits hits = planes_met(r, wanted, w.planes);
-    plane_hit next = planes_next(&hits, R(-1.0), w.planes);
-#endif
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;
-        const real t = g.near + number * step;
-        active &= less(t, g.far);
-        const cell c = cell_at(vec_along(g.origin, t, g.direction), about);
-        const ints entry = brick_at(c, w.grid);
-        const mask stored = active & less(R(-0.5), to_reals(entry));
-        looked += pick(active, R(1.0), R(0.0));
-        real onward = number + R(1.0);
-        real value = R(0.0);
-        if (any_lane(active & ~stored)) {
-            onward = pick(stored, onward, next_place(leave(g, c, -1 - entry), g.near, steps_per_unit, number));
-        }
-        if (any_lane(stored)) {
-            value = grid_value(c, entry, stored, w.grid);
-#if SURFACE
-            const mask met = stored & less_equal((real)(w.settings->level), value);
+        cell c;
+        ints entry;
+        real onward;
+        const mask seen = look(g, number, &active, w, &c, &entry, &onward, &looked);
+        if (any_lane(seen)) {
+            const mask met = seen & less_equal((real)(w.settings->level), grid_value(c, entry, seen, w.grid));
             found |= met;
             active &= ~met;
-#else
-            real opacity;
-            const color tint = transfer_at(value, w.settings, w.transfer, &opacity);
-            const mask adds = stored & less(R(0.0), opacity);
-            if (any_lane(adds)) {
-                const vec point = vec_along(r.origin, t, r.direction);
-                const vec normal = facing_normal(grid_normal(c, entry, adds, w.grid), to_viewer);
-#if COLOR_BY_NORMAL
-                const color base = color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-#else
-                const color base = tint;
-#endif
-                const color light = lit(point, normal, base, to_viewer, adds, w, &looked);
-#if PLANES > 0
-                sight_quads(&e, t, adds, &hits, &next, w.planes);
-#endif
-                sight_add(&e, light, opacity, t, value, normal, nowhere, adds);
-                active &= less(R(1.0) - (real)(w.settings->opacity_limit), e.through);
-            }
-#endif
+            onward = pick(seen, number + R(1.0), onward);
         }
         number = pick(active, onward, number);
     }
-#if SURFACE
     // The crossing lies between this place and the one before.
-    real low = fmax(g.near, g.near + (number - R(1.0)) * step), high = g.near + number * step;
-    cell c;
-    ints entry = (ints)(-1);
+    real low = most(number - R(1.0), R(0.0)), high = number;
     for (int i = 0; i < HALVINGS; ++i) {
         if (!any_lane(found)) break;
         const real middle = R(0.5) * (low + high);
-        c = cell_at(vec_along(g.origin, middle, g.direction), about);
-        entry = brick_at(c, w.grid);
-        const mask stored = found & less(R(-0.5), to_reals(entry));
+        const cell c = cell_at(place_of(g, middle), about);
+        const ints entry = brick_at(c, w.grid);
+        const mask stored = found & is_stored(entry);
         const mask inside = stored & less_equal((real)(w.settings->level), grid_value(c, entry, stored, w.grid));
         high = pick(inside, middle, high);
         low = pick(inside, low, middle);
     }
     if (any_lane(found)) {
-        c = cell_at(vec_along(g.origin, high, g.direction), about);
-        entry = brick_at(c, w.grid);
-        const mask stored = found & less(R(-0.5), to_reals(entry));
+        const cell c = cell_at(place_of(g, high), about);
+        const ints entry = brick_at(c, w.grid);
+        const mask stored = found & is_stored(entry);
         vec normal = grid_normal(c, entry, stored, w.grid);
         const mask none = less(vec_dot(normal, normal), R(0.5));
         // A ray that begins inside, at the grid's side, meets a flat face.
         normal = vec_pick(none, to_viewer, normal);
-        const vec point = vec_along(r.origin, high, r.direction);
-        real opacity;
+        const real t = distance_of(g, high, w);
         const real value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
-        color base = transfer_at(value, w.settings, w.transfer, &opacity);
-#if COLOR_BY_NORMAL
-        base = color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-#endif
-        const color light = lit(point, normal, base, to_viewer, found, w, &looked);
-        sight_add(&e, light, R(1.0), high, value, normal, nowhere, found);
+        const color light = lit(vec_along(r.origin, t, r.direction), normal, tint_of(value, normal, w), to_viewer, found, w,
+                                &looked);
+        sight_add(&e, light, R(1.0), t, value, normal, nowhere, found);
     }
+#else
+#if PLANES > 0
+    const plane_hits hits = planes_met(r, wanted, w.planes);
+    plane_hit next = planes_next(&hits, R(-1.0), R(-1.0), w.planes);
+#endif
+    real half_number = R(-1.0);
+    // Light is the costly part: places are kept until a lane has PENDING of them, and lit together.
+    pending kept_places[PENDING];
+    for (int k = 0; k < PENDING; ++k) kept_places[k].weight = R(0.0);
+    real count = R(0.0);
+    color sum = color_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < w.settings->max_steps; ++i) {
+        if (any_lane(active)) {
+            cell c;
+            ints entry;
+            real onward;
+            const mask seen = look(g, number, &active, w, &c, &entry, &onward, &looked);
+            if (any_lane(seen)) {
+                const real value = grid_value(c, entry, seen, w.grid), opacity = opacity_of(value, w);
+                const mask adds = seen & less(R(0.0), opacity);
+                onward = pick(seen, number + R(1.0), onward);
+                if (any_lane(adds)) {
+                    const real t = distance_of(g, number, w);
+#if PLANES > 0
+                    sight_quads(&e, t, adds, &hits, &next, w.planes);
+#endif
+                    const real weight = sight_pass(&e, opacity, t, value, adds);
+                    for (int k = 0; k < PENDING; ++k) {
+                        const mask here = adds & equal(count, (real)((scalar)k));
+                        kept_places[k].number = pick(here, number, kept_places[k].number);
+                        kept_places[k].value = pick(here, value, kept_places[k].value);
+                        kept_places[k].weight = pick(here, weight, kept_places[k].weight);
+                    }
+                    count += pick(adds, R(1.0), R(0.0));
+                    half_number = pick(e.half_way, number, half_number);
+                    active &= less(R(1.0) - (real)(w.settings->opacity_limit), e.through);
+                }
+            }
+            number = onward;
+        }
+        if (any_lane(active) && !any_lane(less_equal((real)((scalar)PENDING), count))) continue;
+        for (int k = 0; k < PENDING; ++k) {
+            const mask lit_here = less((real)((scalar)k), count);
+            if (!any_lane(lit_here)) break;
+            const real at = kept_places[k].number;
+            const cell c = cell_at(place_of(g, at), about);
+            const vec normal = facing_normal(grid_normal(c, brick_at(c, w.grid), lit_here, w.grid), to_viewer);
+            const color light = lit(vec_along(r.origin, distance_of(g, at, w), r.direction), normal,
+                                    tint_of(kept_places[k].value, normal, w), to_viewer, lit_here, w, &looked);
+            sum = color_pick(lit_here, color_add(sum, color_scale(light, kept_places[k].weight)), sum);
+            e.normal = vec_pick(lit_here & equal(at, half_number), normal, e.normal);
+        }
+        count = R(0.0);
+        if (!any_lane(active)) break;
+    }
+    e.light = color_add(e.light, sum);
 #endif
 #if PLANES > 0
 #if !SURFACE

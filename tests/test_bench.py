@@ -19,7 +19,7 @@ def scene_of(row: str, *changes: str) -> Scene:
 
 def test_rows_are_one_scene_each_but_for_what_they_measure() -> None:
     plain = scene_of("hast2-shadow")
-    rows = [name for name in bench.ROWS if name.startswith("hast2")]
+    rows = [name for name, (text, _, _) in bench.ROWS.items() if text is bench.HAST]
     for name in rows:
         scene = scene_of(name)
         assert (scene.image.width, scene.image.height) == (1000, 1000)
@@ -27,6 +27,18 @@ def test_rows_are_one_scene_each_but_for_what_they_measure() -> None:
         assert changed == plain, name
     renderers = [scene_of(name).renderer for name in rows]
     assert len({renderer.model_dump_json() for renderer in renderers}) == len(rows)
+
+
+def test_rows_of_volumes_and_planes() -> None:
+    kinds = {
+        name: scene_of(name)
+        for name, (text, _, _) in bench.ROWS.items()
+        if text in (bench.VOLUME, bench.PLANE)
+    }
+    assert {scene.renderer.type for scene in kinds.values()} == {"volume", "cut_plane"}
+    for scene in kinds.values():
+        assert scene.image.width * scene.image.height == 1_000_000
+        assert scene.formula.name == "hast"
 
 
 def test_every_normal_and_search_and_the_rivals_of_points_have_a_row() -> None:

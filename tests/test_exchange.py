@@ -159,6 +159,60 @@ def test_a_volume_of_others(shell: InProcess) -> None:
     assert shell("mesh", "theirs.nrrd", "-o", "open.ply", "--level=-2000", "--no-close").status == 2
 
 
+def test_a_scene_that_shows_a_volume_of_others(shell: InProcess) -> None:
+    """It is converted, and meshed, where the scene's box puts it; its axes are turned along those of space."""
+    x, y, z = np.moveaxis(middles(), -1, 0)
+    depth = ((1 - np.sqrt(x * x + y * y + z * z)) * 1000).astype(np.int16)
+    # Stored against x, and y after x.
+    turned = np.ascontiguousarray(depth[:, :, ::-1].transpose(0, 2, 1))
+    first = CORNER + STEP / 2 + np.array([35 * STEP, 0, 0])
+    write_volume("theirs.nrrd", Volume(turned, first, STEP * np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]])))
+    Path("theirs.yaml").write_text(
+        "version: 1\nformula: {name: mandelbulb}\ncamera: {}\nrenderer: {type: volume, file: theirs.nrrd, level: 200}\n"
+    )
+    assert works(shell("voxelize", "theirs.yaml", "-o", "along.npy"))
+    along = read_volume("along.npy")
+    np.testing.assert_array_equal(along.values, depth)
+    np.testing.assert_allclose(along.origin, CORNER + STEP / 2, atol=1e-12)
+    np.testing.assert_allclose(along.directions, STEP * np.eye(3), atol=1e-12)
+    assert SCENE_KEY not in along.texts
+    ended = shell("mesh", "theirs.yaml", "-o", "theirs.ply")
+    assert works(ended)
+    assert "theirs.yaml: 36 x 30 x 27 voxels, 58.3 kB, level 200\n" in ended.err
+    found = load("theirs.ply")
+    assert found.is_watertight
+    assert found.volume == pytest.approx(4 / 3 * np.pi * 0.8**3, rel=0.02)
+    # The gradient's normals: of the ball, not of the scene's formula.
+    points = np.asarray(found.vertices)
+    outward = points / np.linalg.norm(points, axis=1)[:, None]
+    assert np.sum(np.asarray(found.vertex_normals) * outward, axis=1).min() > 0.99
+    twice = ("--set", "renderer.box={center: [5, 0, 0], size: 6}")
+    assert works(shell("mesh", "theirs.yaml", "-o", "large.ply", "--level", "0", *twice, "-q"))
+    assert load("large.ply").volume == pytest.approx(8 * 4 / 3 * np.pi, rel=0.02)
+    told = shell("voxelize", "theirs.yaml", "-o", "no.nrrd", "--resolution", "20")
+    assert told.is_one_line(2, "--resolution: is for grids that are filled; the scene shows a file")
+    told = shell("mesh", "theirs.yaml", "-o", "no.ply", "--level", "5000", "-q")
+    assert told.is_one_line(2, "theirs.yaml: has no surface at the level 5000: its values are from ")
+
+
+def test_the_level_of_the_scene(shell: InProcess) -> None:
+    """Of smooth counts, which are log2(log R / log r) at the radius r; also in a volume that was made before."""
+    bailout = load_scene(BALL).chain.distance_bailout
+    radius = bailout ** (2.0**-4.5)
+    settings = ("--set", "renderer.value=iterations", "--set", "renderer.level=4.5", "-q")
+    box = ("--resolution", "40", "--set", "renderer.box={size: 4}")
+    for store in ("float", "byte"):
+        more = (*box, *settings, "--set", f"renderer.store={store}")
+        assert works(shell("mesh", "ball.yaml", "-o", "level.ply", *more))
+        away = np.linalg.norm(load("level.ply").vertices, axis=1)
+        assert np.abs(away - radius).max() < 0.02
+        assert works(shell("voxelize", "ball.yaml", "-o", "level.nrrd", *more))
+        assert works(shell("mesh", "level.nrrd", "-o", "again.ply", "-q"))
+        assert Path("again.ply").read_bytes() == Path("level.ply").read_bytes()
+    assert works(shell("mesh", "level.nrrd", "-o", "other.ply", "-q", "--level", "127.5"))
+    assert len(load("other.ply").vertices) != len(load("level.ply").vertices)
+
+
 def test_what_the_box_cuts_keeps_its_flat_faces(shell: InProcess) -> None:
     half = "renderer.box={center: [0, 0, 1], size: [2.5, 2.5, 2]}"
     assert works(shell("mesh", "ball.yaml", "-o", "half.ply", "--resolution", "30", "--set", half, "-q"))

@@ -234,7 +234,7 @@ def mesh(
     resolution: Resolution = None,
     level: Annotated[
         float | None,
-        typer.Option("--level", help="Value at the surface.  [default: half way between the ends]"),
+        typer.Option("--level", help="Value at the surface.  [default: renderer.level, or half way]"),
     ] = None,
     no_close: Annotated[
         bool, typer.Option("--no-close", help="Leave the surface open where the box cuts it.")

@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clfractal.commands.voxelize import COLORING_KEY, Order, Teller, fill, grid_volume, painted, volume_scene
+from clfractal.commands.voxelize import (
+    COLORING_KEY,
+    Order,
+    Teller,
+    fill,
+    given_volume,
+    grid_volume,
+    painted,
+    volume_scene,
+)
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
@@ -22,6 +31,7 @@ from clfractal.files.regular import read_bytes
 from clfractal.files.volume import SCENE_KEY, Volume, read_volume
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shell import Shell
 
@@ -97,27 +107,54 @@ def _check_library() -> None:
 
 
 def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
-    """The scene's grid, filled; a level is in the value's own numbers, and in the middle if not given."""
+    """The scene's grid, filled; a level is in the value's own numbers, and the scene's if not given."""
     scene, coloring = volume_scene(order), painted(order)
+    volume = given_volume(order, scene)
+    if volume is not None:
+        return _of_given(order, scene, volume, level, shell)
     grid, job = fill(order, scene, shell)
-    low, high = grid.range
-    wanted = (low + high) / 2 if level is None else level
+    volume = grid_volume(grid, job, coloring)
+    return _Found(volume, _stored(level, volume, job.scene), _Made(job, coloring), False)
+
+
+def _of_given(order: Order, scene: Scene, volume: Volume, level: float | None, shell: Shell) -> _Found:
+    """The grid of others that a scene shows; a level is in its numbers, and the scene's if not given."""
+    assert isinstance(scene.renderer, VolumeRenderer)
+    assert scene.given is not None
+    wanted = scene.renderer.used_level(scene.given.low, scene.given.high) if level is None else level
+    z, y, x = volume.values.shape
+    shell.say(
+        f"{order.source}: {x} x {y} x {z} voxels, {memory.shown(volume.values.nbytes)}, level {wanted:g}"
+    )
+    return _Found(volume, wanted, None, True)
+
+
+def _stored(level: float | None, volume: Volume, scene: Scene) -> float:
+    """The level of a grid that a scene filled, as its values are stored."""
+    assert isinstance(scene.renderer, VolumeRenderer)
+    low, high = scene.renderer.value_range(scene.formula.iterations)
+    wanted = scene.renderer.used_level(low, high) if level is None else level
     if not low < wanted <= high:
         raise SceneError(f"must be above {low:g} and at most {high:g}, got {wanted:g}", Where("--level"))
     # Floats are a value's own numbers, bytes are spread over its range.
-    stored = 255 * (wanted - low) / (high - low) if grid.kind == "byte" else wanted
-    return _Found(grid_volume(grid, job, coloring), stored, _Made(job, coloring), False)
+    return 255 * (wanted - low) / (high - low) if volume.values.dtype == np.uint8 else wanted
 
 
 def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
-    """A volume of a file; a level is in the file's numbers, half way from the least to the largest if not given."""
+    """A volume of a file; a level is in the file's numbers.
+
+    If not given it is that of the scene that made the volume, or half way from the least to the largest.
+    """
     for option, value in (("--set", order.overrides), ("--resolution", order.resolution)):
         if value:
             raise SceneError("is for scenes; the source is a volume", Where(option))
     from clfractal.voxels.mesh import value_range
 
     volume = read_volume(order.source)
-    if level is None:
+    made = _made(order, volume, shell)
+    if level is None and made is not None and _has_level(made.job.scene):
+        level = _stored(None, volume, made.job.scene)
+    elif level is None:
         low, high = value_range(volume.values)
         if low == high:
             raise SceneError(f"has no surface: all its values are {low:g}", Where(order.source))
@@ -126,7 +163,11 @@ def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
     shell.say(
         f"{order.source}: {x} x {y} x {z} voxels, {memory.shown(volume.values.nbytes)}, level {level:g}"
     )
-    return _Found(volume, level, _made(order, volume, shell), True)
+    return _Found(volume, level, made, True)
+
+
+def _has_level(scene: Scene) -> bool:
+    return isinstance(scene.renderer, VolumeRenderer) and scene.renderer.level is not None
 
 
 def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
@@ -148,7 +189,9 @@ def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
     except ClfractalError as error:
         shell.say(f"{order.source}: its scene is of no use, normals are those of the values: {error}")
         return None
-    if not isinstance(scene.renderer, VolumeRenderer) or not _is_along_axes(volume):
+    if not isinstance(scene.renderer, VolumeRenderer) or scene.renderer.file is not None:
+        return None
+    if not _is_along_axes(volume):
         return None
     return _Made(jobs.prepare(scene, choose(order.device), on_start=shell.say), coloring)
 

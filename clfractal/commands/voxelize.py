@@ -68,7 +68,7 @@ class Teller:
 
 
 def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
-    """Fills the grid of a scene and writes it.
+    """Fills the grid of a scene and writes it; one that shows a grid of others is converted.
 
     Raises:
         ClfractalError: anything wrong with the input, the files or the device; an earlier file stays as it was.
@@ -83,12 +83,15 @@ def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
     scene = volume_scene(order)
     coloring = painted(order)
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
-    grid, job = fill(order, scene, shell)
-    volume = grid_volume(grid, job, coloring)
+    volume = given_volume(order, scene)
+    if volume is None:
+        grid, job = fill(order, scene, shell)
+        volume = grid_volume(grid, job, coloring)
     write_volume(order.output, volume, compress=compress)
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
-    shell.say(f"{order.output}: {sides(grid)} voxels, {size}, {time.perf_counter() - start:.2f} s")
+    sides = " x ".join(map(str, volume.values.shape[::-1]))
+    shell.say(f"{order.output}: {sides} voxels, {size}, {time.perf_counter() - start:.2f} s")
 
 
 def volume_scene(order: Order) -> Scene:
@@ -115,9 +118,6 @@ def volume_scene(order: Order) -> Scene:
     if not isinstance(scene.renderer, VolumeRenderer):
         where = Where(order.source, path="renderer.type")
         raise SceneError(f"must be volume here, got {scene.renderer.type}", where)
-    if scene.renderer.file is not None:
-        where = Where(order.source, path="renderer.file")
-        raise SceneError("the scene shows a grid that is in a file already", where)
     return scene
 
 
@@ -188,6 +188,20 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
     return grid, job
 
 
+def given_volume(order: Order, scene: Scene) -> Volume | None:
+    """The grid of others that a scene shows, where and as large as it shows it; None if it shows its formula.
+
+    It has no texts: the formula, which the scene has to have, knows nothing of it.
+    """
+    given = scene.given
+    if given is None:
+        return None
+    if order.resolution is not None:
+        raise SceneError("is for grids that are filled; the scene shows a file", Where("--resolution"))
+    spacing = np.array(given.spacing)
+    return Volume(given.values, np.array(given.corner) + spacing / 2, np.diag(spacing))
+
+
 def grid_volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
     """The grid's values as they are stored, with where they are and the scene that made them."""
     settings = job.scene.renderer
@@ -206,8 +220,3 @@ def grid_volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
 
 def _one_line(plain: Any) -> str:
     return json.dumps(plain, separators=(",", ":")).replace(": ", ":\\u0020")
-
-
-def sides(grid: Grid) -> str:
-    """The grid's size in words."""
-    return " x ".join(map(str, grid.shape))

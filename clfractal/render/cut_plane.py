@@ -86,7 +86,7 @@ class CutPlaneWorker(TileWorker):
         scene, plan = self.scene, self.plan
         renderer = renderer_of(scene)
         width, height = scene.image.width, scene.image.height
-        iterations = scene.formula.iterations
+        iterations = renderer.iterations if renderer.iterations is not None else scene.formula.iterations
         formula = write_formula(scene.chain)
         return [
             view_record(scene_view(scene), width, height, plan.region, plan.precision),

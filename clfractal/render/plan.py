@@ -61,7 +61,7 @@ def finest_steps(scene: Scene, view: View) -> float:
     unit = magnitude * float(np.finfo(np.float32).eps)
     renderer = scene.renderer
     if isinstance(renderer, VolumeRenderer):
-        return _finest_voxels(scene, renderer)
+        return _finest_voxels(scene, renderer, footprint)
     if not isinstance(renderer, SurfaceRenderer):
         # A point of a plane is rounded at its own coordinates, and its orbit at the size of the set.
         reach = np.abs(view.side) * view.width / 2 + np.abs(view.up) * view.height / 2
@@ -74,8 +74,11 @@ def finest_steps(scene: Scene, view: View) -> float:
     return renderer.detail * footprint / unit
 
 
-def _finest_voxels(scene: Scene, renderer: VolumeRenderer) -> float:
-    """Of a volume it is the voxels that are evaluated; their coordinates are found in float64, and rounded once."""
+def _finest_voxels(scene: Scene, renderer: VolumeRenderer, footprint: float) -> float:
+    """Of a volume it is the voxels that are evaluated; their coordinates are found in float64, and rounded once.
+
+    Cut planes are evaluated where pixels of this footprint meet them.
+    """
     if renderer.file is not None:
         return math.inf
     _, box = used_boxes(scene, renderer)
@@ -87,7 +90,8 @@ def _finest_voxels(scene: Scene, renderer: VolumeRenderer) -> float:
         else sides.max() / resolution[0]
     )
     magnitude = max(float((np.abs(np.array(box.center)) + sides / 2).max()), 1e-30)
-    return voxel / (magnitude * float(np.finfo(np.float32).eps))
+    finest = min(voxel, footprint / renderer.magnification) if scene.cut_planes else voxel
+    return finest / (magnitude * float(np.finfo(np.float32).eps))
 
 
 def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool) -> tuple[Precision, str]:

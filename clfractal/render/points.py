@@ -33,7 +33,7 @@ class Distances:
     Attributes:
         step: the distance that rays march by, scene units; 0 inside.
         full: the distance by the full Jacobian (the same for formulas without a scalar rule).
-        normal: unit gradient of the distance; zero where there is none.
+        normal: unit gradient of the distance; zero where there is none, as inside.
         smooth: smooth escape count.
         inside: never escaped.
     """
@@ -79,7 +79,10 @@ def distances(
 ) -> Distances:
     """Distances to the solid at points of shape (n, 3), with normals; see `escape` for the errors."""
     result = _run(chain, points, iterations, "distances", 7, device, lanes, precision, None)
-    return Distances(result[0], result[1], result[2:5].T, result[5], result[6] > 0)
+    inside = result[6] > 0
+    # Inside the kernel's gradient is that of |z| after the last application; the distance is 0 all around.
+    normal = np.where(inside[:, None], 0.0, result[2:5].T)
+    return Distances(result[0], result[1], normal, result[5], inside)
 
 
 def _run(

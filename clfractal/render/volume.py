@@ -13,7 +13,7 @@ import pyopencl as cl
 
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText, flatten
-from clfractal.device.structs import Field, Struct
+from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
 from clfractal.render import layout
 from clfractal.render.plan import Plan
@@ -25,6 +25,7 @@ from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.blocks import seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
@@ -81,8 +82,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
     settings = settings_of(scene)
     defines = {
         **tile_defines(plan),
-        # The grid is looked at in a measure of its own, whatever it was filled with.
-        "REAL_IS_DOUBLE": 0,
+        "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
         "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
         "TRANSFER_SIZE": TRANSFER_SIZE,
@@ -90,6 +90,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "VALUE_IS_FLOAT": int(grid.kind == "float"),
         "NEAREST": int(settings.interpolation == "nearest"),
         "POOLS": len(grid.values),
+        "TINTED": int(settings.transfer.color is not None),
         "HAS_SHADOWS": int(settings.shadows and any(light.shadow for light in scene.lights)),
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
@@ -107,6 +108,14 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
     return flatten("volume.cl", generated=generated, defines=defines, user=["formula.h"])
 
 
+def ray_precision(scene: Scene, plan: Plan) -> Precision:
+    """The number type of rays: the grid is looked at in a measure of its own, whatever it was filled with.
+
+    Only cut planes evaluate the formula where a zoom has led, and want what filling wants.
+    """
+    return plan.precision if scene.cut_planes else "float32"
+
+
 class VolumeWorker(TileWorker):
     """Fills a scene's grid, then renders tiles of its picture."""
 
@@ -120,19 +129,24 @@ class VolumeWorker(TileWorker):
         scene, plan = self.scene, self.plan
         settings = settings_of(scene)
         width, height = scene.image.width, scene.image.height
-        self.grid = self.shared.once(self._grid_key(settings), lambda: self._fill(settings))
+        precision = ray_precision(scene, plan)
+        key = self._grid_key(settings)
+        self.grid = grid = self.shared.once(key, lambda: self._fill(settings))
+        unseen = unseen_sample(scene, plan, grid)
+        blocks = self.shared.once(f"{key} {unseen}", lambda: seen_blocks(grid, unseen, self.on_compile))
         four = (0, 1, 2, 3)
         return [
-            layout.view_record(scene_view(scene), width, height, plan.region, "float32"),
+            layout.view_record(scene_view(scene), width, height, plan.region, precision),
             volume_record(scene, plan, self.grid),
-            grid_record(scene, self.grid),
-            layout.material_record(scene, "float32"),
-            layout.light_records(scene, "float32"),
+            grid_record(scene, self.grid, precision),
+            layout.material_record(scene, precision),
+            layout.light_records(scene, precision),
             transfer_table(scene, value_range(scene, self.grid)),
             self.grid.table,
+            blocks,
             *(_one_of(self.grid.values, pool) for pool in four),
             *(_one_of(self.grid.normals, pool) for pool in four),
-            *(_plane_arguments(scene) if scene.cut_planes else []),
+            *(_plane_arguments(scene, precision) if scene.cut_planes else []),
             channel_slots(plan),
         ]
 
@@ -170,19 +184,16 @@ def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
     """The value up to which a grid's voxels cannot be seen; None if the least can."""
     stops = settings.transfer.opacity
     if stops is None:
-        return float(np.nextafter(np.float32(surface_level(given.low, given.high)), np.float32(-np.inf)))
+        return float(
+            np.nextafter(np.float32(settings.used_level(given.low, given.high)), np.float32(-np.inf))
+        )
     for before, stop in pairwise(stops):
         if before.opacity == 0 and stop.opacity > 0:
             return before.at if stops[0].opacity == 0 else None
     return None if stops[0].opacity > 0 else stops[-1].at
 
 
-def surface_level(low: float, high: float) -> float:
-    """The value of the surface of a grid with values from `low` to `high`, however they are coloured."""
-    return (low + high) / 2
-
-
-def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
+def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
     """Where the grid lies in the picture: in the first box, whatever is zoomed to."""
     shown, _ = used_boxes(scene, settings_of(scene))
     middle = np.array(shown.center)
@@ -197,7 +208,7 @@ def grid_record(scene: Scene, grid: Grid) -> npt.NDArray[Any]:
         "bricks": grid.bricks,
         "pool_bricks": grid.layout.part_slots,
     }
-    return GRID.value("float32", values)
+    return GRID.value(precision, values)
 
 
 def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
@@ -212,7 +223,7 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
     width = settings.filter_width
     values = {
         "step": step,
-        "level": (surface_level(least, most) - grid.range[0]) / per_sample,
+        "level": (settings.used_level(least, most) - grid.range[0]) / per_sample,
         "low": low,
         "range": 1 / (high - low),
         "value_scale": per_sample,
@@ -228,12 +239,30 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
         "seed": settings.seed,
         "light_count": len(scene.lights),
     }
-    return VOLUME.value("float32", values)
+    return VOLUME.value(ray_precision(scene, plan), values)
 
 
 def full_sample(grid: Grid) -> float:
     """The sample that stands for `grid.range[1]`."""
     return 255.0 if grid.kind == "byte" else grid.range[1]
+
+
+def unseen_sample(scene: Scene, plan: Plan, grid: Grid) -> float:
+    """The sample at and below which nothing is seen; not a number where the least is seen."""
+    record = volume_record(scene, plan, grid)
+    if settings_of(scene).transfer.opacity is None:
+        return float(np.nextafter(np.float32(record["level"]), np.float32(-np.inf)))
+    seen = np.flatnonzero(transfer_table(scene, value_range(scene, grid))[:, 0])
+    if not len(seen):
+        return float(np.inf)
+    if seen[0] == 0:
+        return float(np.nan)
+    # Up to the last entry before the first that is seen, as a kernel finds places in the table.
+    low, scale = np.float32(record["low"]), np.float32(record["range"]) * np.float32(TRANSFER_SIZE - 1)
+    sample = low + np.float32(seen[0] - 1.01) / scale
+    while (sample - low) * scale > seen[0] - 1:
+        sample = np.nextafter(sample, np.float32(-np.inf))
+    return float(sample)
 
 
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
@@ -274,13 +303,13 @@ def _mixed(
     return np.stack([np.interp(values, at, column) for column in columns], axis=1)
 
 
-def _plane_arguments(scene: Scene) -> list[KernelArgument]:
+def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
     """The cut planes, and the formula that they show, in the kernel's order."""
-    own = layout.orbit_record(scene.chain, scene.formula.iterations, "float32")
+    own = layout.orbit_record(scene.chain, scene.formula.iterations, precision)
     return [
-        plane_records(scene, "float32"),
-        np.stack([own, *plane_orbits(scene, "float32")]),
-        np.array(write_formula(scene.chain).constants, np.float32),
+        plane_records(scene, precision),
+        np.stack([own, *plane_orbits(scene, precision)]),
+        np.array(write_formula(scene.chain).constants, precision),
         plane_palettes(scene),
     ]
 

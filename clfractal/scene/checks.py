@@ -54,6 +54,14 @@ def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
         raise SceneError(
             "a file's grid has no more to zoom to; remove zoom or file", Where(path="renderer.zoom")
         )
+    if renderer.level is not None:
+        if renderer.transfer.opacity is not None:
+            raise SceneError(
+                "is of a surface, and transfer.opacity shows all values; remove one of them",
+                Where(path="renderer.level"),
+            )
+        if renderer.file is None:
+            renderer.check_level(*renderer.value_range(scene.formula.iterations))
     if scene.coloring.by not in ("solid", "normal"):
         raise SceneError(
             f"must be solid or normal for a volume, got {scene.coloring.by}; renderer.transfer.color colours values",

@@ -18,6 +18,8 @@ Palette = Annotated[
     ),
 ]
 
+Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
+
 
 class EscapeColors(Section):
     """Colours of a plane through the set: the palette at scale * curve(count / limit) + offset, and one for the inside."""
@@ -47,6 +49,9 @@ class CutPlaneRenderer(Sampled):
     colors: EscapeColors = Field(
         default_factory=dict, validate_default=True, description="colours by escape counts"
     )
+    iterations: Iterations | None = Field(
+        None, description="most applications of the formula on the plane; formula.iterations if null"
+    )
     periodicity: bool = Field(
         True, description="whether points inside are found early, by orbits that come back"
     )
@@ -59,10 +64,13 @@ class CutPlane(Section):
     colors: EscapeColors = Field(
         default_factory=dict, validate_default=True, description="colours by escape counts"
     )
-    opacity: Fraction = Field(0.8, description="of the plane outside the set; 0: not shown there")
+    opacity: Fraction = Field(0.8, description="of the rectangle; 0: not shown")
+    inside_opacity: Fraction | None = Field(
+        None, description="of the rectangle where the plane is in the set; opacity if null"
+    )
     cut: bool = Field(False, description="whether the object in front of the plane is removed")
-    iterations: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] | None = Field(
-        None, description="most applications of the formula on the plane; the scene's if null"
+    iterations: Iterations | None = Field(
+        None, description="most applications of the formula on the plane; formula.iterations if null"
     )
     count: int = Field(1, ge=1, le=256, description="parallel planes")
     spacing: Coordinate = Field(0.1, description="from one to the next along the normal, scene units")

@@ -42,7 +42,9 @@ class LayoutView(Section):
     background: Background | None = Field(None, description="in place of the scene's own; that if null")
     environment: Environment | None = Field(None, description="in place of the scene's own; that if null")
     fog: Fog | None = Field(None, description="in place of the scene's own; that if null")
-    cut_planes: CutPlanes | None = Field(None, description="in place of the scene's own; that if null")
+    cut_planes: CutPlanes | None = Field(
+        None, description="in place of the scene's own; that if null, and none for a cut_plane renderer"
+    )
 
     @model_validator(mode="after")
     def _within(self) -> Self:

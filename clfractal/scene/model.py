@@ -14,7 +14,7 @@ from pydantic import Field
 
 from clfractal.scene.base import Section
 from clfractal.scene.coloring import Coloring
-from clfractal.scene.cut_plane import CutPlanes
+from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
@@ -120,6 +120,7 @@ class Scene(Section):
 
         Raises:
             FileError: its file is missing or wrong; the path says where.
+            SceneError: the renderer's level is beyond its values.
         """
         from clfractal.scene.volume import VolumeRenderer
 
@@ -127,7 +128,9 @@ class Scene(Section):
             return None
         from clfractal.scene.given import read_given
 
-        return read_given(self.renderer, self.folder)
+        given = read_given(self.renderer, self.folder)
+        self.renderer.check_level(given.low, given.high)
+        return given
 
     @cached_property
     def views(self) -> "list[tuple[Scene, Place]]":
@@ -147,11 +150,13 @@ class Scene(Section):
                     f"there is no room for it in a picture of {self.image.width} x {self.image.height} pixels",
                     Where(path=f"layout.views.{number}"),
                 )
-            image = Image(width=place.width, height=place.height)
-            shown = self.model_copy(update={**view.changes(), "image": image, "layout": None})
+            own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}
+            if isinstance(view.renderer, CutPlaneRenderer):
+                # The scene's planes stand in pictures of its object, and a plane by itself is none.
+                own["cut_planes"] = ()
+            shown = self.model_copy(update={**own, **view.changes()})
             # It takes up a part of the screen.
-            share = self.eye.share * place.width / self.image.width
-            shown.__dict__["eye"] = replace(self.eye, share=share)
+            shown.__dict__["eye"] = replace(self.eye, share=self.eye.share * place.width / self.image.width)
             found.append((shown, place))
         return found
 

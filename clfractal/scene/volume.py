@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
+from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
 from clfractal.scene.sampled import Sampled
 
@@ -62,7 +63,7 @@ class Transfer(Section):
     """What the values of voxels look like."""
 
     opacity: Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = (
-        Field(None, description="stops in order of `at`; a surface at the middle value if null")
+        Field(None, description="stops in order of `at`; a surface at the renderer's level if null")
     )
     color: Annotated[tuple[ColorStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = Field(
         None, description="stops in order of `at`; the material's colour if null"
@@ -119,6 +120,9 @@ class VolumeRenderer(Sampled):
     step: Annotated[float, Field(strict=True, ge=0.01, le=4)] = Field(
         0.5, description="along the ray, in sides of a voxel"
     )
+    level: Annotated[float, Field(strict=True, ge=-1e12, le=1e12)] | None = Field(
+        None, description="value of the surface; the middle of the grid's values if null"
+    )
     opacity_limit: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
         0.99, description="a ray ends once it is that opaque"
     )
@@ -126,6 +130,22 @@ class VolumeRenderer(Sampled):
         default_factory=dict, validate_default=True, description="what the values of voxels look like"
     )
     shadows: bool = Field(False, description="whether lights with a shadow send rays through the grid")
+
+    def value_range(self, iterations: int) -> tuple[float, float]:
+        """The least and the largest value of a grid that is filled, with a formula of at most `iterations`."""
+        return 0.0, float(iterations) if self.value == "iterations" else 1.0
+
+    def used_level(self, low: float, high: float) -> float:
+        """The value of the surface of a grid with values from `low` to `high`."""
+        return (low + high) / 2 if self.level is None else self.level
+
+    def check_level(self, low: float, high: float) -> None:
+        """Raises SceneError for a level that a grid with values from `low` to `high` cannot have."""
+        if self.level is not None and not low < self.level <= high:
+            raise SceneError(
+                f"must be above {low:g} and at most {high:g}, the ends of the grid's values, got {self.level:g}",
+                Where(path="renderer.level"),
+            )
 
     @property
     def magnification(self) -> float:

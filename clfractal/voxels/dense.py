@@ -16,7 +16,7 @@ from clfractal.scene.base import Vector
 from clfractal.voxels import programs
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import BRICK, Lattice, pack_places
-from clfractal.voxels.octree import levels
+from clfractal.voxels.octree import empty_cubes
 from clfractal.voxels.pool import allocate, plan_pools
 from clfractal.voxels.store import extent_buffer
 
@@ -87,7 +87,7 @@ def grid_from_dense(
         milliseconds += slabs.store(value_part, normal_part, x[first:after], y[first:after], z[first:after])
         if progress is not None:
             progress(after, stored)
-    entries = levels(entries)
+    entries = empty_cubes(entries)
     table = device.buffer(entries.nbytes, "the grid's table", read_only=True)
     with device.failures("storing the grid"):
         cl.enqueue_copy(device.queue, table, entries.reshape(-1))

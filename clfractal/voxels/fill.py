@@ -105,6 +105,16 @@ def check_grid(lattice: Lattice, renderer: VolumeRenderer, device: Device) -> No
     device.check_memory(0, what, largest=4 * bricks)
 
 
+def shows_outside(renderer: VolumeRenderer) -> bool:
+    """Whether a voxel that is outside, of value 0, can be seen."""
+    stops = renderer.transfer.opacity
+    if stops is None:
+        return False
+    opacity = float(np.interp(0.0, [stop.at for stop in stops], [stop.opacity for stop in stops]))
+    # Where the opacity jumps at 0 either side may be met.
+    return max([opacity, *(stop.opacity for stop in stops if stop.at == 0)]) > 0
+
+
 class _Filler:
     """One fill: the constants on the device, and the stages."""
 
@@ -162,6 +172,7 @@ class _Filler:
             keep=kernels["store_bricks"],
             stats=self.stats,
             tell=self._tell,
+            show_outside=shows_outside(renderer),
             refine=kernels.get("refine_normals"),
             constants=self.constants,
         )

@@ -65,15 +65,16 @@ class Grid:
             of `float` the samples are the values (of a given array of floats the range is 0 to 1, whatever it holds).
         device: where the buffers are.
         layout: slots of the pools and their parts.
-        table_entries: of each brick its slot, or -(1 + level) if it cannot be seen; int32 of shape (bz, by, bx).
-            `level`: the node of 8 << level cells a side around it, aligned to multiples of its size, is the largest
-            that cannot be seen as a whole.
+        table_entries: of each brick its slot, or -(1 + sides) if it cannot be seen; int32 of shape (bz, by, bx). `sides`
+            tells how far around it there is nothing, see `octree.empty_cubes`.
         table: the same on the device, x fastest.
         values: samples, uint8 or float32, in up to four buffers (`layout.ranges()`).
         normals: four bytes a sample: round(127.5 (n + 1)) of the outward normal's x, y and z (128 where there is
             none), and 255 inside, 0 outside. `least_squares` and `exact` ones are those of samples of a brick's cells
             that the surface goes through: of a sample that bricks share, a copy may still be by differences.
         solid_slot: the slot that all bricks share which are inside as a whole; None where each has its own.
+        outside_slot: the slot that bricks share which are outside as a whole, where that can be seen; None where they are
+            not stored, or each has its own.
         background: value of what is not stored.
         stats: what filling took.
     """
@@ -88,6 +89,7 @@ class Grid:
     values: tuple[cl.Buffer, ...]
     normals: tuple[cl.Buffer, ...]
     solid_slot: int | None
+    outside_slot: int | None = None
     background: float = 0.0
     stats: GridStats = field(default_factory=GridStats)
 

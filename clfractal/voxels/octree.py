@@ -13,6 +13,9 @@ from clfractal.voxels.lattice import BRICK, Lattice, Places, Shape, all_places, 
 # Nodes to begin with: too few leave a device idle, and large nodes are seldom empty.
 MOST_FIRST_NODES = 4096
 FIRST_LEVEL = 3
+# The octants of directions in which z, y or x falls, a bit each.
+FALLING = (np.uint8(0xF0), np.uint8(0xCC), np.uint8(0xAA))
+MOST_SIDE = 7
 # As in `kernels/voxels_nodes.cl`.
 UNDECIDED, EMPTY, FULL = 0, 1, 2
 
@@ -56,41 +59,65 @@ def descend(lattice: Lattice, classify: Callable[[Places, int], npt.NDArray[np.u
         nodes, full = (_children(each, _halved(bricks, level)) for each in (nodes, full))
 
 
-def levels(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-    """The table with how far there is nothing: -(1 + level) in place of each negative entry.
+def empty_cubes(table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
+    """The table with how far there is nothing: -(1 + sides) in place of each negative entry.
+
+    Rays of an octant of directions never turn back, so that only what lies ahead of them counts.
 
     Args:
         table: entries of bricks, shape (bz, by, bx); a negative one is of a brick that cannot be seen.
 
     Returns:
-        A new table. `level` is the largest for which all bricks of the node of 1 << level bricks a side that the brick
-        is in cannot be seen; nodes are aligned to multiples of their size, and nothing is past the grid's ends.
+        A new table. `sides` tells for each octant of directions the largest k <= 7 for which no brick can be seen of the
+        cube of 1 << k bricks a side that begins with the brick and lies in these directions: bits i, i + 8 and i + 16 are
+        its lowest, middle and highest digit, where of i the lowest bit is set if x falls, then y, then z. Nothing is past
+        the grid's ends.
     """
-    pyramid = [table < 0]
-    while max(pyramid[-1].shape) > 1 and pyramid[-1].any():
-        pyramid.append(_eighth(pyramid[-1]))
-    found = np.full(pyramid[-1].shape, -1, np.int8)
-    for level in range(len(pyramid) - 1, -1, -1):
-        here = pyramid[level]
-        if level < len(pyramid) - 1:
-            for axis in range(3):
-                found = np.repeat(found, 2, axis=axis)
-            found = found[tuple(slice(n) for n in here.shape)]
-        found = np.where(found >= 0, found, np.where(here, np.int8(level), np.int8(-1)))
-    return np.where(found >= 0, -1 - found.astype(np.int32), table)
+    # A bit for each octant: whether the cube is empty. Eight cubes of half its side make up the next.
+    empty = np.where(table < 0, np.uint8(255), np.uint8(0))
+    digits = [np.zeros_like(empty) for _ in range(3)]
+    beside = np.empty_like(empty)
+    for level in range(MOST_SIDE):
+        half = 1 << level
+        if half >= max(table.shape) or not empty.any():
+            break
+        for axis, falling in enumerate(FALLING):
+            if half >= table.shape[axis]:
+                continue
+            # Shifted as a whole, which is quick; what comes from other rows is past the grid's ends.
+            shift = half * int(np.prod(table.shape[axis + 1 :]))
+            flat, other = empty.reshape(-1), beside.reshape(-1)
+            before = empty.copy()
+            other[:-shift] = flat[shift:]
+            np.swapaxes(beside, 0, axis)[-half:] = 255
+            beside |= falling
+            empty &= beside
+            other[shift:] = before.reshape(-1)[:-shift]
+            np.swapaxes(beside, 0, axis)[:half] = 255
+            beside |= ~falling
+            empty &= beside
+        carry = empty.copy()
+        for digit in digits:
+            digit ^= carry
+            carry &= ~digit
+    sides = digits[0].astype(np.int32)
+    sides |= digits[1].astype(np.int32) << 8
+    sides |= digits[2].astype(np.int32) << 16
+    return np.where(table < 0, ~sides, table)
 
 
-def _eighth(empty: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Whether all of each 2 x 2 x 2 are empty."""
+def touched(flags: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Which bricks are flagged, or touch one that is, if only at a corner."""
     for axis in range(3):
-        first, second = (
-            empty[tuple(slice(start, None, 2) if axis == a else slice(None) for a in range(3))]
-            for start in (0, 1)
+        before, after = (
+            tuple(slice(start, stop) if axis == a else slice(None) for a in range(3))
+            for start, stop in ((None, -1), (1, None))
         )
-        whole = first.copy()
-        whole[tuple(slice(n) for n in second.shape)] &= second
-        empty = whole
-    return empty
+        grown = flags.copy()
+        grown[before] |= flags[after]
+        grown[after] |= flags[before]
+        flags = grown
+    return flags
 
 
 def _halved(bricks: Shape, level: int) -> Shape:

@@ -173,6 +173,13 @@ def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int) -> Recip
     return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, 1, BRICK_GROUP, arguments)
 
 
+def blocks_recipe(kept: Kind) -> Recipe:
+    """`seen_blocks`: which parts of stored bricks may be seen."""
+    defines: dict[str, object] = {"VALUE": C_TYPES[kept]}
+    arguments = (_BUFFER, _BUFFER, _INT, _INT, _INT, _FLOAT)
+    return Recipe("voxels_blocks.cl", "seen_blocks", defines, "float32", None, 1, BRICK_GROUP, arguments)
+
+
 def normals_recipe(
     chain: Chain, formula: FormulaText, renderer: VolumeRenderer, lanes: int, precision: Precision
 ) -> Recipe:

@@ -13,8 +13,8 @@ import pyopencl as cl
 from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
-from clfractal.voxels.lattice import BRICK_STRIDE, EXTENT, Lattice, Places
-from clfractal.voxels.octree import levels
+from clfractal.voxels.lattice import BRICK_STRIDE, EXTENT, Lattice, Places, pack_places
+from clfractal.voxels.octree import empty_cubes, touched
 from clfractal.voxels.pool import allocate, plan_pools
 from clfractal.voxels.programs import Built
 
@@ -58,13 +58,15 @@ def store(
     keep: Built,
     stats: GridStats,
     tell: Callable[[str, int, int], None],
+    show_outside: bool = False,
     refine: Built | None = None,
     constants: Sequence[cl.Buffer] = (),
 ) -> Grid:
     """The grid of evaluated bricks. Those outside as a whole are left out, those inside as a whole share a slot.
 
-    `classify` finds them; without it every brick is kept. `refine` replaces normals at the surface, with the formula's
-    `constants`.
+    `classify` finds them; without it every brick is kept. With `show_outside` those outside as a whole share a slot, too,
+    but for those that touch the surface's bricks: they are stored for their normals, which reach that far. `refine`
+    replaces normals at the surface, with the formula's `constants`.
 
     Raises:
         DeviceError: status 2 if what is kept does not fit.
@@ -98,7 +100,8 @@ def store(
         with device.failures("looking at bricks"):
             cl.enqueue_copy(device.queue, classes, found)
     solid_slot = 0 if classify is not None else None
-    first_slot = 0 if solid_slot is None else 1
+    outside_slot = 1 if classify is not None and show_outside else None
+    first_slot = sum(slot is not None for slot in (solid_slot, outside_slot))
     mixed = np.flatnonzero(within & (classes == MIXED))
     full = evaluated.full[(evaluated.full < np.array(lattice.bricks)).all(axis=1)]
     solid = np.concatenate([evaluated.at[within & (classes == INSIDE)], full])
@@ -107,9 +110,16 @@ def store(
     entries = np.full((bz, by, bx), -1, np.int32)
     entries[stored[:, 2], stored[:, 1], stored[:, 0]] = first_slot + np.arange(len(mixed), dtype=np.int32)
     entries[solid[:, 2], solid[:, 1], solid[:, 0]] = 0
-    entries = levels(entries)
+    places = evaluated.places[mixed]
+    if outside_slot is not None:
+        z, y, x = np.nonzero((entries < 0) & touched(entries >= first_slot))
+        entries[z, y, x] = first_slot + len(places) + np.arange(len(x), dtype=np.int32)
+        places = np.append(places, pack_places(x, y, z))
+        entries[entries < 0] = outside_slot
+    entries = empty_cubes(entries)
 
-    slots = first_slot + len(mixed)
+    count = len(places)
+    slots = first_slot + count
     sizes = (SAMPLE_BYTES[kept], 4)
     others = evaluated.samples.size + 4 * entries.size
     layout = plan_pools(device, slots, sizes, others, f"a grid with {slots} stored bricks")
@@ -119,8 +129,9 @@ def store(
     with device.failures("storing the grid"):
         cl.enqueue_copy(device.queue, table, entries.reshape(-1))
     if solid_slot is not None:
-        _store_solid(device, values[0], normals[0], kept)
-    places = evaluated.places[mixed]
+        _store_whole(device, values[0], normals[0], kept, solid_slot, inside=True)
+    if outside_slot is not None:
+        _store_whole(device, values[0], normals[0], kept, outside_slot, inside=False)
     for (first, after), value_part, normal_part in zip(layout.ranges(), values, normals, strict=True):
         low, high = max(first - first_slot, 0), after - first_slot
         if high <= low:
@@ -148,7 +159,7 @@ def store(
             doing="storing the grid",
             group=keep.group,
             first_part=1024,
-            done=partial(_tell_from, tell, "store", low, len(mixed)),
+            done=partial(_tell_from, tell, "store", low, count),
         )
         if refine is not None:
             with device.failures("finding normals"):
@@ -163,18 +174,29 @@ def store(
                 doing="finding normals",
                 group=refine.group,
                 first_part=16,
-                done=partial(_tell_from, tell, "normals", low, len(mixed)),
+                done=partial(_tell_from, tell, "normals", low, count),
             )
     stats = replace(
         stats,
-        stored_bricks=len(mixed),
+        stored_bricks=count,
         solid_bricks=len(solid),
         pool_bytes=sum(buffer.size for buffer in (*values, *normals, table)),
         store_ms=milliseconds,
         normals_ms=refining,
     )
     return Grid(
-        lattice, kept, range, device, layout, entries, table, values, normals, solid_slot, stats=stats
+        lattice,
+        kept,
+        range,
+        device,
+        layout,
+        entries,
+        table,
+        values,
+        normals,
+        solid_slot,
+        outside_slot,
+        stats=stats,
     )
 
 
@@ -205,10 +227,12 @@ def extent_buffer(
     return buffer
 
 
-def _store_solid(device: Device, values: cl.Buffer, normals: cl.Buffer, kept: Kind) -> None:
-    """The slot 0: inside as a whole, without normals."""
-    value = np.full(BRICK_STRIDE, 255 if kept == "byte" else 1, DTYPES[kept])
-    normal = np.full((BRICK_STRIDE, 4), (NO_NORMAL, NO_NORMAL, NO_NORMAL, 255), np.uint8)
+def _store_whole(
+    device: Device, values: cl.Buffer, normals: cl.Buffer, kept: Kind, slot: int, *, inside: bool
+) -> None:
+    """A slot that bricks share: inside or outside as a whole, without normals."""
+    value = np.full(BRICK_STRIDE, (255 if kept == "byte" else 1) if inside else 0, DTYPES[kept])
+    normal = np.full((BRICK_STRIDE, 4), (NO_NORMAL, NO_NORMAL, NO_NORMAL, 255 if inside else 0), np.uint8)
     with device.failures("storing the grid"):
-        cl.enqueue_copy(device.queue, values, value)
-        cl.enqueue_copy(device.queue, normals, normal)
+        for buffer, samples in ((values, value), (normals, normal)):
+            cl.enqueue_copy(device.queue, buffer, samples, dst_offset=slot * samples.nbytes)

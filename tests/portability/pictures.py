@@ -2,7 +2,8 @@
 
 They reach what a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of
 four numbers, the scalar derivative and the full Jacobian, shadows of both kinds of light, several samples; and
-what stills add: the points of a pixel, the search by steps, every kind of ray, a lens and fog.
+what stills add: the points of a pixel, the search by steps, every kind of ray, a lens and fog; a grid that is filled
+and shown as a cloud around a cut plane, and a plane by itself.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from clfractal.render import engine
 from clfractal.render.film import Film
 from clfractal.render.plan import make_plan
 from clfractal.scene.load import load_scene
+from clfractal.scene.surface import SurfaceRenderer
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 
@@ -40,20 +42,26 @@ _SCENES: dict[str, str] = {
     "kaleidoscope": "{name: kaleidoscopic_ifs, iterations: 10}",
     "still": "{name: hast, iterations: 8}",
     "steps": "{name: mandelbulb, iterations: 5}",
+    "cloud": "{name: mandelbulb, iterations: 5}",
+    "plane": "{name: hast, iterations: 60}",
 }
 _RENDERERS = {
     "still": "{samples: 2, points: {}, normal: least_squares, ambient_occlusion: {rays: 2}, bounces: 1,"
     " filter: tent}",
     "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
+    "cloud": "{type: volume, resolution: 12, value: iterations, normals: exact,"
+    " transfer: {opacity: [{at: 1, opacity: 0}, {at: 5, opacity: 0.1}]}}",
+    "plane": "{type: cut_plane, plane: {normal: [0.2, 0.3, 1], width: 3, height: 3}, samples: 2}",
 }
 _MORE = {
     "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\nfog: {density: 0.05}\n",
     "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n",
+    "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
 _LENSES = {"still": ", f_number: 0.5"}
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
-_TINY = ("mandelbulb", "hast", "mandelbox")
+_TINY = ("mandelbulb", "hast", "mandelbox", "cloud")
 
 SIZE, TINY_SIZE = (96, 72), (12, 8)
 
@@ -82,7 +90,7 @@ def picture(
     plan = make_plan(scene, precision=precision, lanes=lanes, channels=CHANNELS)
     film = Film(plan.channels, size, plan.region)
     engine.render(scene, plan, device, film)
-    if scene.surface.search == "steps":
+    if isinstance(scene.renderer, SurfaceRenderer) and scene.renderer.search == "steps":
         # A binary search down to the last digit takes a step more or less where that digit differs.
         film["steps"][:] = 0
     return np.stack([film[channel] for channel in CHANNELS])

@@ -27,6 +27,7 @@ def plane_scene(
     *,
     iterations: int = 64,
     plane: Mapping[str, Any] | None = None,
+    plane_iterations: int | None = None,
     **renderer: Any,
 ) -> Scene:
     """A cut plane of a formula: a name of the library, a `formula` section, or a whole formula."""
@@ -39,7 +40,12 @@ def plane_scene(
             "formula": {"iterations": iterations, **section},
             "image": {"width": size[0], "height": size[1]},
             "camera": {},
-            "renderer": {"type": "cut_plane", "plane": dict(plane or {}), **renderer},
+            "renderer": {
+                "type": "cut_plane",
+                "plane": dict(plane or {}),
+                "iterations": plane_iterations,
+                **renderer,
+            },
         }
     )
 

@@ -53,7 +53,7 @@ class TestMandelbrot:
     ) -> None:
         if precision == "float64" and not has_float64(device.info):
             return
-        size = (192, 192) if iterations < 1000 else (64, 64)
+        size = (96, 96) if iterations < 1000 else (40, 40)
         scene = plane_scene(size=size, iterations=iterations, plane=plane, colors=STEPPED)
         film = shoot(scene, device, precision)
         points = pixel_points(scene).astype(np.longdouble)
@@ -87,6 +87,20 @@ class TestMandelbrot:
         certain = sure(film["P.X"].astype(float), film["P.Y"].astype(float), 200, NUDGE["float32"])
         assert same[certain].all()
         assert same.mean() > 0.999
+
+
+class TestIterations:
+    @pytest.mark.parametrize("curve", ["linear", "log"])
+    def test_the_plane_has_a_limit_of_its_own(self, device: Device, curve: str) -> None:
+        """Counts, the inside and the colours are those of a formula with that limit."""
+        colors = {"mode": "stepped", "curve": curve}
+        own = plane_scene(size=(48, 48), iterations=9, plane=WHOLE, colors=colors, plane_iterations=70)
+        whole = plane_scene(size=(48, 48), iterations=70, plane=WHOLE, colors=colors)
+        film = shoot(own, device)
+        assert stacked(film).tobytes() == stacked(shoot(whole, device)).tobytes()
+        assert film["iterations"].max() == 70
+        short = shoot(plane_scene(size=(48, 48), iterations=9, plane=WHOLE, colors=colors), device)
+        assert short["iterations"].max() == 9
 
 
 class TestChannels:
@@ -227,7 +241,7 @@ class TestSamples:
 
     def test_noise_sends_samples_to_the_edge(self, device: Device) -> None:
         plane = {"center": [0, 0, 0.6], "width": 2, "height": 2}
-        keys = {"samples": 256, "noise": 0.02, "min_samples": 8, "filter": "tent"}
+        keys: dict[str, Any] = {"samples": 256, "noise": 0.02, "min_samples": 8, "filter": "tent"}
         film = shoot(
             plane_scene(BALL, (40, 40), iterations=4, plane=plane, colors=WHITE_DISK, **keys), device
         )

@@ -75,6 +75,20 @@ def test_views_beside_each_other(device: Device) -> None:
     check(stacked(film), scene, [(0, 0, 28, 50), (31, 0, 28, 50), (62, 0, 29, 50)], device)
 
 
+def test_a_plane_by_itself_has_no_other_planes_in_it(device: Device) -> None:
+    """The scene's planes stand in the views of its object, not in that of a plane; one that asks for some is wrong."""
+    glass = [{"plane": {"normal": [0, -1, 0.3], "width": 2}, "opacity": 0.6}]
+    scene = scene_of(VIEWS[:2])
+    scene = load_scene({**scene.resolved(), "cut_planes": glass})
+    assert [len(view.cut_planes) for view, _ in scene.views] == [1, 0]
+    film = stacked(shoot(scene, device))
+    bare = stacked(shoot(scene_of(VIEWS[:2]), device))
+    np.testing.assert_array_equal(film[:, 45:].view(np.uint32), bare[:, 45:].view(np.uint32))
+    assert (film[:, :45] != bare[:, :45]).any()
+    with pytest.raises(SceneError, match=r"^layout\.views\.0\.cut_planes: are for surface and volume"):
+        scene_of([{**VIEWS[1], "cut_planes": glass}])
+
+
 def test_a_region_is_the_part_of_the_whole(device: Device) -> None:
     scene = scene_of(VIEWS, gap=3)
     whole = stacked(shoot(scene, device))

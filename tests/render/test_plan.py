@@ -131,3 +131,19 @@ def test_what_a_plan_takes_from_the_scene() -> None:
     assert (plan.samples, plan.channels, plan.region) == (2, ("R",), Region(1, 2, 3, 4))
     with pytest.raises(SceneError, match="channel"):
         make_plan(scene, precision="float32", lanes=4, channels=("R", "Q"))
+
+
+def test_cut_planes_in_a_zoomed_volume_have_pixels() -> None:
+    """Voxels may be coarse where pixels of a plane are fine: after a zoom of 3000 these are 28 steps of float32 wide."""
+    volume = {"type": "volume", "box": {"size": 3}, "resolution": 8}
+    zoom = [{"center": [0.5, 0, 0], "scale": 3000}]
+    cases: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {
+        "plain": (volume, [{}]),
+        "zoom": ({**volume, "zoom": zoom}, []),
+        "zoom and plane": ({**volume, "zoom": zoom}, [{}]),
+    }
+    found = {}
+    for name, (renderer, planes) in cases.items():
+        scene = scene_of(BALL, ORTHOGRAPHIC, (512, 512), renderer=renderer, cut_planes=planes)
+        found[name] = choose_precision(scene, "auto", has_float64=True)[0]
+    assert found == {"plain": "float32", "zoom": "float32", "zoom and plane": "float64"}

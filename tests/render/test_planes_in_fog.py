@@ -12,7 +12,16 @@ from clfractal.device.select import Device
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import BALL_RADIUS, ORTHOGRAPHIC, PERSPECTIVE, Floats, points_of, rays, shoot, stacked
-from tests.render.test_planes_in_picture import BACKGROUND, COLORS, LOOK, TINT, escape_tint, met, plane
+from tests.render.test_planes_in_picture import (
+    BACKGROUND,
+    COLORS,
+    LOOK,
+    TINT,
+    alpha_of,
+    escape_tint,
+    met,
+    plane,
+)
 from tests.render.volumes import keep, middles, to_box, value_at, volume_scene
 
 CORNER, VOXEL, SIDES = np.array([-1.0, -1.0, -1.0]), 0.0625, (32, 32, 32)
@@ -53,7 +62,7 @@ def expected(scene: Scene, values: Any) -> tuple[Floats, Floats, Any, Floats]:
             start, face_tint = t, tint
             behind = (np.linalg.norm(there, axis=-1) < BALL_RADIUS) & (np.abs(there).max(-1) < 1)
             sure &= (rim > 1e-4) & (np.abs(np.abs(there).max(-1) - 1) > 1e-4)
-        quads.append((np.where(seen, t, np.inf), each.opacity, tint))
+        quads.append((np.where(seen, t, np.inf), alpha_of(each, tint), tint))
     near, far = to_box(origin, direction, CORNER, VOXEL * np.array(SIDES))
     near = np.maximum(near, start)
     step = 0.5 * VOXEL
@@ -112,6 +121,19 @@ def test_quads_in_fog(device: Device, tmp_path: Path, camera: str, cut: bool) ->
         face = sure & found & (np.abs(film["iterations"] - 8) < 1e-6)
         np.testing.assert_allclose(stacked(film, "RGB")[face & (coverage == 1)].max(), 0.9, atol=1e-4)
         assert (np.abs(stacked(film, "RGB") - np.array(COLORS["inside"])).max(-1) < 1e-4).sum() > 150
+
+
+def test_quads_at_one_distance_in_fog(device: Device, tmp_path: Path) -> None:
+    """All of them are seen, the list's first in front, and the set on one is a hole in it."""
+    place = ([0.1, 0.1, 0.05], [0.1, -1, 0.2])
+    scene, values = fog_scene(
+        tmp_path, PERSPECTIVE, [plane(*place, 0.5, inside_opacity=0.0), plane(*place, 0.6)]
+    )
+    film = shoot(scene, device)
+    color, coverage, sure, _ = expected(scene, values)
+    assert sure.mean() > 0.8
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=3e-4)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=1e-3)
 
 
 def test_faint_fog_before_an_opaque_quad(device: Device, tmp_path: Path) -> None:

@@ -12,11 +12,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device
+from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
+from clfractal.render.plan import choose_precision
+from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import named_table
+from tests.render.planes import mandelbrot, sure
 from tests.render.shots import (
     BALL,
     BALL_ITERATIONS,
@@ -106,6 +109,12 @@ def escape_tint(scene: Scene, points: Floats, limit: int = BALL_ITERATIONS) -> t
     return tint.reshape(points.shape), rim.reshape(points.shape[:-1])
 
 
+def alpha_of(each: CutPlane, tint: Floats) -> Floats:
+    """A quad's opacity at points of these colours."""
+    inside = (tint == np.array(COLORS["inside"])).all(-1)
+    return np.where(inside & (each.inside_opacity is not None), each.inside_opacity or 0.0, each.opacity)
+
+
 def met(scene: Scene, index: int, number: int = 0) -> tuple[npt.NDArray[np.bool_], Floats, Floats]:
     """Which rays meet a plane's rectangle, at which distance; and how near to its rim, scene units."""
     origin, direction, _ = rays(scene)
@@ -136,9 +145,9 @@ def layered(scene: Scene, renderer: str) -> tuple[Floats, Floats, npt.NDArray[np
             limit = each.iterations or BALL_ITERATIONS
             tint, rim = escape_tint(scene, origin + t[..., None] * direction, limit)
             sure &= (~seen | (rim > 1e-4)) & (room > 1e-4) & (~seen | (np.abs(t - ball) > slack))
-            layers.append((np.where(seen, t, 1e9), seen * each.opacity, tint))
+            layers.append((np.where(seen, t, 1e9), seen * alpha_of(each, tint), tint))
     depth = np.stack([layer[0] for layer in layers])
-    order = np.argsort(depth, axis=0)
+    order = np.argsort(depth, axis=0, kind="stable")
     through, color = np.ones(nearest.shape), np.zeros((*nearest.shape, 3))
     for rank in order:
         alpha = np.take_along_axis(np.stack([layer[1] for layer in layers]), rank[None], 0)[0]
@@ -201,6 +210,54 @@ def test_several_quads_by_depth(device: Device, renderer: str, side: int) -> Non
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize("opacities", [(0.3, 0.9), (0.0, 1.0), (0.6, 0.0)])
+def test_the_set_on_a_plane_has_its_own_opacity(
+    device: Device, renderer: str, opacities: tuple[float, float]
+) -> None:
+    """A disc of the ball's planes on the glass: opaque in clear glass, alone, or a hole."""
+    outside, inside = opacities
+    planes = [plane([0.0, -1.0, 0.05], [0.1, -1, 0.1], outside, inside_opacity=inside, iterations=2)]
+    scene = picture(renderer, PERSPECTIVE, planes, iterations=BALL_ITERATIONS)
+    film = shoot(scene, device)
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > 0.8
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    # A quad that stops half of the light or more is what the data channels tell of, where it does.
+    seen, t, _ = met(scene, 0)
+    origin, direction, _ = rays(scene)
+    tint, _ = escape_tint(scene, origin + t[..., None] * direction, 2)
+    front = seen & (t < to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)[0])
+    disc = front & sure & (tint == np.array(COLORS["inside"])).all(-1)
+    assert disc.sum() > 100
+    on_plane = np.abs(film["iterations"] - 2) < 1e-6
+    if outside < 0.5:
+        assert on_plane[disc].all()
+        assert not on_plane[~seen & sure & np.isfinite(film["Z"])].any()
+    else:
+        assert not on_plane[disc].any()
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
+def test_quads_at_one_distance(device: Device, renderer: str) -> None:
+    """All are seen, the list's first in front."""
+    place = ([0.0, -1.3, 0.1], [0.1, -1, 0.1])
+    planes = [
+        plane(*place, 0.5, iterations=3),
+        plane(*place, 0.4, iterations=5, width=1.2),
+        plane(*place, 0.7, iterations=8),
+        plane([0, 1.3, 0], [0, -1, 0.2], 1.0),
+    ]
+    scene = picture(renderer, PERSPECTIVE, planes)
+    film = shoot(scene, device)
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > 0.7
+    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    assert {0.85, 0.91, 1.0} <= set(np.round(coverage[sure], 4).tolist())
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
 def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> None:
     scene = picture(
         renderer, PERSPECTIVE, [plane([0, -1.3, 0], [0, -1, 0], 0.0), plane([0, 0, 0], [1, 0, 0], 0)]
@@ -211,6 +268,41 @@ def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> N
     hit = np.isfinite(without["Z"])
     np.testing.assert_array_equal(np.isfinite(with_planes["Z"]), hit)
     np.testing.assert_allclose(with_planes["Z"][hit], without["Z"][hit], atol=1e-5)
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_a_plane_in_a_deep_zoom(device: Device, cut: bool) -> None:
+    """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count."""
+    if not has_float64(device.info):
+        return
+    x, y = -0.743643887037151, 0.131825904205330
+    scene = load_scene(
+        {
+            "version": 1,
+            "formula": {"name": "hast", "iterations": 3000},
+            "image": {"width": 40, "height": 40},
+            "camera": {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 4},
+            "renderer": {
+                "type": "volume",
+                "box": {"size": 4},
+                "resolution": 4,
+                "zoom": [{"center": [x, y, 0], "scale": 4e8}],
+                "transfer": {"opacity": [{"at": 0, "opacity": 0}]},
+            },
+            "cut_planes": [
+                {"plane": {"width": 4, "height": 4}, "opacity": 1, "cut": cut, "colors": {"mode": "stepped"}}
+            ],
+        }
+    )
+    precision, remark = choose_precision(scene, "auto", has_float64=True)
+    assert (precision, remark) == ("float64", "")
+    film = shoot(scene, device, precision)
+    points = (rays(scene)[0] / 4e8 + np.array([x, y, 0])).astype(np.longdouble)
+    certain = sure(points[..., 0], points[..., 1], 3000, 4 * 2.0**-52)
+    count, _ = mandelbrot(points[..., 0], points[..., 1], 3000)
+    assert certain.mean() > 0.9
+    np.testing.assert_array_equal(film["iterations"][certain], count[certain])
+    assert len(np.unique(count[certain])) > 20
 
 
 CUT_CENTER, CUT_NORMAL = np.array([0.1, -0.35, 0.15]), np.array([0.3, -1.0, 0.4])

@@ -213,6 +213,10 @@ def test_distances_in_float32(name: str) -> None:
     agree(found.full, found.normal, expected, gradient, 2e-3)
     assert ((found.smooth >= 0) & (found.smooth <= 5 + EXTRA_APPLICATIONS)).all()
     np.testing.assert_array_equal(found.inside, found.full == 0)
+    assert found.inside.any()
+    length = np.linalg.norm(found.normal, axis=1)
+    assert not length[found.inside].any()
+    np.testing.assert_allclose(length[~found.inside], 1, atol=1e-5)
 
 
 def test_no_point_gives_nan() -> None:

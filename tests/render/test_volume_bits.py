@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device
+from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes, best_lanes
 from clfractal.files.volume import Volume, write_volume
 from clfractal.render import engine, loop
@@ -83,6 +83,12 @@ def test_other_lane_counts(
     for lanes in counts.intersection(accepted_lanes(device, "float32")):
         if lanes != best_lanes(device, "float32"):
             close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
+
+
+def test_float64_shows_the_same(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
+    """With cut planes the rays have the number type of the fill; what they see is the same."""
+    if has_float64(device.info):
+        close(stacked(shoot(SCENES["surface"], device, "float64")), wholes["surface"])
 
 
 @pytest.mark.parametrize("parts", [2, 4])

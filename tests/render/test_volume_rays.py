@@ -10,7 +10,10 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels.fill import fill_grid
 from tests.render.shots import (
+    BALL_RADIUS,
     CHANNELS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
@@ -23,7 +26,7 @@ from tests.render.shots import (
     to_sphere,
     view_of,
 )
-from tests.render.volumes import FLAT, SIDES, composited, keep, middles, to_box, volume_scene
+from tests.render.volumes import FLAT, LIT, SIDES, composited, keep, middles, to_box, volume_scene
 
 CORNER, VOXEL = np.array([-1.15, -1.45, -1.1]), 0.0625
 CENTER, RADIUS = np.array([0.1, 0.05, -0.1]), 0.8
@@ -207,6 +210,74 @@ def test_normals_of_fog_are_those_of_its_surface(device: Device, folder: Path) -
     assert faint.any()
     assert np.isposinf(film["Z"][faint]).all()
     assert not points_of(film)[faint].any()
+
+
+OUTSIDE = {
+    "inside": [{"at": 0, "opacity": 0.03}, {"at": 1, "opacity": 0}],
+    # (0 is an entry of the table.)
+    "coverage": [{"at": -2, "opacity": 0}, {"at": 0, "opacity": 0.04}, {"at": 1, "opacity": 0.02}],
+}
+
+
+@pytest.mark.parametrize("value", OUTSIDE)
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_fog_outside_of_a_filled_grid(device: Device, camera: str, value: str) -> None:
+    """Places outside have a value like others: nothing of the box is missing, and no brick of fog."""
+    transfer = {"opacity": OUTSIDE[value]}
+    scene = volume_scene(
+        CAMERAS[camera], value=value, resolution=60, box={"size": 3}, transfer=transfer, opacity_limit=1
+    )
+    film = shoot(scene, device)
+    corner, voxel = np.full(3, -1.5), 0.05
+    if value == "inside":
+        values = np.linalg.norm(middles((60, 60, 60), corner, [voxel] * 3), axis=-1) < BALL_RADIUS
+    else:
+        thirds = (np.arange(180) + 0.5) / 180 * 3 - 1.5
+        z, y, x = np.meshgrid(thirds, thirds, thirds, indexing="ij")
+        points = (x * x + y * y + z * z < BALL_RADIUS**2).reshape(60, 3, 60, 3, 60, 3)
+        values = np.rint(255 * points.mean(axis=(1, 3, 5))) / 255
+    color, opacity = composited(scene, values, corner, [voxel] * 3, look_of(transfer))
+    assert opacity.min() > 0.3
+    # A few voxels at the surface are another's by rounding.
+    off = np.abs(film["A"] - opacity)
+    assert np.quantile(off, 0.95) < ROUNDING
+    assert off.max() < 0.01
+    np.testing.assert_allclose(stacked(film, "RGB"), color, atol=0.01)
+
+
+def test_fog_outside_is_lit_as_that_of_a_file(device: Device, tmp_path: Path) -> None:
+    """The same voxels, all of them stored: the same normals, if a brick has surface or only touches one that has."""
+    look: dict[str, Any] = {
+        "value": "coverage",
+        "resolution": 60,
+        "box": {"size": 3},
+        "normal_radius": 2,
+        "step": 1,
+    }
+    fog = [{"at": 0, "opacity": 0.05}, {"at": 1, "opacity": 0}]
+    scene = volume_scene(PERSPECTIVE, look=LIT, transfer={"opacity": fog}, **look)
+    own = shoot(scene, device)
+    assert isinstance(scene.renderer, VolumeRenderer)
+    grid = fill_grid(scene, scene.renderer, device, lanes=1, precision="float32")
+    assert grid.outside_slot is not None
+    assert (grid.table_entries >= 0).all()
+    assert (grid.table_entries == grid.outside_slot).sum() > 50
+    keep(tmp_path / "all.nrrd", grid.dense(), grid.corner, grid.spacing)
+    bytes_fog = [{"at": 0, "opacity": 0.05}, {"at": 255, "opacity": 0}]
+    other = shoot(
+        volume_scene(
+            PERSPECTIVE,
+            look=LIT,
+            folder=tmp_path,
+            file="all.nrrd",
+            transfer={"opacity": bytes_fog},
+            normal_radius=2,
+            step=1,
+        ),
+        device,
+    )
+    assert own["A"].max() > 0.5
+    np.testing.assert_allclose(stacked(own, "RGBA"), stacked(other, "RGBA"), atol=2e-5)
 
 
 def test_the_opacity_limit_ends_rays(device: Device, folder: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from clfractal.device.select import Device
 from tests.render.shots import (
+    BALL,
     BALL_RADIUS,
     CHANNELS,
     ORTHOGRAPHIC,
@@ -46,6 +47,48 @@ def lit(points: Floats, normals: Floats, to_viewer: Floats, tint: Any) -> Floats
         body = tint * (0.1 + 0.7 * np.maximum(facing, 0)) + 0.2 * highlight * (facing > 0)
         total += np.array(light.get("color", [1, 1, 1])) * body
     return total
+
+
+@pytest.mark.parametrize("level", [None, 0.6, -0.2])
+@pytest.mark.parametrize("dtype", [np.float32, np.int16, np.uint8])
+def test_the_radius_follows_the_level(
+    device: Device, tmp_path: Path, dtype: Any, level: float | None
+) -> None:
+    """Values are distances from the middle, negated: each level is a sphere. As of a scan, they may be whole numbers."""
+    corner, voxel = np.full(3, -1.5), 0.0625
+    depth = -np.linalg.norm(middles((48, 48, 48), corner, [voxel] * 3), axis=-1)
+    scale, zero = {np.float32: (1, 0), np.int16: (1000, 1500), np.uint8: (90, 255)}[dtype]
+    values = (scale * depth + zero).round(6 if dtype == np.float32 else 0).astype(dtype)
+    keep(tmp_path / "depth.nrrd", values, corner, [voxel] * 3)
+    wanted = None if level is None else float(scale * (level - 1) + zero)
+    scene = volume_scene(PERSPECTIVE, folder=tmp_path, file="depth.nrrd", level=wanted)
+    film = shoot(scene, device)
+    low, high = float(values.min()), float(values.max())
+    radius = 1 - level if level is not None else (zero - (low + high) / 2) / scale
+    found = np.linalg.norm(points_of(film), axis=-1)[film["A"] == 1]
+    assert len(found) > 100
+    # Between voxels, along a straight line, a distance is met to voxel^2 / (8 radius); rounding moves it by half a value.
+    assert np.abs(found - radius).max() < 0.0035 / radius + 0.5 / scale * (dtype != np.float32)
+
+
+@pytest.mark.parametrize("store", ["byte", "float"])
+def test_a_level_of_counts(device: Device, store: str) -> None:
+    """Of z^2 the smooth count at radius r is log2(log R / log r): a level is a sphere."""
+    level = 3.25
+    scene = volume_scene(
+        ORTHOGRAPHIC,
+        box={"size": 5},
+        resolution=96,
+        value="iterations",
+        store=store,
+        level=level,
+        formula={**BALL, "distance_bailout": 100},
+    )
+    radius = 100 ** (2.0**-level)
+    film = shoot(scene, device)
+    found = np.linalg.norm(points_of(film), axis=-1)[film["A"] == 1]
+    assert len(found) > 500
+    assert np.abs(found - radius).max() < (0.01 if store == "float" else 0.03)
 
 
 PHONG = {"ambient": 0.1, "diffuse": 0.7, "specular": 0.2, "shininess": 32}

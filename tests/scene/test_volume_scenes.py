@@ -74,6 +74,24 @@ CASES = [
         VOLUME + "resolution: 64}\ncoloring: {by: §iterations}",
         "coloring.by: must be solid or normal for a volume, got iterations; renderer.transfer.color colours values",
     ),
+    # The level of a surface.
+    (
+        VOLUME + "level: §0}",
+        "renderer.level: must be above 0 and at most 1, the ends of the grid's values, got 0",
+    ),
+    (
+        VOLUME + "level: §1.5, value: coverage}",
+        "renderer.level: must be above 0 and at most 1, the ends of the grid's values, got 1.5",
+    ),
+    (
+        "renderer: {type: volume, value: iterations, level: §30.5}",
+        "renderer.level: must be above 0 and at most 30, the ends of the grid's values, got 30.5",
+    ),
+    (
+        VOLUME + "level: §0.5, transfer: {opacity: [{at: 0, opacity: 0}]}}",
+        "renderer.level: is of a surface, and transfer.opacity shows all values; remove one of them",
+    ),
+    (VOLUME + "level: §.nan}", "renderer.level: must be a finite number, got .nan"),
     # Cut planes.
     (
         PLANE + "colors: {palette: §magmaa}}]",
@@ -144,6 +162,15 @@ def test_files(folder: Path, name: str, message: str) -> None:
     found = error_of(text, folder=folder)
     assert found.startswith(f"{place}: renderer.file: ")
     assert message in found
+
+
+def test_a_level_beyond_a_files_values(folder: Path) -> None:
+    """The file's values are all 0, which counts as a range of 1 around it."""
+    for level in ("-0.5", "0.75", "300"):
+        text, place = marked(f"{HEAD}{VOLUME}file: good.nrrd, level: §{level}}}\n")
+        expected = f"must be above -0.5 and at most 0.5, the ends of the grid's values, got {level}"
+        assert error_of(text, folder=folder) == f"{place}: renderer.level: {expected}"
+    assert load_scene(f"{HEAD}{VOLUME}file: good.nrrd, level: 0.25}}\n", folder=folder).given is not None
 
 
 def test_a_file_is_not_zoomed(folder: Path) -> None:
@@ -230,6 +257,7 @@ cut_planes = st.lists(
         plane=planes,
         colors=colors,
         opacity=fraction,
+        inside_opacity=st.none() | fraction,
         cut=st.booleans(),
         iterations=st.none() | st.integers(1, 1_000_000),
         count=st.integers(1, 16),
@@ -264,12 +292,16 @@ volumes = st.builds(
     side | st.lists(side, min_size=3, max_size=3),
     zooms,
 )
-cuts = st.fixed_dictionaries({"type": st.just("cut_plane")}, optional={"plane": planes, "colors": colors})
+cuts = st.fixed_dictionaries(
+    {"type": st.just("cut_plane")},
+    optional={"plane": planes, "colors": colors, "iterations": st.none() | st.integers(1, 1_000_000)},
+)
 views = st.lists(
     st.builds(
         lambda looks, area: {**looks, **({"area": area} if area else {})},
         st.builds(lambda renderer, others: {"renderer": renderer, "cut_planes": others}, volumes, cut_planes)
         | cuts.map(lambda renderer: {"renderer": renderer, "cut_planes": []})
+        | cuts.map(lambda renderer: {"renderer": renderer})
         | optional(camera=st.just({"position": [1, 2, 3]}), background=st.just("transparent")),
         st.none() | st.sampled_from([[0, 0, 1, 1], [0.25, 0.5, 0.5, 0.3]]),
     ),

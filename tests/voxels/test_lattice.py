@@ -24,7 +24,7 @@ from clfractal.voxels.lattice import (
     pack_places,
     unpack_places,
 )
-from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, levels
+from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, empty_cubes
 from tests.voxels.grids import device
 
 
@@ -114,28 +114,41 @@ def test_descending_finds_the_bricks_that_hold_something(
         np.int32, arrays.array_shapes(min_dims=3, max_dims=3, max_side=9), elements=st.integers(-1, 1)
     )
 )
-def test_levels_against_their_definition(table: npt.NDArray[np.int32]) -> None:
-    found = levels(table)
+def test_empty_cubes_against_their_definition(table: npt.NDArray[np.int32]) -> None:
+    found = empty_cubes(table)
     for place, entry in np.ndenumerate(table):
         if entry >= 0:
             assert found[place] == entry
             continue
-        level = -1 - int(found[place])
-        expected = 0
-        while 1 << expected < max(table.shape):
-            side = 2 << expected
-            node = tuple(slice(p // side * side, p // side * side + side) for p in place)
-            if (table[node] >= 0).any():
-                break
-            expected += 1
-        assert level == expected
+        sides = -1 - int(found[place])
+        for octant in range(8):
+            side, expected = 1, 0
+            # Of the array's axes the last is x, the lowest bit.
+            while side < max(table.shape):
+                cube = tuple(
+                    slice(max(p + 1 - 2 * side, 0), p + 1)
+                    if octant >> (2 - axis) & 1
+                    else slice(p, p + 2 * side)
+                    for axis, p in enumerate(place)
+                )
+                if (table[cube] >= 0).any():
+                    break
+                side, expected = 2 * side, expected + 1
+            digits = [sides >> (octant + 8 * i) & 1 for i in range(3)]
+            assert sum(digit << i for i, digit in enumerate(digits)) == expected
 
 
-def test_levels_are_quick() -> None:
+def test_empty_cubes_of_a_long_grid() -> None:
+    """A side has three bits: at most 128 bricks."""
+    found = empty_cubes(np.full((1, 1, 700), -1, np.int32))
+    assert (found == -1 - 0xFFFFFF).all()
+
+
+def test_empty_cubes_are_quick() -> None:
     table = np.where(np.random.default_rng(0).random((64, 64, 64)) < 0.02, 1, -1).astype(np.int32)
-    levels(table)
+    empty_cubes(table)
     start = time.process_time()
-    levels(table)
+    empty_cubes(table)
     # A tenth of this is usual.
     assert time.process_time() - start < 0.1
 

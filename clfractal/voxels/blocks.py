@@ -1,0 +1,50 @@
+"""Which parts of a grid's stored bricks may be seen: the octree's last levels, for values that are above a given one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pyopencl as cl
+
+from clfractal.device.launch import run_in_parts
+from clfractal.voxels.grid import Grid
+from clfractal.voxels.programs import blocks_recipe, build_all
+
+BLOCK_BYTES = 8
+
+
+def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | None = None) -> cl.Buffer:
+    """A bit for each block of 2 x 2 x 2 cells of each slot: whether any of its 27 samples is above `unseen`.
+
+    Args:
+        grid: the grid.
+        unseen: as samples are kept, 0 to 255 of `byte`. A sample that is not a number counts as above.
+        on_compile: told a line if the program is compiled first.
+
+    Returns:
+        Eight bytes a slot, on the grid's device: for each octant of 4 x 4 x 4 cells, x fastest, then y, then z, a byte
+        whose bits are its blocks in the same order.
+
+    Raises:
+        DeviceError: status 2 if there is no room, 3 if the device failed.
+        KernelBuildError: the program does not compile.
+    """
+    device = grid.device
+    built = build_all(device, [blocks_recipe(grid.kind)], on_compile)[0]
+    blocks = device.buffer(BLOCK_BYTES * grid.layout.slots, "what is seen of bricks")
+    for values, (first, after) in zip(grid.values, grid.layout.ranges(), strict=True):
+        with device.failures("looking at bricks"):
+            built.kernel.set_args(
+                blocks, values, np.int32(0), np.int32(after - first), np.int32(first), np.float32(unseen)
+            )
+        run_in_parts(
+            device,
+            built.kernel,
+            2,
+            after - first,
+            doing="looking at bricks",
+            group=built.group,
+            first_part=4096,
+        )
+    return blocks
