@@ -91,6 +91,31 @@ def comfort_of(scene: Scene, points: Floats) -> Comfort:
     return Comfort(nearest, farthest, float(ends[0]), float(ends[1]))
 
 
+def comfort_of_depth(
+    scene: Scene,
+    view: View,
+    depth: npt.NDArray[np.float32],
+    size: tuple[int, int],
+    origin: tuple[int, int] = (0, 0),
+) -> Comfort | None:
+    """The range of parallax of what one eye's picture shows, or some of its pixels; None where that is nothing.
+
+    Args:
+        scene: the stereo scene.
+        view, depth, size, origin: of the eye's picture, as of `points_of_depth`.
+    """
+    assert scene.stereo is not None
+    if scene.stereo.convergence == "toe_in":
+        points = points_of_depth(view, depth, size, origin)
+        return comfort_of(scene, points) if len(points) else None
+    # Of eyes that look straight on parallax follows from depth alone: two points tell of all.
+    nearest = float(np.where(depth > 0, depth, np.inf).min())
+    farthest = float(np.where(depth < np.inf, depth, 0).max())
+    if nearest == np.inf or farthest <= 0:
+        return None
+    return comfort_of(scene, view.origin + np.array([[nearest], [farthest]]) * view.axis)
+
+
 def measured(
     scene: Scene,
     device: Device,

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal import comfort
-from clfractal.comfort import Comfort, comfort_of, fitted, measured, points_of_depth
+from clfractal.comfort import Comfort, comfort_of, comfort_of_depth, fitted, measured, points_of_depth
 from clfractal.device.select import Device, choose
 from clfractal.render import engine
 from clfractal.render.stereo import degrees, eye_distance
@@ -114,6 +114,21 @@ class TestMeasured:
         part = film["Z"][30:60, 20:90]
         found = points_of_depth(scene_view(scene), part, SIZE, (20, 30))
         np.testing.assert_allclose(found, points_of(film)[30:60, 20:90][np.isfinite(part)], atol=1e-5)
+
+    @pytest.mark.parametrize("convergence", ["off_axis", "parallel", "toe_in"])
+    def test_a_pictures_depth_tells_what_its_points_do(self, device: Device, convergence: str) -> None:
+        """The range over all pixels, and over all of a part of them; of none there is no range."""
+        scene = seen("solids", convergence=convergence)
+        view = scene_view(scene.seen_by("left"))
+        depth = shoot(scene.seen_by("left"), device, channels=("Z",))["Z"]
+        for y, x, part in ((0, 0, depth), (30, 20, depth[30:60, 20:90])):
+            found = comfort_of_depth(scene, view, part, SIZE, (x, y))
+            assert found is not None
+            expected = comfort_of(scene, points_of_depth(view, part, SIZE, (x, y)))
+            for name in Comfort.__slots__:
+                assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-5)
+        for nothing in (np.inf, 0.0):
+            assert comfort_of_depth(scene, view, np.full((2, 3), nothing, np.float32), SIZE) is None
 
 
 class TestFitted:

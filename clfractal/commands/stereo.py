@@ -6,7 +6,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from clfractal.comfort import Comfort, comfort_of, measured, points_of_depth
+from clfractal.comfort import Comfort, comfort_of_depth, measured
 from clfractal.commands import stats
 from clfractal.commands.order import PARTIAL, Order
 from clfractal.commands.progress import Reporter
@@ -142,9 +142,9 @@ def _comfort(pair: Pair, films: dict[Side, JournalFilm]) -> Comfort | None:
     for side, film in films.items():
         view = scene_view(pair.eyes[side].scene)
         for row, band in film.bands():
-            points = points_of_depth(view, band["Z"], film.display, (film.region.x, row))
-            if len(points):
-                found.append(comfort_of(scene, points))
+            part = comfort_of_depth(scene, view, band["Z"], film.display, (film.region.x, row))
+            if part is not None:
+                found.append(part)
     return Comfort.joined(found)
 
 
