@@ -91,6 +91,31 @@ def comfort_of(scene: Scene, points: Floats) -> Comfort:
     return Comfort(nearest, farthest, float(ends[0]), float(ends[1]))
 
 
+def comfort_of_depth(
+    scene: Scene,
+    view: View,
+    depth: npt.NDArray[np.float32],
+    size: tuple[int, int],
+    origin: tuple[int, int] = (0, 0),
+) -> Comfort | None:
+    """The range of parallax of what one eye's picture shows, or some of its pixels; None where that is nothing.
+
+    Args:
+        scene: the stereo scene.
+        view, depth, size, origin: of the eye's picture, as of `points_of_depth`.
+    """
+    assert scene.stereo is not None
+    if scene.stereo.convergence == "toe_in":
+        points = points_of_depth(view, depth, size, origin)
+        return comfort_of(scene, points) if len(points) else None
+    # Of eyes that look straight on parallax follows from depth alone: two points tell of all.
+    nearest = float(np.where(depth > 0, depth, np.inf).min())
+    farthest = float(np.where(depth < np.inf, depth, 0).max())
+    if nearest == np.inf or farthest <= 0:
+        return None
+    return comfort_of(scene, view.origin + np.array([[nearest], [farthest]]) * view.axis)
+
+
 def measured(
     scene: Scene,
     device: Device,
@@ -98,21 +123,26 @@ def measured(
     shared: engine.Shared | None = None,
     on_compile: Callable[[str], None] | None = None,
 ) -> Comfort | None:
-    """The range of parallax in a stereo scene's picture, by a quick look at its depth; None where nothing is seen.
+    """The range of parallax in a stereo scene's picture, by a quick look of either eye; None where nothing is seen.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.
     """
-    views = [view for view, _ in scene.views] if scene.layout is not None else [scene]
     found = []
-    for view in views:
-        if isinstance(view.renderer, CutPlaneRenderer):
-            found.append(Comfort(0.0, 0.0, 0.0, 0.0))
-            continue
-        points = seen_points(view, device, shared=shared, on_compile=on_compile)
-        if len(points):
-            found.append(comfort_of(view, points))
+    for eye in _both(scene):
+        for view in [view for view, _ in eye.views] if eye.layout is not None else [eye]:
+            if isinstance(view.renderer, CutPlaneRenderer):
+                found.append(Comfort(0.0, 0.0, 0.0, 0.0))
+                continue
+            points = seen_points(view, device, shared=shared, on_compile=on_compile)
+            if len(points):
+                found.append(comfort_of(view, points))
     return Comfort.joined(found)
+
+
+def _both(scene: Scene) -> tuple[Scene, Scene]:
+    """A stereo scene as its left and its right eye see it: each looks around a thing on its own side."""
+    return scene.seen_by("left"), scene.seen_by("right")
 
 
 def seen_points(
@@ -122,7 +152,7 @@ def seen_points(
     shared: engine.Shared | None = None,
     on_compile: Callable[[str], None] | None = None,
 ) -> Floats:
-    """What the cyclopean eye sees, as points: shape (n, 3), scene units; of a picture at most 160 pixels wide and high.
+    """What a scene's eye sees, as points: shape (n, 3), scene units; of a picture at most 160 pixels wide and high.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.
@@ -181,17 +211,25 @@ def fitted(
     stereo = scene.stereo
     if stereo is None or stereo.fit is None:
         return scene
-    plain = _with(scene, fit=None)
-    points = seen_points(plain, device, shared=shared, on_compile=on_compile)
+    current = _with(scene, fit=None)
+    view = scene_view(current)
+    # First what the eye between the two sees, then what the two see that follow from it.
+    points = seen_points(current, device, shared=shared, on_compile=on_compile)
     if not len(points):
         raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))
-    view = scene_view(plain)
+    current = _fitted_to(current, stereo, view, points)
+    more = [seen_points(eye, device, shared=shared, on_compile=on_compile) for eye in _both(current)]
+    return _fitted_to(current, stereo, view, np.concatenate([points, *more]))
+
+
+def _fitted_to(scene: Scene, wanted: Stereo, view: View, points: Floats) -> Scene:
+    """A scene with the plane and the separation for points, shape (n, 3), before the eye of a view."""
     depths = (points - view.origin) @ view.axis
     ends = (float(depths.min()), float(depths.max()))
-    if stereo.plane is not None:
-        return _with(plain, separation=_separation(stereo, ends, eye_distance(view)))
-    distance = _balanced(stereo, ends)
-    return _with(plain, plane=_plane_at(view, distance), separation=_separation(stereo, ends, distance))
+    if wanted.plane is not None:
+        return _with(scene, separation=_separation(wanted, ends, eye_distance(view)))
+    distance = _balanced(wanted, ends)
+    return _with(scene, plane=_plane_at(view, distance), separation=_separation(wanted, ends, distance))
 
 
 def _with(scene: Scene, **changes: object) -> Scene:

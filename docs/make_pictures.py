@@ -15,7 +15,8 @@ Keys of the table:
       scene     a name of `scenes`
       set       dotted key: value, replaced in every panel
       panels    one mapping of dotted keys to values for each panel. With `show: samples` a panel shows that channel
-                instead of the colours: from none, dark, to `renderer.samples`, light
+                instead of the colours: from none, dark, to `renderer.samples`, light. With `show: left` or `right`
+                it shows what that eye sees of an anaglyph through its filter
       columns   panels in a row; all of them if not given
       size      width and height of a panel, pixels
       zoom      each pixel of a panel is shown as a square of so many; 1 if not given
@@ -29,7 +30,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +39,7 @@ from PIL import Image
 
 from clfractal.api import load_scene, render
 from clfractal.files.srgb import encode8
+from clfractal.render.anaglyph import filtered
 from clfractal.render.outputs import png_bytes
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES
@@ -48,6 +50,7 @@ TABLE = DOCS / "pictures.yaml"
 PICTURES = DOCS / "pictures"
 GAP = 6  # pixels between panels
 LARGEST_FILE = 300_000  # bytes
+Show = Literal["samples", "left", "right"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +58,8 @@ class Panel:
     """A scene, and what of it is shown."""
 
     scene: Scene
-    samples: bool  # how many samples each pixel took, instead of its colour
+    # `samples`: how many each pixel took, instead of its colour; `left`, `right`: through that eye's filter.
+    show: Show | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +112,11 @@ def _picture(name: str, row: Mapping[str, Any], scenes: Mapping[str, Any]) -> Pi
 
 def _panel(base: Mapping[str, Any], values: dict[str, Any]) -> Panel:
     show = values.pop("show", None)
-    if show not in (None, "samples"):
+    if show not in (None, "samples", "left", "right"):
         raise ValueError(f"{TABLE.name}: a panel cannot show {show!r}")
     # JSON is YAML, and has no line breaks or bare words that the shell form of a value could trip over.
     scene = load_scene(base, overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()])
-    return Panel(scene, samples=show == "samples")
+    return Panel(scene, show)
 
 
 def make_picture(picture: Picture) -> None:
@@ -127,8 +131,12 @@ def make_picture(picture: Picture) -> None:
     for index, panel in enumerate(picture.panels):
         film = render(panel.scene, channels=["R", "G", "B", "A", "samples"])
         seconds += film.header["seconds"]
-        if panel.samples:
+        if panel.show == "samples":
             shown = Image.fromarray(_heat(film["samples"] / np.float32(panel.scene.renderer.samples)))
+        elif panel.show is not None:
+            colors = np.stack([film[name] for name in "RGB"], axis=-1)
+            assert panel.scene.stereo is not None
+            shown = Image.fromarray(encode8(filtered(colors, panel.show, panel.scene.stereo.glasses)))
         else:
             with Image.open(io.BytesIO(png_bytes(film))) as shown:
                 shown.load()

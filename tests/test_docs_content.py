@@ -87,6 +87,8 @@ SECTIONS = {
     "fog": "Fog",
     "layout": "Layout",
     "layout.views": "LayoutView",
+    "stereo": "Stereo",
+    "stereo.plane": "StereoPlane",
     "output": "Output",
 }
 
@@ -127,7 +129,9 @@ def allowed(entry: dict[str, Any]) -> str:
     kind = entry.get("type")
     if kind == "array":
         if entry.get("prefixItems", [{}])[0].get("type") == "array":
-            return f"{len(entry['prefixItems'])} positions"
+            component = entry["prefixItems"][0]["prefixItems"][0]
+            kind = "positions" if component["minimum"] < 0 else f"colours, {interval(component)}"
+            return f"{len(entry['prefixItems'])} {kind}"
         if "prefixItems" in entry:
             return f"{len(entry['prefixItems'])} numbers, {interval(entry['prefixItems'][0])}"
         return f"a list of {entry.get('minItems', 0)} to {entry['maxItems']}"
@@ -375,7 +379,7 @@ def test_the_python_api_is_described() -> None:
         name for name in dir(clfractal) if not name.startswith("__") and f"`clfractal.{name}" not in page
     ]
     assert missing == []
-    for function in (api.render, api.escape):
+    for function in (api.render, api.render_pair, api.escape):
         told = {code(row[0]) for row in table("python.md", f"clfractal.{function.__name__}")}
         assert told == set(inspect.signature(function).parameters)
 

@@ -44,7 +44,7 @@ def test_its_page_shows_it(picture: Any) -> None:
 @each_picture
 def test_its_panels_differ(picture: Any) -> None:
     assert (
-        len({(str(panel.scene.resolved()), panel.samples) for panel in picture.panels})
+        len({(str(panel.scene.resolved()), panel.show) for panel in picture.panels})
         == len(picture.panels)
         > 1
     )

@@ -6,7 +6,7 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from clfractal.comfort import Comfort, comfort_of, measured, points_of_depth
+from clfractal.comfort import Comfort, comfort_of_depth, measured
 from clfractal.commands import stats
 from clfractal.commands.order import PARTIAL, Order
 from clfractal.commands.progress import Reporter
@@ -52,6 +52,8 @@ def render_stereo(
                 shell.say(f"{partial}: earlier work is dropped; --resume would continue it")
             films[side] = _open(pair, side, partial, resume=order.resume)
             left_open.callback(_leave, films[side])
+        if not order.resume:
+            _drop_second(outputs[0], partials, shell)
         reporter = Reporter(shell, pair.tiles)
         left_open.callback(reporter.close)
         shell.state = lambda: _interrupted(partials, films)
@@ -87,8 +89,20 @@ def render_stereo(
 
 def _partial(output: Path, side: Side, pair: Pair) -> Path:
     """Where one eye's unfinished work is kept: the first one's where that of a picture with one eye is."""
-    name = f"{output.name}{PARTIAL}" if side == next(iter(pair.eyes)) else f"{output.name}.{side}{PARTIAL}"
-    return output.with_name(name)
+    return output.with_name(f"{output.name}{PARTIAL}") if side == next(iter(pair.eyes)) else _second(output)
+
+
+def _second(output: Path) -> Path:
+    """Where the other eye's is kept, which of two is the right one."""
+    return output.with_name(f"{output.name}.right{PARTIAL}")
+
+
+def _drop_second(output: Path, partials: dict[Side, Path], shell: Shell) -> None:
+    """Removes what an earlier render of both eyes left of the right one, if this one needs no such file."""
+    stale = _second(output)
+    if stale.exists() and stale not in partials.values():
+        shell.say(f"{stale}: earlier work is dropped")
+        stale.unlink(missing_ok=True)
 
 
 def _open(pair: Pair, side: Side, partial: Path, *, resume: bool) -> JournalFilm:
@@ -128,9 +142,9 @@ def _comfort(pair: Pair, films: dict[Side, JournalFilm]) -> Comfort | None:
     for side, film in films.items():
         view = scene_view(pair.eyes[side].scene)
         for row, band in film.bands():
-            points = points_of_depth(view, band["Z"], film.display, (film.region.x, row))
-            if len(points):
-                found.append(comfort_of(scene, points))
+            part = comfort_of_depth(scene, view, band["Z"], film.display, (film.region.x, row))
+            if part is not None:
+                found.append(part)
     return Comfort.joined(found)
 
 

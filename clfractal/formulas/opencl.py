@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
@@ -37,11 +38,13 @@ class FormulaText:
     has_derivative: bool
 
 
+@lru_cache(maxsize=16)
 def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap = "cheapest") -> FormulaText:
     """The chain's functions over `real` and `dual`.
 
     `scalar_rule=False` leaves out the formulas' own derivative, so that marching uses the Jacobian throughout.
-    A map that uses the point (`point_x`) is always written operation by operation.
+    A map that uses the point (`point_x`) is always written operation by operation. The texts of the last chains are
+    kept: a render asks for its own twice, and each eye of a pair asks again.
     """
     return _ChainWriter(chain, scalar_rule, dual_map).write()
 

@@ -109,8 +109,9 @@ def eye_distance(view: View) -> float:
 def eye_views(scene: Scene) -> dict[EyeName, View]:
     """The views of a stereo scene: left, right, and the cyclopean eye's between them."""
     assert scene.stereo is not None
-    image = scene.image
-    middle = middle_view(scene.stereo, scene.camera, image.width, image.height, scene.eye.share)
+    image, eye = scene.image, scene.eye
+    size = (image.width * eye.wide, image.height * eye.high)
+    middle = middle_view(scene.stereo, scene.camera, *size, eye.share)
     names: tuple[EyeName, ...] = ("left", "right", "middle")
     return {name: eye_view(middle, scene.stereo, Eye(name)) for name in names}
 

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from clfractal.scene.given import GivenGrid
 
 
+# What a scene has read or resolved, and the section that names it.
+_READ = {"chain": "formula", "surroundings": "environment", "given": "renderer"}
+
+
 class Scene(Section):
     """A picture to be made: one formula, one camera, one way of looking."""
 
@@ -75,12 +79,10 @@ class Scene(Section):
         """A stereo scene as one eye sees it: its image is that eye's, what was read and derived is shared."""
         assert self.stereo is not None
         wide, high = self.stereo.squeeze
-        copied = super().model_copy()
+        changes = {}
         if (wide, high) != (1, 1):
-            image = Image(width=self.image.width // wide, height=self.image.height // high)
-            copied = super().model_copy(update={"image": image})
-            derived = ("folder", "chain", "surroundings", "given")
-            copied.__dict__ |= {each: self.__dict__[each] for each in derived if each in self.__dict__}
+            changes["image"] = Image(width=self.image.width // wide, height=self.image.height // high)
+        copied = self.model_copy(update=changes)
         copied.__dict__.pop("views", None)
         copied.__dict__["eye"] = replace(self.eye, name=name, wide=wide, high=high)
         return copied
@@ -95,10 +97,16 @@ class Scene(Section):
         return copied
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As of every section; the copy stays in the scene's folder, and shows the same eye's picture."""
+        """As of every section; the copy stays in the scene's folder, and shows the same eye's picture.
+
+        What was read of a section that is not replaced is kept, so that it is what was checked, and is not read again.
+        """
         copied = super().model_copy(update=update, deep=deep)
         copied.__dict__["folder"] = self.folder
         copied.__dict__["eye"] = self.eye
+        for derived, section in _READ.items():
+            if update and section not in update and derived in self.__dict__:
+                copied.__dict__[derived] = self.__dict__[derived]
         return copied
 
     @cached_property

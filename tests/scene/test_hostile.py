@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from clfractal.errors import ClfractalError, FileError, FormulaError, SceneError
 from clfractal.scene.load import load_scene
+from clfractal.scene.stereo import Stereo
 
 GOOD = """version: 1
 formula: {name: mandelbulb, parameters: {power: 8}, iterations: 12}
@@ -22,6 +23,7 @@ renderer: {search: steps, step: 0.1, points: {pattern: grid, count: 9}, normal: 
 background: {top: [0.1, 0.2, 0.3], bottom: [0, 0, 0]}
 coloring: {by: trap, palette: [{at: 0, color: [0, 0, 0]}, {at: 1, color: [1, 1, 1]}], trap: {shape: axis}}
 fog: {color: [0.5, 0.5, 0.5], density: 0.2}
+stereo: {mode: rows, screen_width: 2, plane: {normal: [0, -1, 0], up: [0, 0, 1], width: 3}, separation: 0.5}
 output: {exposure: 0, channels: [R, G, B, A, Z]}
 """
 FORMULA = """variables: [x, y, z]
@@ -211,6 +213,9 @@ SECTIONS = [
     "background",
     "environment",
     "fog",
+    "cut_planes",
+    "layout",
+    "stereo",
     "output",
 ]
 
@@ -242,6 +247,12 @@ FORMULA_KEYS = [
     "derivative",
     "chain",
 ]
+
+
+@given(st.dictionaries(st.sampled_from([*Stereo.model_fields, "mod"]), ANYTHING | st.floats(1e-9, 1e9)))
+@settings(max_examples=200)
+def test_any_data_in_stereo(data: dict[str, Any]) -> None:
+    loads_or_one_line({"version": 1, "formula": {"name": "hast"}, "camera": {}, "stereo": data})
 
 
 @given(st.dictionaries(st.sampled_from(FORMULA_KEYS), ANYTHING))

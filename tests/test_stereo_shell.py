@@ -1,0 +1,396 @@
+"""Stereo scenes from the shell: every mode, its files, and what is told of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from PIL import Image
+
+from clfractal.errors import STATUS_BAD_INPUT
+from clfractal.files.exr import read_exr
+from clfractal.files.png import read_texts
+from clfractal.render.compose import compose, picture_size
+from clfractal.scene.load import load_scene
+from clfractal.scene.stereo import Stereo
+from tests.shell import SCENE, InProcess
+
+MONO = SCENE + "output:\n  precision: {R: float, G: float, B: float}\n"
+STEREO = MONO + "stereo: {separation: 0.3}\n"
+SIZE = (40, 36)
+COMPOSED = [
+    "left",
+    "right",
+    "split",
+    "over_under",
+    "split_half",
+    "over_under_half",
+    "rows",
+    "columns",
+    "checkerboard",
+    "anaglyph_chessboard",
+    "anaglyph",
+]
+Planes = dict[str, npt.NDArray[Any]]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder, with a stereo scene."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.yaml").write_text(STEREO)
+    return tmp_path
+
+
+@pytest.fixture
+def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
+    return InProcess(capsys)
+
+
+@pytest.fixture(scope="module")
+def eyes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Planes, Planes]:
+    """Both eyes' channels, as `mode: pair` writes them."""
+    from clfractal.cli import run
+    from clfractal.shell import Shell
+
+    folder = tmp_path_factory.mktemp("eyes")
+    (folder / "scene.yaml").write_text(STEREO)
+    arguments = ["render", folder / "scene.yaml", "-o", folder / "a.exr", "--set", "stereo.mode=pair"]
+    assert run([str(each) for each in arguments], Shell(owns_process=False)) == 0
+    assert {path.name for path in folder.iterdir()} == {"scene.yaml", "a_L.exr", "a_R.exr"}
+    left, right = (read_exr(folder / f"a_{letter}.exr")[0] for letter in "LR")
+    return left, right
+
+
+def rendered(shell: InProcess, source: str, output: str, *options: str) -> None:
+    ended = shell("render", source, "-o", output, "--quiet", *options)
+    assert (ended.status, ended.err) == (0, "")
+
+
+def pixels(path: Path) -> dict[str, bytes]:
+    """The bytes of every channel of an EXR, or of a PNG."""
+    if path.suffix == ".exr":
+        return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
+    with Image.open(path) as picture:
+        return {picture.mode: picture.tobytes()}
+
+
+def added(here: Path) -> set[str]:
+    return {path.name for path in here.iterdir()} - {"scene.yaml"}
+
+
+@pytest.mark.parametrize("mode", COMPOSED)
+def test_every_mode_as_png_and_exr(
+    here: Path, shell: InProcess, eyes: tuple[Planes, Planes], mode: str
+) -> None:
+    """`image` is one eye's size, but of the squeezed modes; what is shown are the pixels of both eyes' pictures."""
+    ended = shell("render", "scene.yaml", "-o", "a.png", "-o", "a.exr", "--set", f"stereo.mode={mode}")
+    assert ended.status == 0
+    assert ended.err.splitlines()[-1].startswith("a.png, a.exr: ")
+    assert added(here) == {"a.png", "a.exr"}
+    width, height = SIZE
+    expected = {"split": (2 * width, height), "over_under": (width, 2 * height)}.get(mode, SIZE)
+    with Image.open(here / "a.png") as picture:
+        assert picture.size == expected
+    planes, header = read_exr(here / "a.exr")
+    assert header["displayWindow"] == header["dataWindow"] == (0, 0, expected[0] - 1, expected[1] - 1)
+    assert planes["R"].shape == expected[::-1]
+    assert ("worldToCamera" in header) == (mode in ("left", "right"))
+    assert header.get("view") == (mode if mode in ("left", "right") else None)
+    if mode.endswith("_half"):
+        return  # of other pixels than the eyes' own, see below
+    stereo = Stereo.model_validate({"mode": mode})
+    assert expected == picture_size(stereo, SIZE)
+    composed = compose(stereo, *eyes)
+    for name in composed:
+        np.testing.assert_array_equal(planes[name], composed[name].astype(planes[name].dtype))
+
+
+@pytest.mark.parametrize(
+    ("mode", "whole", "size"), [("split_half", "split", "20x36"), ("over_under_half", "over_under", "40x18")]
+)
+def test_squeezed_pictures_show_all_of_the_screen(
+    here: Path, shell: InProcess, mode: str, whole: str, size: str
+) -> None:
+    """They are those of half as many pixels, with the whole picture's plane for their screen."""
+    rendered(shell, "scene.yaml", "a.exr", "--set", f"stereo.mode={mode}")
+    high = 2 * 3 * float(np.tan(np.radians(22.5)))  # the camera's default is 45 degrees
+    plane = f"{{width: {high * SIZE[0] / SIZE[1]!r}, height: {high!r}}}"
+    options = ("--set", f"stereo.mode={whole}", "--set", f"stereo.plane={plane}", "--size", size)
+    rendered(shell, "scene.yaml", "b.exr", *options)
+    assert pixels(here / "a.exr") == pixels(here / "b.exr")
+
+
+def test_the_right_eye_first(here: Path, shell: InProcess, eyes: tuple[Planes, Planes]) -> None:
+    """As two projectors need it that cross, or rows whose first is the right eye's."""
+    for mode in ("split", "rows"):
+        rendered(shell, "scene.yaml", "a.exr", "--set", f"stereo.mode={mode}", "--set", "stereo.swap=true")
+        planes = read_exr(here / "a.exr")[0]
+        expected = compose(Stereo.model_validate({"mode": mode}), eyes[1], eyes[0])
+        np.testing.assert_array_equal(planes["R"], expected["R"])
+
+
+def test_a_pair_as_two_files(here: Path, shell: InProcess, eyes: tuple[Planes, Planes]) -> None:
+    ended = shell("render", "scene.yaml", "-o", "a.png", "-o", "b.exr", "--set", "stereo.mode=pair")
+    assert ended.status == 0
+    assert ended.err.startswith("a_L.png, a_R.png, b_L.exr, b_R.exr: ")
+    assert added(here) == {"a_L.png", "a_R.png", "b_L.exr", "b_R.exr"}
+    for letter, view, expected in zip("LR", ("left", "right"), eyes, strict=True):
+        planes, header = read_exr(here / f"b_{letter}.exr")
+        assert header["view"] == view
+        assert sorted(planes) == sorted(expected)
+        for name in planes:
+            np.testing.assert_array_equal(planes[name], expected[name])
+    cameras = [read_exr(here / f"b_{letter}.exr")[1]["worldToCamera"] for letter in "LR"]
+    # The left eye is to the left: what is at x in its coordinates is farther left in the right one's.
+    assert cameras[0][3][0] > cameras[1][3][0]
+    np.testing.assert_allclose(np.delete(cameras[0][3] - cameras[1][3], 0), 0, atol=1e-6)
+
+
+def test_both_views_in_one_file(here: Path, shell: InProcess, eyes: tuple[Planes, Planes]) -> None:
+    """A PNG has room for one: of those there are two."""
+    ended = shell("render", "scene.yaml", "-o", "a.exr", "-o", "a.png", "--set", "stereo.mode=multi_view")
+    assert ended.status == 0
+    assert ended.err.startswith("a.exr, a_L.png, a_R.png: ")
+    assert added(here) == {"a.exr", "a_L.png", "a_R.png"}
+    planes, header = read_exr(here / "a.exr")
+    assert header["multiView"] == ("left", "right")
+    for name in "RGBAZ":
+        np.testing.assert_array_equal(planes[name], eyes[0][name])
+        np.testing.assert_array_equal(planes[f"right.{name}"], eyes[1][name])
+    assert not np.array_equal(header["left.worldToNDC"], header["right.worldToNDC"])
+    np.testing.assert_array_equal(header["worldToCamera"], header["left.worldToCamera"])
+
+
+@pytest.mark.parametrize(
+    ("mode", "output", "written", "again", "fit"),
+    [
+        ("split", "a.exr", ["a.exr"], ["b.exr"], "auto"),
+        ("over_under_half", "a.png", ["a.png"], ["b.png"], "null"),
+        ("anaglyph", "a.png", ["a.png"], ["b.png"], "auto"),
+        ("right", "a.exr", ["a.exr"], ["b.exr"], "null"),
+        ("multi_view", "a.exr", ["a.exr"], ["b.exr"], "null"),
+        ("pair", "a.exr", ["a_L.exr", "a_R.exr"], ["b_L.exr", "b_R.exr"], "auto"),
+        ("pair", "a.png", ["a_L.png", "a_R.png"], ["b_L.png", "b_R.png"], "null"),
+    ],
+)
+def test_a_picture_renders_itself_again(
+    here: Path, shell: InProcess, mode: str, output: str, written: list[str], again: list[str], fit: str
+) -> None:
+    """Bit for bit, from the header of any of its files; what was fitted is written there, and not fitted again."""
+    rendered(
+        shell,
+        "scene.yaml",
+        output,
+        *("--set", f"stereo.mode={mode}", "--set", f"stereo.fit={fit}", "--set", "stereo.budget=0.4"),
+    )
+    before = {name: pixels(here / name) for name in written}
+    told = load_scene(here / written[-1]).stereo
+    assert told is not None
+    assert told.fit is None
+    assert (told.plane is not None) == (fit == "auto")
+    (here / "scene.yaml").unlink()
+    rendered(shell, written[-1], f"b{Path(output).suffix}")
+    assert [pixels(here / name) for name in again] == list(before.values())
+
+
+@pytest.mark.parametrize("mode", ["split", "over_under", "rows", "anaglyph", "multi_view"])
+def test_a_region_is_the_part_of_the_whole(here: Path, shell: InProcess, mode: str) -> None:
+    """One across the seam with odd corners, and one in a single eye's half."""
+    chosen = ("--set", f"stereo.mode={mode}")
+    both = ("-o", "whole.png") if mode in ("split", "anaglyph") else ()
+    rendered(shell, "scene.yaml", "whole.exr", *both, *chosen)
+    whole, header = read_exr(here / "whole.exr")
+    width, height = header["displayWindow"][2] + 1, header["displayWindow"][3] + 1
+    x, y = width // 2 - 7, height // 2 - 5
+    for region in ((x, y, 15, 13), (1, 3, 11, 9)):
+        both = ("-o", "part.png") if (here / "whole.png").exists() else ()
+        rendered(shell, "scene.yaml", "part.exr", *both, "--region", ",".join(map(str, region)), *chosen)
+        part, header = read_exr(here / "part.exr")
+        left, top, wide, high = region
+        assert header["dataWindow"] == (left, top, left + wide - 1, top + high - 1)
+        assert header["displayWindow"] == (0, 0, width - 1, height - 1)
+        for name in whole:
+            np.testing.assert_array_equal(part[name], whole[name][top : top + high, left : left + wide])
+        if both:
+            with Image.open(here / "whole.png") as picture, Image.open(here / "part.png") as cut:
+                expected = np.asarray(picture)[top : top + high, left : left + wide]
+                np.testing.assert_array_equal(np.asarray(cut), expected)
+
+
+def test_size_samples_and_statistics(here: Path, shell: InProcess) -> None:
+    options = ("--size", "24x20", "--samples", "3", "--stats", "stats.json")
+    rendered(shell, "scene.yaml", "a.png", *options)
+    with Image.open(here / "a.png") as picture:
+        assert picture.size == (48, 20)
+    told = json.loads((here / "stats.json").read_text())
+    assert (told["width"], told["height"], told["samples"]) == (48, 20, 3)
+    assert told["rays"] == 2 * 24 * 20 * 3
+    assert told["tiles"] == 2
+    stereo = told["stereo"]
+    assert (stereo["mode"], stereo["separation"]) == ("split", 0.3)
+    plane_width = 2 * 3 * np.tan(np.radians(22.5)) * 24 / 20  # fov is 45 by default
+    assert stereo["plane"]["width"] == pytest.approx(plane_width)
+    np.testing.assert_allclose(stereo["plane"]["center"], 0, atol=1e-12)
+    np.testing.assert_allclose(stereo["eye"], [0, -0.6 / 0.52 * plane_width, 0], atol=1e-12)
+    comfort = stereo["parallax"]
+    # The set reaches from about -1.2 to 1.2, and nothing is as far before the plane as its bounds.
+    eye = 0.6 / 0.52 * plane_width
+    least = 0.063 * 0.3 * (1 - eye / (eye - 1.3))
+    assert least < comfort["nearest"] < 0.4 * least < 0
+    assert comfort["nearest"] <= comfort["farthest"] < 0.063 * 0.3
+    for end in ("nearest", "farthest"):
+        angles = [2 * np.arctan((0.063 - p) / 2 / 0.6) for p in (0, comfort[end])]
+        assert comfort[f"{end}_degrees"] == pytest.approx(np.degrees(angles[0] - angles[1]))
+
+
+def test_statistics_without_depth_take_a_quick_look(here: Path, shell: InProcess) -> None:
+    """The numbers are nearly those of the picture's own depth."""
+    found = []
+    for channels in ("[R, G, B]", "[R, G, B, Z]"):
+        rendered(shell, "scene.yaml", "a.exr", "--stats", "s.json", "--set", f"output.channels={channels}")
+        found.append(json.loads((here / "s.json").read_text())["stereo"]["parallax"])
+    assert found[0]["nearest"] == pytest.approx(found[1]["nearest"], rel=0.02)
+    assert found[0]["nearest"] != 0
+
+
+def test_a_warning_past_one_degree(here: Path, shell: InProcess) -> None:
+    ended = shell("render", "scene.yaml", "-o", "a.png", "--set", "stereo.separation=1")
+    assert ended.status == 0
+    assert ended.err.splitlines()[-1].startswith("scene.yaml: parallax reaches 3.")
+    assert "beyond 1 eyes tire" in ended.err
+    assert "tire" not in shell("render", "scene.yaml", "-o", "a.png").err
+    assert shell("render", "scene.yaml", "-o", "a.png", "--set", "stereo.separation=1", "--quiet").err == ""
+    told = shell("render", "scene.yaml", "-o", "a.png", "--verbose").err
+    assert "of the screen's units" in told
+    checked = shell("check", "scene.yaml", "--parallax", "--set", "stereo.separation=1")
+    assert checked.err.startswith("scene.yaml: parallax reaches 3.")
+
+
+class TestCheck:
+    def test_where_the_camera_moves(self, here: Path, shell: InProcess) -> None:
+        """A screen as wide as the plane: one unit is 1, and the eye is a screen's distance before the target."""
+        options = (
+            *("--set", "camera={position: [0, -3, 0], fov: 90}", "--set", "image={width: 40, height: 40}"),
+            *("--set", "stereo={screen_width: 6, screen_distance: 4, interpupillary_distance: 0.5}"),
+        )
+        ended = shell("check", "scene.yaml", *options)
+        assert (ended.status, ended.err) == (0, "")
+        told = [line for line in ended.out.splitlines() if line.startswith("#")]
+        assert told == [
+            "# stereo: the camera is at [0, -4, 0], moved from [0, -3, 0]; the left eye at [-0.25, -4, 0], "
+            "the right at [0.25, -4, 0]",
+            "# stereo: on the screen lies the plane around [0, 0, 0], 6 x 6 scene units; "
+            "one unit of the screen's is 1 of them",
+        ]
+        # What is printed is a scene file still.
+        (here / "printed.yaml").write_text(ended.out)
+        assert load_scene(here / "printed.yaml") == load_scene(
+            here / "scene.yaml", overrides=[each for each in options if each != "--set"]
+        )
+
+    def test_a_plane_of_its_own_moves_no_camera(self, here: Path, shell: InProcess) -> None:
+        ended = shell("check", "scene.yaml", "--set", "stereo.plane={center: [0, 1, 0], width: 0.52}")
+        assert "the camera is at [0, 0.4, 0]; the left eye" in ended.out
+
+    def test_parallax(self, here: Path, shell: InProcess) -> None:
+        ended = shell("check", "scene.yaml", "--parallax")
+        assert (ended.status, ended.err) == (0, "")
+        assert len([line for line in ended.out.splitlines() if line.startswith("# parallax -0.")]) == 1
+        assert load_scene(ended.out) == load_scene(here / "scene.yaml")
+
+    def test_parallax_of_a_fit(self, here: Path, shell: InProcess) -> None:
+        """The scene that is printed is the one that would be rendered."""
+        plain = shell("check", "scene.yaml", "--set", "stereo.fit=auto")
+        assert "#" not in plain.out  # nothing is known before the depth is looked at
+        ended = shell("check", "scene.yaml", "--parallax", "--set", "stereo.fit=auto")
+        scene = load_scene(ended.out)
+        assert scene.stereo is not None
+        assert scene.stereo.fit is None
+        assert scene.stereo.plane is not None
+        (here / "fitted.yaml").write_text(ended.out)
+        rendered(shell, "fitted.yaml", "a.exr")
+        rendered(shell, "scene.yaml", "b.exr", "--set", "stereo.fit=auto")
+        assert pixels(here / "a.exr") == pixels(here / "b.exr")
+
+    def test_parallax_of_one_picture(self, here: Path, shell: InProcess) -> None:
+        (here / "scene.yaml").write_text(MONO)
+        ended = shell("check", "scene.yaml", "--parallax")
+        assert ended.is_one_line(STATUS_BAD_INPUT, "--parallax: needs a scene with a stereo section")
+
+    def test_nothing_to_see(self, here: Path, shell: InProcess) -> None:
+        away = ("--set", "camera={position: [0, -3, 0], target: [0, -6, 0]}")
+        assert "# parallax: nothing is seen\n" in shell("check", "scene.yaml", "--parallax", *away).out
+        for command in ("check", "render"):
+            options = ("--parallax",) if command == "check" else ("-o", "a.png")
+            ended = shell(command, "scene.yaml", *options, *away, "--set", "stereo.fit=auto")
+            assert ended.is_one_line(
+                STATUS_BAD_INPUT, "scene.yaml: stereo.fit: auto finds nothing to fit to: the picture is empty"
+            )
+        assert added(here) == set()
+
+    def test_an_eye_inside_the_object_sees_nothing(self, here: Path, shell: InProcess) -> None:
+        within = ("--set", "camera={position: [0, -0.2, 0], target: [0, 0, 0]}")
+        ended = shell("check", "scene.yaml", "--parallax", *within)
+        assert ended.status == 0
+        assert "# parallax: nothing is seen\n" in ended.out
+        rendered(shell, "scene.yaml", "a.png", "--stats", "s.json", *within)
+        assert json.loads((here / "s.json").read_text())["stereo"]["parallax"] is None
+
+
+class TestFlat:
+    """A cut plane has no depth; it lies on the screen."""
+
+    def test_alone(self, here: Path, shell: InProcess) -> None:
+        plane = ("--set", "renderer={type: cut_plane}")
+        told = shell("check", "scene.yaml", "--parallax", *plane).out
+        assert "# stereo: a cut plane by itself is flat; both eyes see it on the screen\n" in told
+        assert "# parallax +0 to +0 of the screen's units" in told
+        rendered(shell, "scene.yaml", "a.exr", "--stats", "s.json", *plane)
+        planes = read_exr(here / "a.exr")[0]
+        np.testing.assert_array_equal(planes["R"][:, :40], planes["R"][:, 40:])
+        stereo = json.loads((here / "s.json").read_text())["stereo"]
+        assert stereo["eye"] is None
+        assert stereo["parallax"]["nearest"] == stereo["parallax"]["farthest"] == 0
+        (here / "scene.yaml").write_text(MONO)
+        rendered(shell, "scene.yaml", "mono.exr", *plane)
+        np.testing.assert_array_equal(planes["R"][:, :40], read_exr(here / "mono.exr")[0]["R"])
+
+    def test_an_orthographic_camera_is_not_used(self, here: Path, shell: InProcess) -> None:
+        rendered(
+            shell,
+            "scene.yaml",
+            "a.png",
+            *("--set", "renderer={type: cut_plane}", "--set", "camera={projection: orthographic}"),
+        )
+
+    def test_beside_a_surface(self, here: Path, shell: InProcess) -> None:
+        layout = ("--set", "layout={views: [{}, {renderer: {type: cut_plane}}]}")
+        told = shell("check", "scene.yaml", "--parallax", *layout).out
+        assert "# layout.views.0: stereo: the camera is at [0, -" in told
+        assert "# layout.views.1: stereo: a cut plane by itself is flat" in told
+        assert "# parallax -0." in told
+        rendered(shell, "scene.yaml", "a.exr", "--stats", "s.json", *layout)
+        red = read_exr(here / "a.exr")[0]["R"]
+        assert red.shape == (36, 80)
+        np.testing.assert_array_equal(red[:, 20:40], red[:, 60:])  # the plane, for both eyes
+        assert (red[:, :20] != red[:, 40:60]).any()
+        assert json.loads((here / "s.json").read_text())["stereo"]["parallax"]["nearest"] < 0
+
+
+def test_texts_of_a_png(here: Path, shell: InProcess) -> None:
+    """What a mono picture's are, and of one eye's its view."""
+    rendered(shell, "scene.yaml", "a.png")
+    rendered(shell, "scene.yaml", "b.png", "--set", "stereo.mode=pair")
+    (here / "scene.yaml").write_text(MONO)
+    rendered(shell, "scene.yaml", "mono.png")
+    mono = set(read_texts(here / "mono.png"))
+    assert set(read_texts(here / "a.png")) == mono
+    for letter, view in zip("LR", ("left", "right"), strict=True):
+        texts = read_texts(here / f"b_{letter}.png")
+        assert set(texts) == {*mono, "view"}
+        assert texts["view"] == view
