@@ -9,7 +9,7 @@ from unittest.mock import MagicMock
 
 import pytest
 
-from benchmarks import compare
+from benchmarks import compare, growth
 from benchmarks.ours import Ours
 from benchmarks.rivals import base
 from benchmarks.rivals.base import MissingError
@@ -20,6 +20,7 @@ from clfractal import bench
 from clfractal.device.select import choose
 from clfractal.errors import ClfractalError
 from clfractal.formulas.opencl import operations_per_application
+from clfractal.render.workers import WORKERS
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -179,3 +180,19 @@ def test_vtk_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(MissingError, match=r"needs a display \(xvfb-run -a\)"):
         VtkVolume().prepare()
+
+
+def test_the_table_of_growth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its smallest lines, in a picture and a grid that are quick."""
+    monkeypatch.setitem(WORKERS, "volume", WORKERS["volume"])
+    monkeypatch.setattr(growth, "RESOLUTIONS", (24, 1024))
+    monkeypatch.setattr(growth, "SHOWN", (24, 1024))
+    monkeypatch.setattr(growth, "MEGAPIXELS", (0.01, 16))
+    lines = list(growth.figures(choose(None), 1, 24, 1))
+    assert [(line.row, line.size) for line in lines] == [
+        ("grid", "24^3"),
+        ("volume, composited", "24^3, 0.01 MP"),
+        ("volume, a surface", "24^3, 0.01 MP"),
+        ("cut plane", "0.01 MP"),
+    ]
+    assert all(line.device_ms > 0 and line.processor_ms > 0 for line in lines)
