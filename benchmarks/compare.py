@@ -1,12 +1,12 @@
 """This engine and its rivals side by side: one session, rounds in turn, medians.
 
-    python -m benchmarks.compare [--rounds N] [--json FILE] [--only TEXT ...]
+    python -m benchmarks.compare [--rounds N] [--json FILE] [--row NAME ...] [--only TEXT ...]
         [--runtime NAME=ICD_FOLDER[,LIBRARY_FOLDER] ...] [--kernel ROW=FILE.cl ...]
 
 Prints a Markdown table. A contestant that cannot run gets a line that says why. In every round each
 contestant draws once, so that a machine that slows down slows all of them. Needs nothing but this engine;
-Numba (extra `bench`), Mandelbulber 2 (Debian package) and further OpenCL runtimes join where they are
-installed.
+Numba (extra `bench`), VTK 9 (`pip install vtk`; without a display under `xvfb-run -a`), Mandelbulber 2
+(Debian package) and further OpenCL runtimes join where they are installed.
 """
 
 from __future__ import annotations
@@ -19,50 +19,87 @@ import platform
 import statistics
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.ours import Ours
 from benchmarks.rivals.base import ROWS, Contestant, MissingError, Sample
 from benchmarks.rivals.mandelbulber import Mandelbulber
+from benchmarks.rivals.vtk_volume import VtkVolume
 from benchmarks.runtimes import Runtime, find_runtimes, parse_runtime
 from benchmarks.stand_alone import StandAloneKernel
 
+if TYPE_CHECKING:
+    from benchmarks.rivals.numba_grid import NumbaGrid
+    from benchmarks.rivals.numba_march import NumbaMarch
+    from benchmarks.rivals.numba_plane import NumbaPlane
+
 
 class NumbaRival:
-    """Both marches of `numba_march`, compiled before the first round; Numba is optional, so imported late."""
+    """The rows that Numba draws, compiled before the first round; Numba is optional, so imported late."""
 
     name = "Numba"
+    rows = ("mandelbulb8-shadow", "hast2-shadow", "hast2-grid512", "hast2-plane256")
+
+    def __init__(self, rows: Sequence[str] = ()) -> None:
+        """`rows` are those that are wanted; all, if none is named."""
+        self._measures: dict[str, Callable[[], Sample]] = {}
+        self._wanted = [row for row in self.rows if row in rows or not rows]
 
     def prepare(self) -> None:
         try:
             import numba
 
-            from benchmarks.rivals import numba_march
+            from benchmarks.rivals import numba_grid, numba_march, numba_plane
         except ImportError as error:
             raise MissingError("Numba is not installed (pip install 'clfractal[bench]')") from error
         self.name = f"Numba {numba.__version__}, {numba.get_num_threads()} threads"
-        self._marches = {
-            "mandelbulb8-shadow": numba_march.mandelbulb_march(),
-            "hast2-shadow": numba_march.hast_march(),
-        }
+        for row in self._wanted:
+            if row == "hast2-grid512":
+                self._measures[row] = _grid_measure(row, numba_grid.NumbaGrid())
+            elif row == "hast2-plane256":
+                self._measures[row] = _plane_measure(row, numba_plane.NumbaPlane(periodicity=True))
+            else:
+                march = numba_march.hast_march if row == "hast2-shadow" else numba_march.mandelbulb_march
+                self._measures[row] = _march_measure(row, march())
 
     def measure(self) -> list[Sample]:
-        samples = []
-        for row, march in self._marches.items():
-            milliseconds, counts = march.frame()
-            seconds = milliseconds / 1e3
-            samples.append(
-                Sample(
-                    row,
-                    milliseconds,
-                    rays_per_second=counts.rays / seconds,
-                    iterations_per_second=counts.iterations / seconds,
-                    steps_per_ray=counts.steps / counts.rays,
-                )
-            )
-        return samples
+        return [measure() for measure in self._measures.values()]
+
+
+def _march_measure(row: str, march: NumbaMarch) -> Callable[[], Sample]:
+    def measure() -> Sample:
+        milliseconds, counts = march.frame()
+        seconds = milliseconds / 1e3
+        return Sample(
+            row,
+            milliseconds,
+            rays_per_second=counts.rays / seconds,
+            iterations_per_second=counts.iterations / seconds,
+            steps_per_ray=counts.steps / counts.rays,
+        )
+
+    return measure
+
+
+def _grid_measure(row: str, grid: NumbaGrid) -> Callable[[], Sample]:
+    return lambda: Sample(row, grid.fill())
+
+
+def _plane_measure(row: str, plane: NumbaPlane) -> Callable[[], Sample]:
+    def measure() -> Sample:
+        milliseconds, applications = plane.frame()
+        seconds = milliseconds / 1e3
+        return Sample(
+            row,
+            milliseconds,
+            rays_per_second=plane.counts.size / seconds,
+            iterations_per_second=applications / seconds,
+        )
+
+    return measure
 
 
 @dataclass(slots=True)
@@ -201,15 +238,24 @@ def _cell(value: float | None, scale: float, form: str) -> str:
     return "" if value is None else form.format(value * scale)
 
 
-def contestants(runtimes: Sequence[Runtime], kernels: Sequence[str], flags: str) -> list[Contestant]:
-    """Everyone who might take part, ours first."""
-    found: list[Contestant] = [Ours(runtime) for runtime in runtimes]
+def contestants(
+    runtimes: Sequence[Runtime], kernels: Sequence[str], flags: str, rows: Sequence[str] = ()
+) -> list[Contestant]:
+    """Everyone who might take part in the wanted rows, or in all, ours first."""
+    found: list[Contestant] = [Ours(runtime, rows) for runtime in runtimes]
     for text in kernels:
         row, equals, file = text.partition("=")
         if not (equals and Path(file).is_file()):
             raise ValueError(f"a kernel looks like ROW=FILE.cl, not {text!r}")
         found += [StandAloneKernel(row, Path(file).resolve(), flags, runtime) for runtime in runtimes]
-    return [*found, NumbaRival(), Mandelbulber()]
+    rivals: list[Contestant] = []
+    if not rows or set(rows) & set(NumbaRival.rows):
+        rivals.append(NumbaRival(rows))
+    if not rows or set(rows) & set(VtkVolume.rows):
+        rivals.append(VtkVolume())
+    if not rows or set(rows) & set(Mandelbulber.rows):
+        rivals.append(Mandelbulber())
+    return [*found, *rivals]
 
 
 def main() -> int:
@@ -217,6 +263,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.compare", description=__doc__.splitlines()[0])
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--json", type=Path, help="also write everything measured to this file")
+    parser.add_argument("--row", action="append", default=[], help="only this row; repeat it for more")
     parser.add_argument(
         "--only", action="append", default=[], help="only contestants whose name contains this text"
     )
@@ -233,7 +280,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="clfractal-runtimes-") as scratch:
         try:
             runtimes = [parse_runtime(text) for text in arguments.runtime] or find_runtimes(Path(scratch))
-            everyone = contestants(runtimes, arguments.kernel, arguments.kernel_flags)
+            everyone = contestants(runtimes, arguments.kernel, arguments.kernel_flags, arguments.row)
         except ValueError as error:
             parser.error(str(error))
         wanted = [text.casefold() for text in arguments.only]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.rivals.base import MissingError, Sample, run
@@ -14,11 +15,12 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 
 
 class Ours:
-    """All rows of `python -m clfractal bench --json FILE` on one runtime."""
+    """Rows of `python -m clfractal bench --json FILE` on one runtime: the wanted ones, or all."""
 
-    def __init__(self, runtime: Runtime) -> None:
+    def __init__(self, runtime: Runtime, rows: Sequence[str] = ()) -> None:
         self.name = f"clfractal ({runtime.name})"
         self._runtime = runtime
+        self._rows = tuple(rows)
 
     def prepare(self) -> None:
         """One run for the caches: programs are built and lanes measured once per machine, not per picture."""
@@ -28,6 +30,8 @@ class Ours:
         with tempfile.TemporaryDirectory(prefix="clfractal-bench-") as folder:
             report = Path(folder, "bench.json")
             command: list[str | Path] = [sys.executable, "-m", "clfractal", "bench", "--json", report]
+            for row in self._rows:
+                command += ["--row", row]
             run(command, environment=self._runtime.environment(), timeout_s=900, cwd=REPOSITORY)
             try:
                 rows = json.loads(report.read_text())["rows"]

@@ -9,14 +9,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, choose
-from clfractal.errors import DeviceError
+from clfractal.errors import ClfractalError, DeviceError, Where
 from clfractal.files.atomic import atomic_writer
 from clfractal.formulas.opencl import operations_per_application
 from clfractal.job import Job, prepare
@@ -85,6 +85,8 @@ ROWS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "hast2-volume512-surface": (VOLUME, ("renderer.transfer={}",), REPETITIONS),
     "hast2-plane256": (PLANE, (), REPETITIONS),
 }
+# Rows that are no frames: filling the grid of row 5, and the whole program.
+GRID_ROW, SHELL_ROW = "hast2-grid512", "shell-to-png"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,23 +107,36 @@ class Row:
     lanes: int | None = None
 
 
-def run(*, device: str | None, json_file: Path | None, shell: Shell) -> None:
-    """Measures every row, prints the table, and writes JSON if a file is named.
+def row_names() -> list[str]:
+    """The table's rows, in its order."""
+    return [*ROWS, GRID_ROW, SHELL_ROW]
+
+
+def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Sequence[str] = ()) -> None:
+    """Measures the wanted rows, or every one, prints the table, and writes JSON if a file is named.
 
     Raises:
+        ClfractalError: there is no such row.
         DeviceError: there is no device, or it failed.
         FileError: the file cannot be written.
     """
+    for name in wanted:
+        if name not in row_names():
+            raise ClfractalError(f"there is no {name!r}, only {', '.join(row_names())}", Where("--row"))
+    names = [name for name in row_names() if name in wanted or not wanted]
     chosen = choose(device)
     shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
     peak = fma_peak(chosen, "float32")
     rows = []
-    for name, (text, changes, repetitions) in ROWS.items():
-        rows.append(_render_row(name, load_scene(text, overrides=changes), chosen, peak, repetitions))
+    for name in names:
+        if name == GRID_ROW:
+            rows.append(_grid_row(chosen))
+        elif name == SHELL_ROW:
+            rows.append(_shell_row(chosen))
+        else:
+            text, changes, repetitions = ROWS[name]
+            rows.append(_render_row(name, load_scene(text, overrides=changes), chosen, peak, repetitions))
         shell.say(f"{name}: {rows[-1].ms:.0f} ms")
-    rows.append(_grid_row(chosen))
-    shell.say(f"{rows[-1].name}: {rows[-1].ms:.0f} ms")
-    rows.append(_shell_row(chosen))
     report = {
         "device": chosen.info.name,
         "platform": f"{chosen.info.platform}, {chosen.info.version}",
@@ -198,7 +213,7 @@ def _grid_row(device: Device) -> Row:
         on_device = stats.octree_ms + stats.fill_ms + stats.store_ms + stats.normals_ms
         times.append((on_device, 1e3 * (time.perf_counter() - start) - stats.build_ms))
     ms, wall_ms = (statistics.median(column) for column in zip(*times[1:], strict=True))
-    return Row("hast2-grid512", ms=ms, wall_ms=wall_ms, lanes=job.plan.lanes)
+    return Row(GRID_ROW, ms=ms, wall_ms=wall_ms, lanes=job.plan.lanes)
 
 
 def _shell_row(device: Device) -> Row:
@@ -216,4 +231,4 @@ def _shell_row(device: Device) -> Row:
             if done.returncode != 0:
                 raise DeviceError(f"the shell's row failed: {done.stderr.strip()}")
     median = statistics.median(times[1:])
-    return Row("shell-to-png", ms=median, wall_ms=median)
+    return Row(SHELL_ROW, ms=median, wall_ms=median)

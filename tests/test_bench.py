@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+import json
+import sys
+from pathlib import Path
+from unittest.mock import MagicMock
+
 import pytest
 
+from benchmarks import compare, growth
+from benchmarks.ours import Ours
+from benchmarks.rivals import base
+from benchmarks.rivals.base import MissingError
+from benchmarks.rivals.mandelbulber import Mandelbulber
+from benchmarks.rivals.vtk_volume import VtkVolume
+from benchmarks.runtimes import Runtime
 from clfractal import bench
 from clfractal.device.select import choose
+from clfractal.errors import ClfractalError
 from clfractal.formulas.opencl import operations_per_application
+from clfractal.render.workers import WORKERS
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
+from clfractal.shell import Shell
 
 
 def scene_of(row: str, *changes: str) -> Scene:
@@ -110,3 +125,74 @@ def test_the_table_has_a_line_for_each_row() -> None:
     ]
     assert second.split() == ["shell-to-png", "900.0", "900.0", "-", "-", "-", "-", "-"]
     assert len(titles) == len(first) == len(second)
+
+
+def test_only_the_wanted_rows_are_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def row(name: str, *_: object) -> bench.Row:
+        return bench.Row(name, 1.0, 2.0)
+
+    monkeypatch.setattr(bench, "_render_row", row)
+    monkeypatch.setattr(bench, "_grid_row", lambda device: row(bench.GRID_ROW))
+    monkeypatch.setattr(bench, "_shell_row", lambda device: row(bench.SHELL_ROW))
+    monkeypatch.setattr(bench, "fma_peak", lambda device, precision: 100.0)
+    report = tmp_path / "bench.json"
+    shell = Shell(owns_process=False)
+    shell.quiet = True
+    for wanted in ((), ("hast2-plane256", "hast2-grid512")):
+        bench.run(device=None, json_file=report, shell=shell, wanted=wanted)
+        found = [one["name"] for one in json.loads(report.read_text())["rows"]]
+        assert found == [name for name in bench.row_names() if name in wanted or not wanted]
+    with pytest.raises(ClfractalError, match="--row: there is no 'hast3', only mandelbulb8-shadow"):
+        bench.run(device=None, json_file=None, shell=shell, wanted=("hast3",))
+
+
+def test_rivals_take_part_in_their_rows() -> None:
+    """Rows 4 to 6 have a rival each; who has none of the wanted rows stays at home."""
+    runtime = Runtime("PoCL", Path("vendors"))
+    everyone = compare.contestants([runtime], [], "")
+    assert [type(one) for one in everyone] == [Ours, compare.NumbaRival, VtkVolume, Mandelbulber]
+    rivals = {
+        row: [type(one) for one in compare.contestants([runtime], [], "", [row])[1:]] for row in base.ROWS
+    }
+    assert rivals["hast2-grid512"] == rivals["hast2-plane256"] == [compare.NumbaRival]
+    assert rivals["hast2-volume512"] == [VtkVolume]
+    assert rivals["shell-to-png"] == [Mandelbulber]
+    assert set(base.ROWS) <= set(bench.row_names())
+
+
+@pytest.mark.parametrize("rival", [compare.NumbaRival, VtkVolume])
+def test_a_rival_that_is_not_installed_says_so(
+    rival: type[compare.NumbaRival | VtkVolume], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in ("numba", "vtk"):
+        monkeypatch.setitem(sys.modules, module, None)
+    entries = compare.play([rival()], 1)
+    assert entries[0].missing is not None
+    assert "is not installed (pip install" in entries[0].missing
+    assert "| missing: " in compare.markdown(entries)
+
+
+def test_vtk_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would end the process."""
+    for module in ("vtk", "vtk.util", "vtk.util.numpy_support"):
+        monkeypatch.setitem(sys.modules, module, MagicMock())
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(MissingError, match=r"needs a display \(xvfb-run -a\)"):
+        VtkVolume().prepare()
+
+
+def test_the_table_of_growth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its smallest lines, in a picture and a grid that are quick."""
+    monkeypatch.setitem(WORKERS, "volume", WORKERS["volume"])
+    monkeypatch.setattr(growth, "RESOLUTIONS", (24, 1024))
+    monkeypatch.setattr(growth, "SHOWN", (24, 1024))
+    monkeypatch.setattr(growth, "MEGAPIXELS", (0.01, 16))
+    lines = list(growth.figures(choose(None), 1, 24, 1))
+    assert [(line.row, line.size) for line in lines] == [
+        ("grid", "24^3"),
+        ("volume, composited", "24^3, 0.01 MP"),
+        ("volume, a surface", "24^3, 0.01 MP"),
+        ("cut plane", "0.01 MP"),
+    ]
+    assert all(line.device_ms > 0 and line.processor_ms > 0 for line in lines)

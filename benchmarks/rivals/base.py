@@ -10,7 +10,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-ROWS = ("mandelbulb8-shadow", "hast2-shadow", "shell-to-png")  # the rows every table starts with
+# The rows every table starts with.
+ROWS = (
+    "mandelbulb8-shadow",
+    "hast2-shadow",
+    "hast2-grid512",
+    "hast2-volume512",
+    "hast2-plane256",
+    "shell-to-png",
+)
 
 
 class MissingError(Exception):

@@ -34,6 +34,7 @@ class Mandelbulber:
     """One run serves two rows: its own rendering time, and the wall time from shell to finished PNG."""
 
     name = "Mandelbulber 2"
+    rows = ("mandelbulb8-shadow", "shell-to-png")
 
     def __init__(self) -> None:
         self._home = tempfile.TemporaryDirectory(prefix="mandelbulber-")  # its settings must be the defaults

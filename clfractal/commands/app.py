@@ -313,6 +313,10 @@ def bench(
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE.json", help="Write the table as JSON, too.")
     ] = None,
+    rows: Annotated[
+        list[str] | None,
+        typer.Option("--row", metavar="NAME", help="Measure only this row; repeat it for more."),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Work:
@@ -321,4 +325,4 @@ def bench(
 
     shell = _shell(context, quiet=quiet, verbose=verbose)
     shell.mute_drivers()
-    return lambda: run(device=device, json_file=json_file, shell=shell)
+    return lambda: run(device=device, json_file=json_file, shell=shell, wanted=rows or ())
