@@ -32,7 +32,7 @@ LIMIT_DEGREES = 1.0
 """Parallax past which the viewer is warned."""
 
 # The quick look at the depth is that many pixels wide at most.
-_QUICK_SIDE = 160
+_QUICK_SIDE = 320
 # It misses the finest spikes: what is fitted is fitted to this part of the budget.
 _MARGIN = 0.95
 # An angle whose tangent is large but no more than that: the eyes of no viewer turn so far.
@@ -152,7 +152,7 @@ def seen_points(
     shared: engine.Shared | None = None,
     on_compile: Callable[[str], None] | None = None,
 ) -> Floats:
-    """What a scene's eye sees, as points: shape (n, 3), scene units; of a picture at most 160 pixels wide and high.
+    """What a scene's eye sees, as points: shape (n, 3), scene units; of a picture at most 320 pixels wide and high.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.

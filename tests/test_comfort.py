@@ -71,7 +71,7 @@ class TestMeasured:
         np.testing.assert_allclose([found.nearest_degrees, found.farthest_degrees], ends)
 
     def test_a_look_is_quick(self, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-        """However large the picture and how many its samples: 160 pixels on the longer side, one ray each."""
+        """However large the picture and how many its samples: 320 pixels on the longer side, one ray each."""
         looks: list[tuple[int, int, int, tuple[str, ...]]] = []
         render = engine.render
 
@@ -82,8 +82,8 @@ class TestMeasured:
         monkeypatch.setattr(engine, "render", watched)
         large = seen("ball", (16000, 4000))
         large = large.model_copy(update={"renderer": large.renderer.model_copy(update={"samples": 64})})
-        found, small = measured(large, device), measured(seen("ball", (160, 40)), device)
-        assert looks == [(160, 40, 1, ("Z",))] * 4  # of either eye
+        found, small = measured(large, device), measured(seen("ball", (320, 80)), device)
+        assert looks == [(320, 80, 1, ("Z",))] * 4  # of either eye
         assert found == small
 
     def test_all_views_of_a_layout(self, device: Device) -> None:
@@ -136,7 +136,7 @@ class TestFitted:
     @pytest.mark.parametrize("kind", SOLIDS_SEEN)
     def test_all_of_the_depth_is_within_the_budget(self, device: Device, kind: str, budget: float) -> None:
         """Of the picture's own pixels, of both eyes, which are finer than those of the quick look."""
-        scene = seen(kind, (240, 200), fit="auto", budget=budget)
+        scene = seen(kind, (400, 330), fit="auto", budget=budget)
         shared = engine.Shared()
         found = fitted(scene, device, shared=shared)
         assert found.stereo is not None
@@ -148,7 +148,7 @@ class TestFitted:
         assert look.nearest_degrees == pytest.approx(-look.farthest_degrees, rel=0.06)
         for side in ("left", "right"):
             film = shoot(found.seen_by(side), device, channels=("Z",))
-            points = points_of_depth(scene_view(found.seen_by(side)), film["Z"], (240, 200))
+            points = points_of_depth(scene_view(found.seen_by(side)), film["Z"], (400, 330))
             assert comfort_of(found, points).worst_degrees <= budget
         # And it is used: either the eyes are as far apart as they may be, or the depth takes up nearly all of it.
         assert found.stereo.separation == 1 or look.worst_degrees > 0.9 * budget
