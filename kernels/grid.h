@@ -24,6 +24,7 @@ typedef struct {
 } cell;
 
 // The cell that holds a point, given in voxels from the middle of the first; beyond the outermost middles the nearest goes on.
+// (What is not a number, in lanes without a ray, is in the last: nothing is read past the grid.)
 INLINE cell cell_at(vec p, __constant const struct Grid *about) {
     const real x = least(most(p.x, R(0.0)), (real)((scalar)(about->sides[0] - 1)));
     const real y = least(most(p.y, R(0.0)), (real)((scalar)(about->sides[1] - 1)));

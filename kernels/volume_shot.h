@@ -198,7 +198,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     real half_number = R(-1.0);
     // Light is the costly part: places are kept until a lane has PENDING of them, and lit together.
     pending kept_places[PENDING];
-    for (int k = 0; k < PENDING; ++k) kept_places[k].weight = R(0.0);
+    for (int k = 0; k < PENDING; ++k) kept_places[k].number = kept_places[k].value = kept_places[k].weight = R(0.0);
     real count = R(0.0);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->max_steps; ++i) {
