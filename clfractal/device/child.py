@@ -1,8 +1,11 @@
-"""The child process that talks to drivers which may abort: `python -m clfractal.device.child FOLDER`.
+"""The child process that talks to drivers which may abort: `python -m clfractal.device.child DESCRIPTOR`.
 
-The folder holds `request.json`; the answer goes into `answer.json` there. A job is a function of one
-argument, the request, that returns JSON data; it may leave files in the folder. Nothing is printed: what
-appears on the standard streams comes from the driver.
+It takes one job after the other, since starting a driver takes longer than many a compilation. A line on standard input
+names a folder that holds `request.json`; the answer goes into `answer.json` there, and a line into the pipe DESCRIPTOR. A
+job is a function of one argument, the request, that returns JSON data; it may leave files there. Nothing is printed:
+what appears on the standard streams comes from the driver, and goes into the folder's `driver.log`.
+
+It ends by itself when nothing is asked for some seconds, when its parent ends, and after a job that failed.
 """
 
 from __future__ import annotations
@@ -12,40 +15,74 @@ import importlib
 import json
 import os
 import resource
+import select
 import signal
 import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
 from clfractal.errors import ClfractalError
 
-REQUEST, ANSWER = "request.json", "answer.json"
+REQUEST, ANSWER, NOISE = "request.json", "answer.json", "driver.log"
+DONE = b"done\n"
+
+# It holds some 200 MB of the compiler's: not for long.
+IDLE_S = 10.0
+# A compiler keeps something of all that it has compiled.
+MOST_JOBS = 20
 
 # A stand-in for a broken driver: the child aborts if its request contains this variable's text.
 TEST_ABORT = "CLFRACTAL_TEST_ABORT"
 
 _PR_SET_PDEATHSIG = 1  # <sys/prctl.h>
+_LONGEST_LINE = 4096
 
 
 def main() -> None:
-    """Do what the request asks and leave at once, without a driver's clean-up, which may hang or crash."""
-    folder = Path(sys.argv[1])
+    """Do what the requests ask and leave at once, without a driver's clean-up, which may hang or crash."""
+    done = int(sys.argv[1])
+    _die_with(int(sys.argv[2]))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for _ in range(MOST_JOBS):
+        folder = _next_folder()
+        if folder is None:
+            break
+        _work(folder)
+        os.write(done, DONE)
+    os._exit(0)
+
+
+def _next_folder() -> Path | None:
+    """Where the next request is; None if there is none for long, or never will be."""
+    if not select.select([0], [], [], IDLE_S)[0]:
+        return None
+    # The parent writes a line at once, and no other before it is answered.
+    line = os.read(0, _LONGEST_LINE)
+    return Path(os.fsdecode(line.rstrip(b"\n"))) if line else None
+
+
+def _work(folder: Path) -> None:
+    with open(folder / NOISE, "wb", buffering=0) as noise:
+        for stream in (1, 2):
+            os.dup2(noise.fileno(), stream)
     text = (folder / REQUEST).read_text(encoding="utf-8")
     request: dict[str, Any] = json.loads(text)
-    _die_with(int(request["parent"]))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     _play_broken_driver(text)
     module, function = request["job"].split(":")
     try:
         answer: dict[str, Any] = {"value": getattr(importlib.import_module(module), function)(request)}
     except ClfractalError as error:
         answer = {"error": [type(error).__name__, error.message, error.details, error.status]}
+    except BaseException:
+        traceback.print_exc()
+        sys.stderr.flush()
+        os._exit(1)
     temporary = folder / f"{ANSWER}.new"
     temporary.write_text(json.dumps(answer), encoding="utf-8")
     temporary.replace(folder / ANSWER)
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(0)
 
 
 def _die_with(parent: int) -> None:
