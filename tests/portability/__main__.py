@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -74,18 +75,23 @@ def _conformance_faults(implementation: Implementation, environment: Mapping[str
     return [] if passed else ["conformance tests fail"]
 
 
-def _picture_faults(implementation: Implementation, environment: Mapping[str, str]) -> list[str]:
+def _picture_faults(implementation: Implementation, environment: Mapping[str, str], half: int) -> list[str]:
+    """Renders every other picture; compiling them one after the other would leave a core idle."""
     found = []
     for kind in ("tiny",) if implementation.simulator else ("full", "tiny"):
-        pictures = _pictures(implementation, kind)
+        pictures = _pictures(implementation, kind, half)
         pictures.unlink(missing_ok=True)
-        if not _run(["tests.portability.pictures", str(pictures), kind], environment):
+        if not _run(["tests.portability.pictures", str(pictures), kind, str(half)], environment):
             found.append(f"the {kind} pictures fail")
     return found
 
 
 Part = Callable[[Implementation, Mapping[str, str]], list[str]]
-PARTS: tuple[Part, ...] = (_conformance_faults, _picture_faults)
+PARTS: tuple[Part, ...] = (
+    _conformance_faults,
+    partial(_picture_faults, half=0),
+    partial(_picture_faults, half=1),
+)
 
 
 def _tests(implementation: Implementation) -> list[str]:
@@ -93,8 +99,8 @@ def _tests(implementation: Implementation) -> list[str]:
     return ["tests/device"] if implementation.simulator else ["tests"]
 
 
-def _pictures(implementation: Implementation, kind: str) -> Path:
-    return WORKPLACE / f"{implementation.name}-{kind}.npz"
+def _pictures(implementation: Implementation, kind: str, half: int) -> Path:
+    return WORKPLACE / f"{implementation.name}-{kind}-{half}.npz"
 
 
 def _oclgrind_checks(implementation: Implementation) -> dict[str, str]:
@@ -133,14 +139,18 @@ def _compare(chosen: list[Implementation]) -> list[tuple[str, str]]:
     for kind in ("full", "tiny"):
         reference: dict[str, np.typing.NDArray[np.float32]] = {}
         for implementation in chosen:
-            path = _pictures(implementation, kind)
-            if not path.exists():
+            pictures: dict[str, np.typing.NDArray[np.float32]] = {}
+            for path in (_pictures(implementation, kind, half) for half in (0, 1)):
+                if path.exists():
+                    with np.load(path) as archive:
+                        pictures |= {name: archive[name] for name in archive.files}
+            if not pictures:
                 continue
-            with np.load(path) as archive:
-                pictures = {name: archive[name] for name in archive.files}
             if not reference:
                 reference = pictures
             for name, picture in pictures.items():
+                if name not in reference:  # it failed there, which is told already
+                    continue
                 # The measure is compared with itself too: that finds colours that are no numbers.
                 found = difference(reference[name], picture, name.split()[-1])
                 print(f"{implementation.name:12} {kind} {name:24} {found.share:.3%} {found.fault or 'same'}")
