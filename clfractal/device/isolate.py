@@ -115,7 +115,7 @@ class _Child:
         """0 once it has answered; else its exit status, negative for a signal; None if it takes too long.
 
         Raises:
-            BrokenPipeError: it ended before it was asked.
+            BrokenPipeError: it ended, but not by what it was asked.
         """
         assert self.process.stdin is not None
         self.process.stdin.write(os.fsencode(folder) + b"\n")
@@ -124,7 +124,10 @@ class _Child:
         if os.read(self.answers, len(DONE)):
             return 0
         status = self.process.wait()
-        if status == 0:  # it had waited long enough, just then
+        if status in (
+            0,
+            -signal.SIGKILL,
+        ):  # it had waited long enough just then, or somebody ended it; no driver does
             raise BrokenPipeError
         return status
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,43 @@ def test_a_value_comes_back_and_noise_does_not(device: Device, capfd: pytest.Cap
     assert number == 42
     assert process != os.getpid()
     assert capfd.readouterr() == ("", "")
+
+
+def test_the_child_stays_for_the_next_job(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = _run(device, "echo_job", number=1)[1]
+    assert _run(device, "echo_job", number=2) == [3, first]
+    with pytest.raises(FormulaError):
+        _run(device, "raise_job")
+    assert _run(device, "echo_job", number=3) == [4, first]
+    # Drivers read the environment when they start.
+    monkeypatch.setenv("CLFRACTAL_TEST_OTHER", "1")
+    second = _run(device, "echo_job", number=4)[1]
+    assert second != first
+    assert _wait(lambda: not _is_running(first))
+
+
+def test_a_child_that_ended_meanwhile_is_replaced(device: Device) -> None:
+    process = _run(device, "echo_job", number=1)[1]
+    os.kill(process, signal.SIGKILL)
+    assert _wait(lambda: not _is_running(process))
+    assert _run(device, "echo_job", number=2)[0] == 3
+
+
+def test_a_child_ends_by_itself_after_many_jobs(device: Device) -> None:
+    first = _run(device, "echo_job", number=1)[1]
+    processes = [_run(device, "echo_job", number=number)[1] for number in range(child.MOST_JOBS)]
+    assert processes[-1] != first
+    assert len(set(processes)) == 2
+
+
+def test_threads_have_children_of_their_own(device: Device) -> None:
+    own = _run(device, "echo_job", number=1)[1]
+    with ThreadPoolExecutor(1) as other:
+        theirs = other.submit(_run, device, "echo_job", number=1).result()[1]
+    assert theirs != own
+    # It ends with its thread.
+    assert _wait(lambda: not _is_running(theirs))
+    assert _run(device, "echo_job", number=2) == [3, own]
 
 
 def test_our_errors_pass_through(device: Device) -> None:
