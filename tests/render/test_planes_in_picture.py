@@ -6,6 +6,7 @@ spheres of radius 4^(2^-n) make rings.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ from tests.render.shots import (
     to_sphere,
     view_of,
 )
+from tests.render.volumes import keep, middles
 
 POSITION = [1.5, -2.5, 1.2]
 CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
@@ -48,6 +50,7 @@ RENDERERS: dict[str, dict[str, Any]] = {
         "box": {"center": [0, 0, 0.1], "size": 2.7},
         "resolution": 64,
         "value": "coverage",
+        "shadows": True,
     },
 }
 # How far from the ball a renderer may find its surface.
@@ -56,7 +59,8 @@ COLORS = {"mode": "stepped", "palette": "magma", "inside": [0.9, 0.1, 0.3], "sca
 TINT = np.array([0.25, 0.5, 0.75])
 LOOK: dict[str, Any] = {
     "material": {"ambient": 1, "diffuse": 0, "specular": 0, "color": list(TINT)},
-    "lights": [{"direction": [0, 1, -0.5], "shadow": False}],
+    # A shadow, of which ambient light shows nothing: tests with shadows have the same program.
+    "lights": [{"direction": [0, 1, -0.5], "shadow": True}],
     "background": {"top": [0.5, 0.25, 0.125], "bottom": [0.5, 0.25, 0.125]},
 }
 BACKGROUND = np.array(LOOK["background"]["top"])
@@ -75,6 +79,8 @@ def picture(
     camera: dict[str, Any],
     planes: list[dict[str, Any]],
     *,
+    folder: Path | None = None,
+    settings: dict[str, Any] | None = None,
     formula: dict[str, Any] = BALL,
     iterations: int = BALL_ITERATIONS,
     **sections: Any,
@@ -87,11 +93,12 @@ def picture(
             "formula": {"inline": formula, "iterations": iterations},
             "image": {"width": 56, "height": 56},
             "camera": camera,
-            "renderer": RENDERERS[renderer],
+            "renderer": settings or RENDERERS[renderer],
             **LOOK,
             "cut_planes": filled,
             **sections,
-        }
+        },
+        folder=folder,
     )
 
 
@@ -272,7 +279,8 @@ def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> N
 
 @pytest.mark.parametrize("cut", [False, True])
 def test_a_plane_in_a_deep_zoom(device: Device, cut: bool) -> None:
-    """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count."""
+    """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count. None of its few voxels is
+    inside: only the plane is seen."""
     if not has_float64(device.info):
         return
     x, y = -0.743643887037151, 0.131825904205330
@@ -287,7 +295,7 @@ def test_a_plane_in_a_deep_zoom(device: Device, cut: bool) -> None:
                 "box": {"size": 4},
                 "resolution": 4,
                 "zoom": [{"center": [x, y, 0], "scale": 4e8}],
-                "transfer": {"opacity": [{"at": 0, "opacity": 0}]},
+                "shadows": True,
             },
             "cut_planes": [
                 {"plane": {"width": 4, "height": 4}, "opacity": 1, "cut": cut, "colors": {"mode": "stepped"}}
@@ -351,33 +359,54 @@ def test_a_cut_ball(device: Device, renderer: str, camera: str) -> None:
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
-def test_what_is_cut_away_throws_no_shadow(device: Device, renderer: str) -> None:
-    """A sphere over a box, lit from above; without the sphere the box has no shadow."""
+def test_what_is_cut_away_throws_no_shadow(device: Device, tmp_path: Path, renderer: str) -> None:
+    """A sphere over a box, lit from above; without the sphere the box has no shadow. The volume is a file's, beside the
+    formula's ball, which shows nothing then."""
     look: dict[str, Any] = {
         "material": {"ambient": 0.25, "diffuse": 0.5, "specular": 0, "color": [1, 1, 1]},
         "lights": [{"direction": [0, 0, -1], "shadow": True}],
     }
-    camera = {"projection": "orthographic", "position": [0, -3, 6], "target": [0, 0, 0], "height": 2.6}
-    seen = {}
+    middle = np.zeros(3)
+    if renderer == "volume":
+        middle[0] = 5
+        side, voxels = 2.7, 64
+        corner, spacing = middle + [-side / 2, -side / 2, 0.1 - side / 2], [side / voxels] * 3
+        keep(tmp_path / "solids.nrrd", solids(corner - middle, voxels, side / voxels), corner, spacing)
+        look["settings"] = {"type": "volume", "file": "solids.nrrd", "shadows": True}
+    else:
+        look["formula"] = SOLIDS
+    camera = {
+        "projection": "orthographic",
+        "position": list(middle + [0, -3, 6]),
+        "target": list(middle),
+        "height": 2.6,
+    }
+    films = {}
     for cut in (False, True):
-        planes = [plane([0, 0, 0.3], [0, 0, 1], 0.0, cut=cut, up=[0, 1, 0])]
-        scene = picture(renderer, camera, planes, formula=SOLIDS, **look)
-        settings = (
-            scene.renderer.model_copy(update={"shadows": True}) if renderer == "volume" else scene.renderer
-        )
-        seen[cut] = shoot(scene.model_copy(update={"renderer": settings}), device)
+        planes = [plane(list(middle + [0, 0, 0.3]), [0, 0, 1], 0.0, cut=cut, up=[0, 1, 0])]
+        films[cut] = shoot(picture(renderer, camera, planes, folder=tmp_path, **look), device)
+    places = {cut: points_of(film) - middle for cut, film in films.items()}
     top = {
         cut: (np.abs(film["P.Z"]) < 0.03) & (film["A"] == 1) & (film["N.Z"] > 0.999)
-        for cut, film in seen.items()
+        for cut, film in films.items()
     }
-    both = top[True] & top[False] & (np.abs(points_of(seen[True])[..., :2]).max(-1) < 1.1)
+    both = top[True] & top[False] & (np.abs(places[True][..., :2]).max(-1) < 1.1)
     assert both.sum() > 700
-    away = np.hypot(seen[True]["P.X"] - SPHERE_CENTER[0], seen[True]["P.Y"] - SPHERE_CENTER[1])
+    away = np.linalg.norm(places[True][..., :2] - SPHERE_CENTER[:2], axis=-1)
     shadow = both & (away < SPHERE_RADIUS - 0.05)
     assert shadow.sum() > 20
-    np.testing.assert_allclose(seen[True]["R"][both], 0.75, atol=0.01)
-    np.testing.assert_allclose(seen[False]["R"][shadow], 0.25, atol=0.01)
-    np.testing.assert_allclose(seen[False]["R"][both & (away > SPHERE_RADIUS + 0.05)], 0.75, atol=0.01)
+    np.testing.assert_allclose(films[True]["R"][both], 0.75, atol=0.01)
+    np.testing.assert_allclose(films[False]["R"][shadow], 0.25, atol=0.01)
+    np.testing.assert_allclose(films[False]["R"][both & (away > SPHERE_RADIUS + 0.05)], 0.75, atol=0.01)
     # The sphere itself is gone.
-    assert (seen[False]["P.Z"] > 1).any()
-    assert (seen[True]["P.Z"] < 0.1).all()
+    assert (films[False]["P.Z"] > 1).any()
+    assert (films[True]["P.Z"] < 0.1).all()
+
+
+def solids(corner: Floats, voxels: int, spacing: float) -> npt.NDArray[np.uint8]:
+    """`SOLIDS` as a grid: shares of voxels, of 255."""
+    places = middles((voxels, voxels, voxels), corner, [spacing] * 3)
+    sphere = np.linalg.norm(places - SPHERE_CENTER, axis=-1) - SPHERE_RADIUS
+    box = np.max(np.abs(places + [0, 0, 0.25]) - [1.2, 1.2, 0.25], axis=-1)
+    share = np.clip(0.5 - np.minimum(sphere, box) / spacing, 0, 1)
+    return np.asarray(np.rint(255 * share), np.uint8)

@@ -24,6 +24,7 @@ from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
 
 SIZE = (70, 40)
 FOG = {"opacity": [{"at": 0.1, "opacity": 0}, {"at": 1, "opacity": 0.4}]}
+WHITE = [{"at": 0, "color": [1, 1, 1]}, {"at": 1, "color": [1, 1, 1]}]
 LIGHTS = [{"direction": [-1, 1, -1], "shadow": True}, {"type": "point", "position": [2, -2, 3]}]
 PLANES = [
     {"plane": {"center": [0, -0.2, 0], "normal": [0.2, -1, 0.3]}, "opacity": 0.5},
@@ -39,13 +40,23 @@ def scene_of(**sections: Any) -> Scene:
     return load_scene({**plain, "lights": LIGHTS, **sections})
 
 
-BOX = {"center": [0, 0, 0], "size": [2.4, 2.6, 2.8]}
-VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "value": "coverage", "shadows": True}
+BOX = {"center": [-0.2, 0, 0], "size": [2.4, 2.6, 2.8]}
+VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "shadows": True}
+UNSEEN = {"plane": {"center": [0, 0, 9]}, "opacity": 0}
+# Of programs that others need: the grids are those of voxels/test_fill.py, one plane through a grid is that of figure 9
+# and, in float64, of test_planes_in_picture.py, which also has four planes.
 SCENES = {
-    "surface": scene_of(renderer=VOLUME, cut_planes=PLANES),
-    "fog": scene_of(renderer={**VOLUME, "transfer": FOG, "samples": 3}, background="transparent"),
-    "cut object": scene_of(renderer={"type": "surface"}, cut_planes=PLANES),
+    "surface": scene_of(renderer=VOLUME, formula=HAST, cut_planes=PLANES[1:]),
+    "fog": scene_of(
+        renderer={**VOLUME, "transfer": FOG, "samples": 3}, formula=HAST, background="transparent"
+    ),
+    "cut object": scene_of(renderer={"type": "surface"}, cut_planes=[*PLANES, UNSEEN, UNSEEN]),
 }
+
+
+def shaded(look: dict[str, Any]) -> dict[str, Any]:
+    """With shadows, as the other fog of this file: the same program."""
+    return {**look, "lights": [{**light, "shadow": True} for light in look["lights"]]}
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +86,7 @@ def test_tiles_and_regions(
     assert same(stacked(shoot(scene, device)), whole)
 
 
-@pytest.mark.parametrize(("name", "counts"), [("surface", {1}), ("fog", {1, 8, 16})])
+@pytest.mark.parametrize(("name", "counts"), [("surface", {1}), ("fog", {4, 8, 16})])
 def test_other_lane_counts(
     device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str, counts: set[int]
 ) -> None:
@@ -91,17 +102,21 @@ def test_float64_shows_the_same(device: Device, wholes: dict[str, npt.NDArray[np
         close(stacked(shoot(SCENES["surface"], device, "float64")), wholes["surface"])
 
 
-@pytest.mark.parametrize("parts", [2, 4])
-def test_a_grid_in_several_pools(
-    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: int
-) -> None:
-    """Larger than the device's largest buffer: values and normals come from the right part."""
+def test_a_grid_in_several_pools(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Larger than the device's largest buffer: values and normals come from the right one of four parts."""
+    parts = 4
     values = np.random.default_rng(5).uniform(0, 255, (33, 41, 50)).astype(np.uint8)
     values[:12] //= 16
     keep(tmp_path / "a.nrrd", values, [-1.2, -1, -0.8], [0.05] * 3)
     transfer = {"opacity": [{"at": 20, "opacity": 0}, {"at": 255, "opacity": 0.5}]}
     scene = volume_scene(
-        PERSPECTIVE, folder=tmp_path, file="a.nrrd", look=LIT, transfer=transfer, size=(40, 40)
+        PERSPECTIVE,
+        folder=tmp_path,
+        file="a.nrrd",
+        look=shaded(LIT),
+        transfer=transfer,
+        shadows=True,
+        size=(40, 40),
     )
     whole = stacked(shoot(scene, device))
     usual = pool.plan_pools
@@ -158,7 +173,16 @@ def test_samples(device: Device, tmp_path: Path) -> None:
     keep(tmp_path / "full.nrrd", np.full((8, 8, 8), 200, np.uint8), [-0.5, -0.5, -0.5], [0.125] * 3)
     camera = {"projection": "orthographic", "position": [0, -3, 0], "height": 1.6}
     solid = {"opacity": [{"at": 0, "opacity": 1}]}
-    scene = volume_scene(camera, folder=tmp_path, file="full.nrrd", transfer=solid, samples=64, size=(15, 15))
+    scene = volume_scene(
+        camera,
+        folder=tmp_path,
+        file="full.nrrd",
+        look=shaded(FLAT),
+        transfer=solid,
+        shadows=True,
+        samples=64,
+        size=(15, 15),
+    )
     film = shoot(scene, device)
     edges = np.clip((np.arange(16) - 7.5) * 1.6 / 15, -0.5, 0.5)
     part = np.diff(edges) / (1.6 / 15)
@@ -225,7 +249,7 @@ def test_files_whose_axes_run_otherwise(device: Device, tmp_path: Path, turn: li
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("transfer", [FOG, {}], ids=["fog", "surface"])
+@pytest.mark.parametrize("transfer", [{**FOG, "color": WHITE}, {}], ids=["fog", "surface"])
 def test_values_that_are_no_numbers(
     device: Device, tmp_path: Path, transfer: dict[str, Any], value: float
 ) -> None:
