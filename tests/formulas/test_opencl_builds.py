@@ -1,4 +1,4 @@
-"""The whole programs of every library formula build, without a warning, at every lane count.
+"""The whole programs of every library formula build, without a warning, in single lanes and packets; some at every width.
 
 All formulas of an entry point share one build: what stands before the generated text is the same for all,
 and what comes after it gets a number. Only the front end of the driver's compiler is asked (no optimiser);
@@ -32,6 +32,8 @@ formula: {name: %s}
 camera: {position: [0, -3, 0], target: [0, 0, 0]}
 coloring: {by: %s}
 """
+# With Jacobians, with a scalar derivative, a chain, and a shape.
+KINDS = ("hast", "quaternion_julia", "mengerbulb", "sierpinski_tetrahedron")
 FORMULA = '#line 1 "generated/formula.h"'
 
 
@@ -76,16 +78,21 @@ def build(text: str, precision: Precision) -> None:
     compiler.compile_source(device(), text, flags)
 
 
-def test_every_lane_count_in_float32() -> None:
-    for lanes in accepted_lanes(device(), "float32"):
+def test_single_lanes_and_the_widest_packets_in_float32() -> None:
+    """Every formula. A packet's width is only a number, so those between are tried with a few."""
+    first, *between, last = accepted_lanes(device(), "float32")
+    for lanes in {first, last}:
         build(together([whole_text(name, "float32", lanes) for name in catalog.names()]), "float32")
+    for lanes in between:
+        build(together([whole_text(name, "float32", lanes) for name in KINDS]), "float32")
 
 
 def test_one_lane_count_in_float64() -> None:
+    """That of every formula compiles, test_opencl.py shows."""
     if not has_float64(device().info):
         return
     lanes = accepted_lanes(device(), "float64")[-1]
-    build(together([whole_text(name, "float64", lanes) for name in catalog.names()]), "float64")
+    build(together([whole_text(name, "float64", lanes) for name in KINDS]), "float64")
 
 
 @pytest.mark.parametrize("coloring", ["solid", "normal"])

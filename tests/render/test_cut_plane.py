@@ -230,7 +230,16 @@ class TestSamples:
     def test_the_mean_is_the_area(self, device: Device) -> None:
         """White in a disk of radius 0.8 (a ball of radius 1, cut at height 0.6), black outside."""
         plane = {"center": [0, 0, 0.6], "width": 2, "height": 2}
-        scene = plane_scene(BALL, (40, 40), iterations=4, plane=plane, colors=WHITE_DISK, samples=64)
+        scene = plane_scene(
+            BALL,
+            (40, 40),
+            iterations=4,
+            plane=plane,
+            colors=WHITE_DISK,
+            samples=64,
+            min_samples=64,
+            noise=1e-3,
+        )
         film = shoot(scene, device)
         radius = np.hypot(film["P.X"], film["P.Y"])
         half_diagonal = 0.05 * np.sqrt(0.5)

@@ -40,10 +40,9 @@ from tests.render.shots import (
 # Search, normal and pattern: each is a program of its own.
 VARIANTS: list[Variant] = [
     ("distance", "one_triangle", "grid"),
-    ("distance", "eight_triangles_normal", "grid"),
     ("distance", "least_squares", "stochastic"),
+    ("steps", "eight_triangles_normal", "grid"),
     ("steps", "eight_triangles_shading", "grid"),
-    ("steps", "least_squares", "grid"),
     ("steps", "gradient", "stochastic"),
 ]
 
@@ -193,7 +192,7 @@ def test_data_channels(device: Device, variant: Variant) -> None:
     assert np.linalg.norm(aside, axis=-1)[whole].max() < 2e-6
 
 
-@pytest.mark.parametrize("variant", VARIANTS[2:4], ids=" ".join)
+@pytest.mark.parametrize("variant", [VARIANTS[1], VARIANTS[3]], ids=" ".join)
 def test_regions(device: Device, variant: Variant) -> None:
     """A region is that part of the picture, bit for bit."""
     part = stacked(shoot(scene_for(variant, "perspective"), device, region=(5, 9, 30, 21)))

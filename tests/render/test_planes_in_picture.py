@@ -370,20 +370,20 @@ def test_what_is_cut_away_throws_no_shadow(device: Device, tmp_path: Path, rende
     if renderer == "volume":
         middle[0] = 5
         side, voxels = 2.7, 64
-        corner, spacing = middle + [-side / 2, -side / 2, 0.1 - side / 2], [side / voxels] * 3
+        corner, spacing = middle + np.array([0, 0, 0.1]) - side / 2, [side / voxels] * 3
         keep(tmp_path / "solids.nrrd", solids(corner - middle, voxels, side / voxels), corner, spacing)
         look["settings"] = {"type": "volume", "file": "solids.nrrd", "shadows": True}
     else:
         look["formula"] = SOLIDS
     camera = {
         "projection": "orthographic",
-        "position": list(middle + [0, -3, 6]),
+        "position": list(middle + np.array([0, -3, 6])),
         "target": list(middle),
         "height": 2.6,
     }
     films = {}
     for cut in (False, True):
-        planes = [plane(list(middle + [0, 0, 0.3]), [0, 0, 1], 0.0, cut=cut, up=[0, 1, 0])]
+        planes = [plane(list(middle + np.array([0, 0, 0.3])), [0, 0, 1], 0.0, cut=cut, up=[0, 1, 0])]
         films[cut] = shoot(picture(renderer, camera, planes, folder=tmp_path, **look), device)
     places = {cut: points_of(film) - middle for cut, film in films.items()}
     top = {
@@ -407,6 +407,6 @@ def solids(corner: Floats, voxels: int, spacing: float) -> npt.NDArray[np.uint8]
     """`SOLIDS` as a grid: shares of voxels, of 255."""
     places = middles((voxels, voxels, voxels), corner, [spacing] * 3)
     sphere = np.linalg.norm(places - SPHERE_CENTER, axis=-1) - SPHERE_RADIUS
-    box = np.max(np.abs(places + [0, 0, 0.25]) - [1.2, 1.2, 0.25], axis=-1)
+    box = np.max(np.abs(places + np.array([0, 0, 0.25])) - [1.2, 1.2, 0.25], axis=-1)
     share = np.clip(0.5 - np.minimum(sphere, box) / spacing, 0, 1)
     return np.asarray(np.rint(255 * share), np.uint8)

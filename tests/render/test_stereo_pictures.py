@@ -38,9 +38,13 @@ KINDS: dict[str, dict[str, Any]] = {
     "surface": {"renderer": EXACT},
     "planes": {
         "renderer": EXACT,
-        "cut_planes": [{"plane": {"normal": [0.3, -1, 0.2], "width": 3, "height": 2}, "opacity": 1}],
+        # Four, of which one is seen: the program of test_planes_in_picture.py.
+        "cut_planes": [
+            {"plane": {"normal": [0.3, -1, 0.2], "width": 3, "height": 2}, "opacity": 1},
+            *[{"plane": {"center": [0, 0, 9]}, "opacity": 0}] * 3,
+        ],
     },
-    "volume": {"renderer": {"type": "volume", "box": {"size": 2.4}, "resolution": 32}},
+    "volume": {"renderer": {"type": "volume", "box": {"size": 2.4}, "resolution": 32, "value": "coverage"}},
 }
 
 

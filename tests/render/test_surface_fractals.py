@@ -44,6 +44,8 @@ CASES: dict[str, tuple[dict[str, Any], Map, int]] = {
     "hast": ({"name": "hast", "iterations": 8}, hast, 2),
     "quaternion_julia": ({"name": "quaternion_julia", "iterations": 8}, julia, 2),
 }
+# Coloured as the scenes of the library that show them, whose programs have the same text.
+COLORING = {"mandelbulb": "iterations", "hast": "solid", "quaternion_julia": "solid"}
 CAMERA = {"position": [1.3, -2.6, 1.6], "target": [0, 0, 0], "fov": 45}
 
 
@@ -52,7 +54,7 @@ def test_normals_and_counts(device: Device, name: str) -> None:
     """The normal is the direction in which |z| of the last application grows fastest; the smooth count is
     n - log(log|z| / log R) / log d at the first n where |z| exceeds R, 1000 or less for high degrees d."""
     formula, step, degree = CASES[name]
-    scene = scene_of(formula, CAMERA, (96, 72), lights=[])
+    scene = scene_of(formula, CAMERA, (96, 72), lights=[], coloring={"by": COLORING[name]})
     film = shoot(scene, device)
     hit = film["A"] > 0
     assert hit.sum() > 800

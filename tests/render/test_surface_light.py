@@ -148,7 +148,7 @@ def test_light_from_behind_a_surface(device: Device) -> None:
 def test_coloring_by_normal(device: Device) -> None:
     """The thesis stores (n + 1)/2 as red, green and blue (sec. 3.2.1)."""
     flat = {**MATERIAL, "ambient": 1, "diffuse": 0, "specular": 0}
-    scene = scene_of(BALL, PERSPECTIVE, coloring={"by": "normal"}, material=flat)
+    scene = scene_of({"name": "hast", "iterations": 8}, PERSPECTIVE, coloring={"by": "normal"}, material=flat)
     film = shoot(scene, device)
     hit = film["A"] == 1
     normals = stacked(film, ("N.X", "N.Y", "N.Z"))

@@ -26,7 +26,14 @@ LIGHTS: list[dict[str, Any]] = [
 ]
 CAMERA = {"position": [1.3, -2.6, 1.6], "target": [0, 0, 0], "fov": 45}
 SCENES: dict[str, Scene] = {
-    "mandelbulb": scene_of({"name": "mandelbulb", "iterations": 8}, CAMERA, SIZE, lights=LIGHTS),
+    # Coloured as the scenes of the library that show it, whose programs have the same text.
+    "mandelbulb": scene_of(
+        {"name": "mandelbulb", "iterations": 8},
+        CAMERA,
+        SIZE,
+        lights=LIGHTS,
+        coloring={"by": "iterations"},
+    ),
     "hast": scene_of(
         {"name": "hast", "iterations": 20}, CAMERA, SIZE, lights=LIGHTS, renderer={"samples": 3}
     ),
@@ -188,18 +195,17 @@ def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float
             close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
 
 
-@pytest.mark.parametrize("name", ["mandelbulb"])
-def test_float64_shows_the_same(
-    device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str
-) -> None:
+def test_float64_shows_the_same(device: Device) -> None:
+    """Of few iterations: folds of hast are finer than float32 soon."""
     if has_float64(device.info):
-        close(stacked(shoot(SCENES[name], device, "float64")), wholes[name])
+        scene = scene_of({"name": "hast", "iterations": 4}, CAMERA, SIZE, lights=LIGHTS)
+        close(stacked(shoot(scene, device, "float64")), stacked(shoot(scene, device)))
 
 
 @pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
 def test_size_of_the_picture_moves_nothing(device: Device, camera: dict[str, Any]) -> None:
     """With three times the pixels every third one has the same ray, in the middle of the coarse one."""
-    formula = {"name": "mandelbulb", "iterations": 8}
+    formula = {"name": "hast", "iterations": 8}
     coarse, fine = (
         shoot(scene_of(formula, camera, (20 * n, 15 * n), renderer={"detail": 0.01}), device) for n in (1, 3)
     )
