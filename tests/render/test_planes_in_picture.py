@@ -277,40 +277,48 @@ def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> N
     np.testing.assert_allclose(with_planes["Z"][hit], without["Z"][hit], atol=1e-5)
 
 
-@pytest.mark.parametrize("cut", [False, True])
-def test_a_plane_in_a_deep_zoom(device: Device, cut: bool) -> None:
-    """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count. None of its few voxels is
-    inside: only the plane is seen."""
+def test_a_plane_in_a_deep_zoom(device: Device) -> None:
+    """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count, whether the plane cuts or
+    not. None of its few voxels is inside: only the plane is seen."""
     if not has_float64(device.info):
         return
     x, y = -0.743643887037151, 0.131825904205330
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "hast", "iterations": 3000},
-            "image": {"width": 40, "height": 40},
-            "camera": {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 4},
-            "renderer": {
-                "type": "volume",
-                "box": {"size": 4},
-                "resolution": 4,
-                "zoom": [{"center": [x, y, 0], "scale": 4e8}],
-                "shadows": True,
-            },
-            "cut_planes": [
-                {"plane": {"width": 4, "height": 4}, "opacity": 1, "cut": cut, "colors": {"mode": "stepped"}}
-            ],
-        }
-    )
-    precision, remark = choose_precision(scene, "auto", has_float64=True)
-    assert (precision, remark) == ("float64", "")
-    film = shoot(scene, device, precision)
-    points = (rays(scene)[0] / 4e8 + np.array([x, y, 0])).astype(np.longdouble)
+    scenes = [
+        load_scene(
+            {
+                "version": 1,
+                "formula": {"name": "hast", "iterations": 3000},
+                "image": {"width": 40, "height": 40},
+                "camera": {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 4},
+                "renderer": {
+                    "type": "volume",
+                    "box": {"size": 4},
+                    "resolution": 4,
+                    "zoom": [{"center": [x, y, 0], "scale": 4e8}],
+                    "shadows": True,
+                },
+                "cut_planes": [
+                    {
+                        "plane": {"width": 4, "height": 4},
+                        "opacity": 1,
+                        "cut": cut,
+                        "colors": {"mode": "stepped"},
+                    }
+                ],
+            }
+        )
+        for cut in (False, True)
+    ]
+    points = (rays(scenes[0])[0] / 4e8 + np.array([x, y, 0])).astype(np.longdouble)
     certain = sure(points[..., 0], points[..., 1], 3000, 4 * 2.0**-52)
     count, _ = mandelbrot(points[..., 0], points[..., 1], 3000)
     assert certain.mean() > 0.9
-    np.testing.assert_array_equal(film["iterations"][certain], count[certain])
     assert len(np.unique(count[certain])) > 20
+    for scene in scenes:
+        precision, remark = choose_precision(scene, "auto", has_float64=True)
+        assert (precision, remark) == ("float64", "")
+        film = shoot(scene, device, precision)
+        np.testing.assert_array_equal(film["iterations"][certain], count[certain])
 
 
 CUT_CENTER, CUT_NORMAL = np.array([0.1, -0.35, 0.15]), np.array([0.3, -1.0, 0.4])
