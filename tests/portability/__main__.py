@@ -1,6 +1,7 @@
 """`python -m tests.portability [--tested] [NAME ...]`: the same tests and pictures on every OpenCL implementation.
 
-With `--tested` the first, which every installation has, gets no tests: `make test` has run them all on it.
+With `--tested` the first, which every installation has, gets no tests, since `make test` has run them all on it, and
+fewer pictures are rendered: those that differ in kind, as golden pictures have shown the formulas on it.
 
 Each implementation runs alone, in processes of its own: first the tests marked `conformance`, then the
 pictures of `pictures.py`; Oclgrind renders tiny ones and checks every access to memory. All pictures are then
@@ -30,6 +31,7 @@ def main() -> int:
     """The exit status: 0 if every implementation is there and passes."""
     wanted = [argument for argument in sys.argv[1:] if argument != "--tested"]
     tested = IMPLEMENTATIONS[0] if "--tested" in sys.argv else None
+    kind = "full" if tested is None else "brief"
     unknown = set(wanted) - {each.name for each in IMPLEMENTATIONS}
     if unknown:
         known = ", ".join(each.name for each in IMPLEMENTATIONS)
@@ -40,9 +42,10 @@ def main() -> int:
     faults: dict[str, list[str]] = {}
     for implementation in chosen:
         start = time.monotonic()
-        faults[implementation.name] = list(_examine(implementation, PARTS[implementation is tested :]))
+        parts = _parts(kind, tested=implementation is tested)
+        faults[implementation.name] = list(_examine(implementation, parts))
         print(f"{implementation.name}: {time.monotonic() - start:.0f} s", flush=True)
-    for name, fault in _compare(chosen):
+    for name, fault in _compare(chosen, (kind, "tiny")):
         faults[name].append(fault)
     print("\nimplementation  result")
     for name, found in faults.items():
@@ -75,23 +78,28 @@ def _conformance_faults(implementation: Implementation, environment: Mapping[str
     return [] if passed else ["conformance tests fail"]
 
 
-def _picture_faults(implementation: Implementation, environment: Mapping[str, str], half: int) -> list[str]:
+def _picture_faults(
+    implementation: Implementation, environment: Mapping[str, str], half: int, kind: str
+) -> list[str]:
     """Renders every other picture; compiling them one after the other would leave a core idle."""
     found = []
-    for kind in ("tiny",) if implementation.simulator else ("full", "tiny"):
-        pictures = _pictures(implementation, kind, half)
+    # Tiny ones are for the simulator, and what it is compared with.
+    measure = (kind, "tiny") if implementation is IMPLEMENTATIONS[0] else (kind,)
+    for each in ("tiny",) if implementation.simulator else measure:
+        pictures = _pictures(implementation, each, half)
         pictures.unlink(missing_ok=True)
-        if not _run(["tests.portability.pictures", str(pictures), kind, str(half)], environment):
-            found.append(f"the {kind} pictures fail")
+        if not _run(["tests.portability.pictures", str(pictures), each, str(half)], environment):
+            found.append(f"the {each} pictures fail")
     return found
 
 
 Part = Callable[[Implementation, Mapping[str, str]], list[str]]
-PARTS: tuple[Part, ...] = (
-    _conformance_faults,
-    partial(_picture_faults, half=0),
-    partial(_picture_faults, half=1),
-)
+
+
+def _parts(kind: str, *, tested: bool) -> tuple[Part, ...]:
+    """What is done on an implementation, each in processes of its own."""
+    halves = tuple(partial(_picture_faults, half=half, kind=kind) for half in (0, 1))
+    return halves if tested else (_conformance_faults, *halves)
 
 
 def _tests(implementation: Implementation) -> list[str]:
@@ -133,10 +141,10 @@ def _run(module_and_arguments: list[str], environment: Mapping[str, str]) -> boo
         return False
 
 
-def _compare(chosen: list[Implementation]) -> list[tuple[str, str]]:
+def _compare(chosen: list[Implementation], kinds: tuple[str, str]) -> list[tuple[str, str]]:
     """Faults of the pictures, by implementation; those of the first that has them are the measure."""
     faults = []
-    for kind in ("full", "tiny"):
+    for kind in kinds:
         reference: dict[str, np.typing.NDArray[np.float32]] = {}
         for implementation in chosen:
             pictures: dict[str, np.typing.NDArray[np.float32]] = {}

@@ -1,7 +1,7 @@
 """Small pictures that every implementation renders: `python -m tests.portability.pictures OUT.npz KIND PART`.
 
-KIND is `full` or `tiny`, PART is 0 or 1: every other picture. They reach what a compiler may get wrong: trigonometry and
-whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full Jacobian, shadows of
+KIND is `full`, `brief` or `tiny`, PART is 0 or 1: every other picture. They reach what a compiler may get wrong:
+trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full Jacobian, shadows of
 both kinds of light, several samples; what stills add: the points of a pixel, the search by steps, every kind of ray, a lens
 and fog; a grid that is filled and shown as a cloud around a cut plane, and a plane by itself.
 """
@@ -59,6 +59,8 @@ _MORE = {
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
 _LENSES = {"still": ", f_number: 0.5"}
+# Each adds something that the others do not have; the rest are more formulas.
+_BRIEF = ("trigonometric", "mandelbox", "still", "steps", "cloud", "plane")
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)
@@ -67,12 +69,14 @@ _TINY = ("mandelbulb", "hast", "mandelbox", "plane")
 SIZE, TINY_SIZE = (96, 72), (12, 8)
 
 
-def cases(tiny: bool) -> Iterator[tuple[str, Precision]]:
+def cases(kind: str) -> Iterator[tuple[str, Precision]]:
     """Names and number types of the pictures."""
-    for name in _TINY if tiny else _SCENES:
+    chosen = {"full": tuple(_SCENES), "brief": _BRIEF, "tiny": _TINY}[kind]
+    for name in chosen:
         yield name, "float32"
-    for name in () if tiny else _DOUBLE:
-        yield name, "float64"
+    for name in _DOUBLE:
+        if name in chosen and kind != "tiny":
+            yield name, "float64"
 
 
 def picture(
@@ -114,12 +118,14 @@ def _scene_text(
 
 def main() -> None:
     """Render a part of the pictures on the device that the environment names."""
-    tiny, part = sys.argv[2] == "tiny", int(sys.argv[3])
+    kind, part = sys.argv[2], int(sys.argv[3])
     device = choose()
     print(device.info.name, "|", device.info.version, flush=True)
     rendered = {}
-    for name, precision in list(cases(tiny))[part::2]:
-        rendered[f"{name} {precision}"] = picture(device, name, precision, TINY_SIZE if tiny else SIZE)
+    for name, precision in list(cases(kind))[part::2]:
+        rendered[f"{name} {precision}"] = picture(
+            device, name, precision, TINY_SIZE if kind == "tiny" else SIZE
+        )
         print("rendered", name, precision, flush=True)
     save: Any = np.savez  # its stubs know no arrays by name beside options
     save(Path(sys.argv[1]), **rendered)
