@@ -1,9 +1,9 @@
 """Small pictures that every implementation renders: `python -m tests.portability.pictures OUT.npz KIND PART`.
 
 KIND is `full`, `brief` or `tiny`, PART is 0 or 1: every other picture. They reach what a compiler may get wrong:
-trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full Jacobian, shadows of
-both kinds of light, several samples; what stills add: the points of a pixel, the search by steps, every kind of ray, a lens
-and fog; a grid that is filled and shown as a cloud around a cut plane, and a plane by itself.
+trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full
+Jacobian, shadows of both kinds of light, several samples; what stills add: the points of a pixel, the search by steps,
+every kind of ray, a lens and fog; a grid that is filled and shown as a cloud around a cut plane, and a plane by itself.
 """
 
 from __future__ import annotations
