@@ -9,11 +9,11 @@ from typing import Any
 
 from clfractal.comfort import fitted
 from clfractal.device.select import Device
-from clfractal.errors import SceneError, Where
 from clfractal.job import Job, prepare
 from clfractal.render import engine
 from clfractal.render.compose import APART, Composed, Side, composed_channels, eye_regions, picture_size
 from clfractal.render.outputs import pair_paths, save_views
+from clfractal.render.plan import make_region
 from clfractal.render.split import Share
 from clfractal.render.tiled import Picture, TiledStore
 from clfractal.render.tiles import Region, TileGrid
@@ -34,12 +34,14 @@ class Pair:
         eyes: the job of each eye whose picture is needed.
         region: the part of the finished picture to make, pixels.
         shared: what both renders have in common.
+        common: what files tell about the whole picture, whichever eye's they show.
     """
 
     job: Job
     eyes: Mapping[Side, Job]
     region: Region
     shared: engine.Shared
+    common: Mapping[str, Any]
 
     @property
     def stereo(self) -> Stereo:
@@ -56,7 +58,7 @@ class Pair:
         """What files tell about one eye's picture: the whole scene, and that eye's camera."""
         view = scene_view(self.eyes[side].scene)
         cameras = {"worldToCamera": view.world_to_camera(), "worldToNDC": view.world_to_ndc()}
-        return {**self.job.header(), **cameras, "view": side}
+        return {**self.common, **cameras, "view": side}
 
     def identity(self, side: Side) -> dict[str, Any]:
         """What has to be the same for a tile of one eye's picture to have the same bits."""
@@ -69,7 +71,7 @@ class Pair:
     def header_of_both(self, stores: Mapping[Side, Picture]) -> dict[str, Any]:
         """What files tell about a picture made of both: it has no camera of its own, and took the time of two."""
         seconds = sum(store.header.get("seconds", 0.0) for store in stores.values())
-        common = {key: value for key, value in self.job.header().items() if not key.startswith("worldTo")}
+        common = {key: value for key, value in self.common.items() if not key.startswith("worldTo")}
         return {**common, "seconds": seconds}
 
 
@@ -96,7 +98,7 @@ def prepare_pair(
     job = prepare(scene, device, precision=precision, samples=samples, channels=channels, on_start=on_start)
     composed_channels(scene.stereo, job.plan.channels)
     image = (scene.image.width, scene.image.height)
-    part = _part(region, picture_size(scene.stereo, image))
+    part = make_region(picture_size(scene.stereo, image), region)
     if scene.stereo.fit is not None:
         found = fitted(scene, device, shared=shared, on_compile=on_compile)
         job = prepare(found, device, precision=precision, samples=samples, channels=channels)
@@ -106,18 +108,7 @@ def prepare_pair(
         for side, needed in regions.items()
         if needed is not None
     }
-    return Pair(job, eyes, part, shared)
-
-
-def _part(region: tuple[int, int, int, int] | None, size: tuple[int, int]) -> Region:
-    width, height = size
-    found = Region(0, 0, width, height) if region is None else Region(*region)
-    if found.width < 1 or found.height < 1 or not found.inside(width, height):
-        got = ",".join(str(value) for value in region or ())
-        raise SceneError(
-            f"must lie inside the picture of {width} x {height} pixels, got {got}", Where("--region")
-        )
-    return found
+    return Pair(job, eyes, part, shared, job.header())
 
 
 def render_eyes(

@@ -112,13 +112,13 @@ def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool
     return "float32", "pixels are finer than float32 resolves here, and the device has no float64"
 
 
-def make_region(scene: Scene, region: tuple[int, int, int, int] | None) -> Region:
-    """The region `x, y, width, height` of a scene's picture, or all of it.
+def make_region(size: tuple[int, int], region: tuple[int, int, int, int] | None) -> Region:
+    """The region `x, y, width, height` of a picture of `size`, or all of it; pixels.
 
     Raises:
         SceneError: it is empty or does not lie inside the picture.
     """
-    width, height = scene.image.width, scene.image.height
+    width, height = size
     if region is None:
         return Region(0, 0, width, height)
     x, y, w, h = region
@@ -144,6 +144,6 @@ def make_plan(
         precision,
         lanes,
         samples if samples is not None else scene.renderer.samples,
-        make_region(scene, region),
+        make_region((scene.image.width, scene.image.height), region),
         check_channels(channels if channels is not None else scene.output.channels),
     )

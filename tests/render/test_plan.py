@@ -115,12 +115,12 @@ def test_auto_changes_before_float32_is_seen(device: Device) -> None:
 
 
 def test_regions() -> None:
-    scene = scene_of(BALL, PERSPECTIVE, (40, 30))
-    assert make_region(scene, None) == Region(0, 0, 40, 30)
-    assert make_region(scene, (39, 29, 1, 1)) == Region(39, 29, 1, 1)
+    size = (40, 30)
+    assert make_region(size, None) == Region(0, 0, 40, 30)
+    assert make_region(size, (39, 29, 1, 1)) == Region(39, 29, 1, 1)
     for wrong in ((0, 0, 41, 1), (0, 0, 1, 31), (-1, 0, 2, 2), (0, -1, 2, 2), (5, 5, 0, 1), (5, 5, 1, 0)):
         with pytest.raises(SceneError, match="inside the picture of 40 x 30 pixels"):
-            make_region(scene, wrong)
+            make_region(size, wrong)
 
 
 def test_what_a_plan_takes_from_the_scene() -> None:
