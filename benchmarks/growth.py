@@ -17,16 +17,16 @@ from dataclasses import dataclass
 
 from clfractal import bench
 from clfractal.device.select import Device, choose
-from clfractal.job import prepare
-from clfractal.render import engine
-from clfractal.render.film import Film
-from clfractal.render.volume import VolumeWorker, settings_of
-from clfractal.render.workers import WORKERS
+from clfractal.pictures.film import Film
+from clfractal.renderers.volume import VolumeWorker, settings_of
+from clfractal.renderers.workers import WORKERS
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
+from clfractal.work import engine
+from clfractal.work.job import prepare
 
 RESOLUTIONS = (128, 256, 512, 1024)
 SHOWN = (256, 512, 1024)

@@ -10,9 +10,7 @@ Everything public is imported when it is first used, so that `import clfractal` 
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
     from clfractal.errors import FormulaError as FormulaError
     from clfractal.errors import KernelBuildError as KernelBuildError
     from clfractal.errors import SceneError as SceneError
-    from clfractal.render.film import Film as Film
+    from clfractal.pictures.film import Film as Film
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
 
@@ -36,6 +34,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "escape": "clfractal.api",
     "load_scene": "clfractal.api",
+    "render": "clfractal.api",
     "render_pair": "clfractal.api",
     "devices": "clfractal.device.select",
     "ClfractalError": "clfractal.errors",
@@ -44,38 +43,17 @@ _HOMES = {
     "FormulaError": "clfractal.errors",
     "KernelBuildError": "clfractal.errors",
     "SceneError": "clfractal.errors",
-    "Film": "clfractal.render.film",
+    "Film": "clfractal.pictures.film",
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
 }
 
 
-class _CallablePackage(ModuleType):
-    """What `clfractal.render` is: the package of that name, and when called the function `api.render`."""
-
-    def __call__(self, *arguments: Any, **settings: Any) -> Any:
-        return import_module("clfractal.api").render(*arguments, **settings)
-
-
-class _Root(ModuleType):
-    """This package. Importing `clfractal.render` binds that name here; from then on it can be called."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name == "render" and isinstance(value, ModuleType):
-            value.__class__ = _CallablePackage
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Root
-
-
 def __getattr__(name: str) -> Any:
-    if name == "render":
-        return import_module("clfractal.render")
     if name in _HOMES:
         return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'clfractal' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted(["__version__", "render", *_HOMES])
+    return sorted(["__version__", *_HOMES])

@@ -15,10 +15,10 @@ from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
     from clfractal.device.structs import Precision
-    from clfractal.pair import Pair
-    from clfractal.render.compose import Side
-    from clfractal.render.engine import ProgressCallback
-    from clfractal.render.film import Film
+    from clfractal.pictures.compose import Side
+    from clfractal.pictures.film import Film
+    from clfractal.work.engine import ProgressCallback
+    from clfractal.work.pair import Pair
 
 __all__ = ["escape", "load_scene", "render", "render_pair"]
 
@@ -58,7 +58,7 @@ def render(
 
     loaded = scene if isinstance(scene, Scene) else load_scene(scene)
     if loaded.stereo is not None:
-        from clfractal.pair import composed
+        from clfractal.work.pair import composed
 
         if loaded.stereo.mode in ("pair", "multi_view"):
             raise SceneError(
@@ -69,10 +69,10 @@ def render(
             loaded, device, progress, precision=precision, samples=samples, region=region, channels=channels
         )
         return composed(pair, films).to_film()
-    from clfractal import job as jobs
     from clfractal.device.select import choose
-    from clfractal.render import engine
-    from clfractal.render.film import Film
+    from clfractal.pictures.film import Film
+    from clfractal.work import engine
+    from clfractal.work import job as jobs
 
     job = jobs.prepare(
         loaded, choose(device), precision=precision, samples=samples, region=region, channels=channels
@@ -126,8 +126,8 @@ def _rendered_pair(
 ) -> tuple[Pair, dict[Side, Film]]:
     """How a stereo scene was rendered, and the films of the eyes that its mode needs."""
     from clfractal.device.select import choose
-    from clfractal.pair import prepare_pair, render_eyes
-    from clfractal.render.film import Film
+    from clfractal.pictures.film import Film
+    from clfractal.work.pair import prepare_pair, render_eyes
 
     pair = prepare_pair(scene, choose(device), region=region, **settings)
     films: dict[Side, Film] = {
@@ -177,8 +177,8 @@ def escape(
     from clfractal.device.select import choose
     from clfractal.device.tune import best_lanes
     from clfractal.formulas.catalog import load_chain
-    from clfractal.render import points as launch
-    from clfractal.render.probe import probe_for
+    from clfractal.renderers import points as launch
+    from clfractal.work.probe import probe_for
 
     chain = load_chain(formula, parameters)
     if precision not in ("float32", "float64"):

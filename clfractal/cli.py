@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from clfractal.shell import Shell
+    from clfractal.commands.shell import Shell
 
 INTERRUPTED = 130
 
@@ -34,7 +34,7 @@ def main() -> None:
 
     try:
         interrupt.watch(last_words, INTERRUPTED)
-        from clfractal.shell import Shell
+        from clfractal.commands.shell import Shell
 
         shell = Shell(owns_process=True)
         status = run(sys.argv[1:], shell)

@@ -22,7 +22,7 @@ from clfractal import resources
 from clfractal.api import load_scene, render
 from clfractal.files.srgb import encode8
 from clfractal.formulas import catalog
-from clfractal.render.compose import APART
+from clfractal.pictures.compose import APART
 from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent

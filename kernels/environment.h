@@ -10,7 +10,7 @@
 //   by_column[rows][columns + 1] the same along each row,
 //   density[rows][columns]       probability per steradian, constant in a cell,
 //   pixels[height][width][3]     linear Rec. 709.
-// clfractal/render/environment.py fills it. Needs lanes.h, numbers/real.h, vectors.h, structs.h, shade.h.
+// clfractal/renderers/environment.py fills it. Needs lanes.h, numbers/real.h, vectors.h, structs.h, shade.h.
 #define ENVIRONMENT_TURN S(6.283185307179586)
 
 // Where in the picture a direction lies: parts of its width and height, both 0 to 1.

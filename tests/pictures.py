@@ -19,8 +19,8 @@ from PIL import Image
 
 from clfractal import resources
 from clfractal.api import load_scene, render, render_pair
-from clfractal.render.compose import APART, Composed
-from clfractal.render.film import Film
+from clfractal.pictures.compose import APART, Composed
+from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.volume import VolumeRenderer

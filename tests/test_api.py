@@ -9,7 +9,7 @@ import pytest
 
 import clfractal
 from clfractal.files.exr import read_exr
-from clfractal.render.engine import Progress
+from clfractal.work.engine import Progress
 from tests.shell import SCENE
 
 
@@ -20,14 +20,14 @@ def test_everything_public_is_there() -> None:
         clfractal.rendre  # noqa: B018
 
 
-def test_render_is_a_function_and_a_package() -> None:
-    from clfractal.render import film
+def test_render_is_a_plain_function_and_stereo_a_public_module() -> None:
+    import inspect
 
-    assert film.Film is clfractal.Film
-    assert callable(clfractal.render)
-    import clfractal.render.engine as engine
+    import clfractal.stereo
 
-    assert callable(engine.render)
+    assert inspect.isfunction(clfractal.render)
+    assert "device" in inspect.signature(clfractal.render).parameters
+    assert all(callable(getattr(clfractal.stereo, name)) for name in ("frustum", "attitude", "parallax"))
 
 
 def test_a_film_of_arrays() -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from clfractal.device import program, select
 from clfractal.device.source import FlatText
-from clfractal.render import surface
+from clfractal.renderers import surface
 from tests.files.limits import file_size_limit
 from tests.shell import SCENE, InProcess, command, environment
 

@@ -16,15 +16,15 @@ from benchmarks.rivals.base import MissingError
 from benchmarks.rivals.mandelbulber import Mandelbulber
 from benchmarks.rivals.vtk_volume import VtkVolume
 from benchmarks.runtimes import Runtime
-from clfractal import bench
+from clfractal.commands import bench
+from clfractal.commands.shell import Shell
 from clfractal.device.select import choose
 from clfractal.errors import ClfractalError
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.render.workers import WORKERS
+from clfractal.renderers.workers import WORKERS
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.shell import Shell
 
 
 def scene_of(row: str, *changes: str) -> Scene:

@@ -14,11 +14,11 @@ import pytest
 
 import clfractal
 from clfractal.commands.progress import Reporter
+from clfractal.commands.shell import Shell
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import catalog
-from clfractal.render.engine import Progress
-from clfractal.shell import Shell
+from clfractal.work.engine import Progress
 from tests.shell import SCENE, InProcess, command, environment, process
 
 

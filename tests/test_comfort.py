@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal import comfort
-from clfractal.comfort import Comfort, comfort_of, comfort_of_depth, fitted, measured, points_of_depth
 from clfractal.device.select import Device, choose
-from clfractal.render import engine
-from clfractal.render.stereo import degrees, eye_distance
-from clfractal.render.view import scene_view
+from clfractal.optics.stereo import degrees, eye_distance
+from clfractal.optics.view import scene_view
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
+from clfractal.work import engine
+from clfractal.work.comfort import Comfort, comfort_of, comfort_of_depth, fitted, measured, points_of_depth
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, points_of, scene_of, shoot
 from tests.shell import SCENE
 

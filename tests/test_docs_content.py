@@ -333,7 +333,7 @@ def test_messages(
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a.exr, a.png and stats.json."""
     from clfractal.cli import run
-    from clfractal.shell import Shell
+    from clfractal.commands.shell import Shell
 
     folder = tmp_path_factory.mktemp("rendered")
     (folder / "scene.yaml").write_text(SCENE)
@@ -389,7 +389,7 @@ def test_the_python_api_is_described() -> None:
 
 @pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
 def test_files_that_a_page_names_exist(page: str) -> None:
-    """`clfractal/render/view.py`, `kernels/march.h`: an architecture page outlives its files only too easily."""
+    """`clfractal/optics/view.py`, `kernels/march.h`: an architecture page outlives its files only too easily."""
     named = set(re.findall(r"`((?:clfractal|kernels|tests|benchmarks|scenes)/[\w./]+\.\w+)`", text(page)))
     assert [name for name in sorted(named) if not os.path.exists(DOCS.parent / name)] == []
 

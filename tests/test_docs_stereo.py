@@ -15,8 +15,8 @@ import pytest
 from PIL import Image
 
 from clfractal.api import load_scene
-from clfractal.pair import output_files
-from clfractal.render.anaglyph import (
+from clfractal.optics.stereo import degrees
+from clfractal.pictures.anaglyph import (
     IDEAL,
     REAL_RED_CYAN,
     Filter,
@@ -28,10 +28,10 @@ from clfractal.render.anaglyph import (
     matrices,
     mix,
 )
-from clfractal.render.compose import eye_size, picture_size
-from clfractal.render.stereo import degrees
+from clfractal.pictures.compose import eye_size, picture_size
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
+from clfractal.work.pair import output_files
 from tests.test_docs_content import DOCS, code, table, text
 
 WIDTH, HEIGHT = 640, 360

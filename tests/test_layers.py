@@ -74,7 +74,7 @@ def test_a_library_is_used_in_one_place(module: str) -> None:
 def test_checking_a_scene_needs_no_opencl() -> None:
     """And neither a bar nor a picture library: what is loaded for a command is what it needs."""
     code = (
-        "import sys; from clfractal.cli import run; from clfractal.shell import Shell\n"
+        "import sys; from clfractal.cli import run; from clfractal.commands.shell import Shell\n"
         "import tempfile, pathlib; f = pathlib.Path(tempfile.mkdtemp()) / 's.yaml'\n"
         "f.write_text('version: 1\\nformula: {name: hast}\\ncamera: {}\\n')\n"
         "assert run(['check', str(f)], Shell(owns_process=False)) == 0\n"

@@ -11,9 +11,9 @@ import pytest
 import clfractal
 from clfractal.commands.slices import Stack, slice_scene
 from clfractal.files.exr import read_exr
-from clfractal.render import engine
-from clfractal.render.cut_plane import renderer_of
+from clfractal.renderers.cut_plane import renderer_of
 from clfractal.scene.load import load_scene
+from clfractal.work import engine
 from tests.shell import InProcess
 
 SCENE = """version: 1

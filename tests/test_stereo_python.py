@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.comfort import fitted
 from clfractal.device.select import choose
-from clfractal.render.compose import compose
-from clfractal.render.engine import Progress
+from clfractal.pictures.compose import compose
 from clfractal.scene import given
 from clfractal.scene.stereo import Stereo
+from clfractal.work.comfort import fitted
+from clfractal.work.engine import Progress
 from tests.render.volumes import keep
 from tests.shell import SCENE
 

@@ -14,7 +14,7 @@ from PIL import Image
 from clfractal.errors import STATUS_BAD_INPUT
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.render.compose import compose, picture_size
+from clfractal.pictures.compose import compose, picture_size
 from clfractal.scene.load import load_scene
 from clfractal.scene.stereo import Stereo
 from tests.shell import SCENE, InProcess
@@ -55,7 +55,7 @@ def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
 def eyes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Planes, Planes]:
     """Both eyes' channels, as `mode: pair` writes them."""
     from clfractal.cli import run
-    from clfractal.shell import Shell
+    from clfractal.commands.shell import Shell
 
     folder = tmp_path_factory.mktemp("eyes")
     (folder / "scene.yaml").write_text(STEREO)

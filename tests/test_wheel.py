@@ -70,7 +70,7 @@ def test_a_fresh_environment_renders_from_the_wheel(wheel: Path, tmp_path: Path)
     assert (work / "a.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"
     loaded = run(
         python,
-        *("-c", "import sys, clfractal.api, clfractal.render.engine, clfractal.resources as r\n"),
+        *("-c", "import sys, clfractal.api, clfractal.work.engine, clfractal.resources as r\n"),
         folder=work,
     )
     assert loaded == ""

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 import clfractal
+from clfractal.commands.shell import Shell
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_INTERRUPTED
-from clfractal.shell import Shell
 
 Work = Callable[[], None]
 
@@ -321,7 +321,7 @@ def bench(
     verbose: Verbose = False,
 ) -> Work:
     """Measure this machine's speed and print a table."""
-    from clfractal.bench import run
+    from clfractal.commands.bench import run
 
     shell = _shell(context, quiet=quiet, verbose=verbose)
     shell.mute_drivers()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where, speaking_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
-from clfractal.shell import Shell
 
 if TYPE_CHECKING:
     import numpy as np
@@ -44,9 +44,9 @@ def check_scene(
 
 def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, str, str]:
     """The scene as it is rendered, the range of its parallax, and a warning or nothing."""
-    from clfractal.comfort import fitted, measured
     from clfractal.device.select import choose
-    from clfractal.render.engine import Shared
+    from clfractal.work.comfort import fitted, measured
+    from clfractal.work.engine import Shared
 
     device, shared = choose(wanted), Shared()
     found = fitted(scene, device, shared=shared, on_compile=shell.say)
@@ -58,7 +58,7 @@ def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, st
 
 def _eyes(scene: Scene) -> list[str]:
     """Where the viewer's eyes are in the scene, which moves the camera, and what lies on the screen."""
-    from clfractal.render.stereo import eye_views, relation
+    from clfractal.optics.stereo import eye_views, relation
     from clfractal.scene.cut_plane import CutPlaneRenderer
 
     views = (

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from clfractal.commands.shell import Shell
 from clfractal.device import select, tune
 from clfractal.device.select import Device, DeviceInfo
 from clfractal.errors import ClfractalError, DeviceError
-from clfractal.render.probe import probe_for
-from clfractal.shell import Shell
+from clfractal.work.probe import probe_for
 
 _HEAD = ("", "index", "name", "platform", "memory", "float64", "GL", "lanes", "speed")
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from clfractal.commands.shell import Shell
 from clfractal.commands.voxelize import (
     COLORING_KEY,
     Order,
@@ -33,10 +34,9 @@ from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.shell import Shell
 
 if TYPE_CHECKING:
-    from clfractal.job import Job
+    from clfractal.work.job import Job
 
 _NPY = b"\x93NUMPY"
 
@@ -175,8 +175,8 @@ def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
     text = volume.texts.get(SCENE_KEY)
     if not text or not ("\n" in text or text.startswith("{")):  # else it would be the name of a file
         return None
-    from clfractal import job as jobs
     from clfractal.device.select import choose
+    from clfractal.work import job as jobs
 
     folder = Path(order.source).parent
     try:
@@ -240,7 +240,7 @@ def _nothing(order: Order, found: _Found, close: bool) -> ClfractalError:
 
 def _dressed(mesh: Mesh, made: _Made, volume: Volume, tell: Teller, shell: Shell) -> Mesh:
     """With the formula's normals and the scene's colours."""
-    from clfractal.render.vertices import COLORED_BY, dress, on_faces
+    from clfractal.renderers.vertices import COLORED_BY, dress, on_faces
 
     job, by = made.job, made.coloring.by
     if by not in COLORED_BY:

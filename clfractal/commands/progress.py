@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from clfractal.shell import Shell
+from clfractal.commands.shell import Shell
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-    from clfractal.render.engine import Progress
+    from clfractal.work.engine import Progress
 
 BAR_AFTER_SECONDS = 0.5
 """Quick renders show no bar: the library that draws it takes longer to load than they take."""

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
 from clfractal.commands.progress import Reporter
+from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.atomic import check_output
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.shell import Shell
 
 if TYPE_CHECKING:
-    from clfractal.render.store import JournalFilm
+    from clfractal.pictures.store import JournalFilm
 
 
 def render_scene(order: Order, shell: Shell) -> None:
@@ -40,11 +40,11 @@ def render_scene(order: Order, shell: Shell) -> None:
         render_stereo(order, scene, outputs, region, shell, start)
         return
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
-    from clfractal import job as jobs
     from clfractal.commands import stats
     from clfractal.device.select import choose
-    from clfractal.render import engine
-    from clfractal.render.store import JournalFilm
+    from clfractal.pictures.store import JournalFilm
+    from clfractal.work import engine
+    from clfractal.work import job as jobs
 
     job = jobs.prepare(scene, choose(order.device), region=region, on_start=shell.say)
     if job.remark:
@@ -130,7 +130,7 @@ def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
     outputs = order.outputs or (Path(source.with_suffix(".png").name),)
     if not order.outputs and os.path.realpath(outputs[0]) == os.path.realpath(source):
         raise FileError("would be replaced by its own picture; name an output with -o", Where(order.scene))
-    from clfractal.render.outputs import check_output as check_picture
+    from clfractal.pictures.outputs import check_output as check_picture
 
     for path in outputs:
         for file in _files(scene, path):
@@ -144,7 +144,7 @@ def _files(scene: Scene, path: Path) -> list[Path]:
     """What is written for an output."""
     if scene.stereo is None:
         return [path]
-    from clfractal.pair import output_files
+    from clfractal.work.pair import output_files
 
     return output_files(scene.stereo, path)
 

@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING
 from pydantic import ValidationError
 
 from clfractal.commands.render import PARTIAL, Order, ordered_scene
+from clfractal.commands.shell import Shell
 from clfractal.errors import FileError, SceneError, Where
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.plane import moved
-from clfractal.shell import Shell
 
 if TYPE_CHECKING:
     from clfractal.device.select import Device
-    from clfractal.job import Job
-    from clfractal.render.film import Film
-    from clfractal.render.store import JournalFilm
+    from clfractal.pictures.film import Film
+    from clfractal.pictures.store import JournalFilm
+    from clfractal.work.job import Job
 
 MOST_SLICES = 100_000
 # Pictures beyond this are kept on disk until they are whole, bytes.
@@ -119,7 +119,7 @@ def _numbered(outputs: tuple[Path, ...], number: int, count: int) -> tuple[Path,
 
 def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> None:
     """All files, before anything is rendered."""
-    from clfractal.render.outputs import check_output
+    from clfractal.pictures.outputs import check_output
 
     source = os.path.realpath(order.scene)
     for path in files[0]:
@@ -137,7 +137,7 @@ def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> N
 def _precision(scenes: list[Scene], device: Device) -> str:
     """One number type for the whole stack: the finest that any of its ends needs."""
     from clfractal.device.select import has_float64
-    from clfractal.render.plan import choose_precision
+    from clfractal.renderers.plan import choose_precision
 
     wanted = scenes[0].renderer.precision
     able = has_float64(device.info)
@@ -147,8 +147,8 @@ def _precision(scenes: list[Scene], device: Device) -> str:
 
 def _render(scene: Scene, device: Device, precision: str, paths: tuple[Path, ...], shell: Shell) -> int:
     """One slice; gives the number of its samples."""
-    from clfractal import job as jobs
-    from clfractal.render import engine
+    from clfractal.work import engine
+    from clfractal.work import job as jobs
 
     job = jobs.prepare(scene, device, precision=precision, on_start=shell.say)
     film, discard = _film(job, paths[0].with_name(paths[0].name + PARTIAL))
@@ -163,8 +163,8 @@ def _render(scene: Scene, device: Device, precision: str, paths: tuple[Path, ...
 
 def _film(job: Job, partial: Path) -> tuple[Film | JournalFilm, Callable[[], None]]:
     """Where a slice's tiles go, and how to be rid of it."""
-    from clfractal.render.film import Film
-    from clfractal.render.store import JournalFilm
+    from clfractal.pictures.film import Film
+    from clfractal.pictures.store import JournalFilm
 
     plan, image = job.plan, job.scene.image
     size = (image.width, image.height)

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import clfractal
 from clfractal.files.atomic import atomic_writer
-from clfractal.job import Job
-from clfractal.render.engine import Progress
-from clfractal.render.view import scene_view
+from clfractal.optics.view import scene_view
+from clfractal.work.engine import Progress
+from clfractal.work.job import Job
 
 if TYPE_CHECKING:
-    from clfractal.comfort import Comfort
-    from clfractal.pair import Pair
+    from clfractal.work.comfort import Comfort
+    from clfractal.work.pair import Pair
 
 
 def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) -> dict[str, Any]:

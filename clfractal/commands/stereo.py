@@ -6,18 +6,18 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from clfractal.comfort import Comfort, comfort_of_depth, measured
 from clfractal.commands import stats
 from clfractal.commands.order import PARTIAL, Order
 from clfractal.commands.progress import Reporter
+from clfractal.commands.shell import Shell
 from clfractal.device.select import choose
 from clfractal.errors import speaking_of
-from clfractal.pair import Pair, output_files, prepare_pair, render_eyes, save_pair
-from clfractal.render.compose import Side
-from clfractal.render.store import JournalFilm
-from clfractal.render.view import scene_view
+from clfractal.optics.view import scene_view
+from clfractal.pictures.compose import Side
+from clfractal.pictures.store import JournalFilm
 from clfractal.scene.model import Scene
-from clfractal.shell import Shell
+from clfractal.work.comfort import Comfort, comfort_of_depth, measured
+from clfractal.work.pair import Pair, output_files, prepare_pair, render_eyes, save_pair
 
 # The depth of a picture larger than this is not read again to measure parallax; a quick look tells as much.
 _MOST_PIXELS = 1 << 24

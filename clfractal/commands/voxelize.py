@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clfractal.commands.progress import LINE_EVERY_SECONDS
+from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
@@ -22,11 +23,10 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.shell import Shell
 
 if TYPE_CHECKING:
-    from clfractal.job import Job
     from clfractal.voxels.grid import Grid
+    from clfractal.work.job import Job
 
 _AS_VOLUME, _AS_SURFACE, _PLAIN = (
     "renderer={type: volume}",
@@ -152,11 +152,11 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
     """
     assert isinstance(scene.renderer, VolumeRenderer)
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
-    from clfractal import job as jobs
     from clfractal.device.select import choose
     from clfractal.scene.checks import used_boxes
     from clfractal.voxels.fill import FillProgress, fill_grid
     from clfractal.voxels.lattice import lattice_of
+    from clfractal.work import job as jobs
 
     settings = scene.renderer
     lattice = lattice_of(used_boxes(scene, settings)[1], settings.resolution)

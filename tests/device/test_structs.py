@@ -10,7 +10,7 @@ import pyopencl as cl
 import pytest
 from pyopencl.tools import match_dtype_to_c_struct
 
-from clfractal.device import layout
+from clfractal.device import struct_layout as layout
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Field, Precision, Struct

@@ -20,9 +20,9 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.files.channels import CHANNELS
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.render import layout, surface
-from clfractal.render.plan import Plan
-from clfractal.render.tiles import Region
+from clfractal.pictures.tiles import Region
+from clfractal.renderers import records, surface
+from clfractal.renderers.plan import Plan
 from clfractal.scene.load import load_scene
 from tests.formulas.opencl_batch import numbered
 
@@ -46,7 +46,7 @@ def points_text(name: str, precision: Precision, lanes: int) -> str:
     formula = write_formula(catalog.load_chain(name))
     return flatten(
         "points.cl",
-        generated={"formula.h": formula.text, "structs.h": layout.struct_text()},
+        generated={"formula.h": formula.text, "structs.h": records.struct_text()},
         defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
     ).text
 

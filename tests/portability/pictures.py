@@ -19,11 +19,11 @@ import numpy.typing as npt
 from clfractal.device import tune
 from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
-from clfractal.render import engine
-from clfractal.render.film import Film
-from clfractal.render.plan import make_plan
+from clfractal.pictures.film import Film
+from clfractal.renderers.plan import make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.surface import SurfaceRenderer
+from clfractal.work import engine
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 

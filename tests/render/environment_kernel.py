@@ -14,8 +14,8 @@ from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
-from clfractal.render import layout
-from clfractal.render.environment import PackedEnvironment, material_fields
+from clfractal.renderers import records
+from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.scene.lighting import Environment
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -71,7 +71,7 @@ def settings_of(**values: Any) -> Environment:
 @cache
 def _program(device: Device, precision: Precision, lanes: int) -> Any:
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "COLORING": 0, **_DEFINES}
-    generated = {"environment.cl": _TEXT, "structs.h": layout.struct_text()}
+    generated = {"environment.cl": _TEXT, "structs.h": records.struct_text()}
     flat = flatten("environment.cl", generated=generated, defines=defines)
     return compiler.compile_source(device, flat.text, program.math_flags(precision))
 
@@ -102,7 +102,7 @@ def ask(
     for place, columns in ((slice(0, 3), directions), (slice(3, 5), numbers)):
         if columns is not None:
             planes[place, :given] = columns.T
-    material = np.zeros((), layout.MATERIAL.dtype(precision))
+    material = np.zeros((), records.MATERIAL.dtype(precision))
     for name, value in material_fields(settings or settings_of(), packed).items():
         material[name] = value
     device = choose()

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.render.compose import eye_regions, eye_size, picture_size
-from clfractal.render.film import Film
-from clfractal.render.tiled import TiledStore
-from clfractal.render.tiles import Region
+from clfractal.pictures.compose import eye_regions, eye_size, picture_size
+from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import TiledStore
+from clfractal.pictures.tiles import Region
 from clfractal.scene.stereo import Stereo
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X")

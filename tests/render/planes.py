@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.render.cut_plane import renderer_of
-from clfractal.render.film import Film
+from clfractal.pictures.film import Film
+from clfractal.renderers.cut_plane import renderer_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.plane import Placed

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.render.surface import SurfaceWorker
+from clfractal.renderers.surface import SurfaceWorker
 from clfractal.scene.model import Scene
 from tests.render.shots import plan_of
 

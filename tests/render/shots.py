@@ -11,12 +11,12 @@ import numpy.typing as npt
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.device.tune import best_lanes
-from clfractal.render import engine
-from clfractal.render.film import Film
-from clfractal.render.plan import Plan, make_plan
-from clfractal.render.view import View, camera_view
+from clfractal.optics.view import View, camera_view
+from clfractal.pictures.film import Film
+from clfractal.renderers.plan import Plan, make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.work import engine
 
 Floats = npt.NDArray[np.float64]
 

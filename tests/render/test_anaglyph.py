@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from clfractal.render.anaglyph import (
+from clfractal.pictures.anaglyph import (
     IDEAL,
     LUMINANCE,
     REAL_RED_CYAN,

@@ -15,8 +15,8 @@ from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes, best_lanes
 from clfractal.formulas import reference
 from clfractal.formulas.opencl import write_formula
-from clfractal.render import layout
-from clfractal.render.surface import TRAPS, coloring_defines
+from clfractal.renderers import records
+from clfractal.renderers.surface import TRAPS, coloring_defines
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of
 from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, PERSPECTIVE, SOLIDS, scene_of
@@ -106,9 +106,9 @@ def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> Any:
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)
 
 
-def records(scene: Scene, precision: Precision) -> list[npt.NDArray[Any]]:
-    orbit = layout.orbit_record(scene.chain, scene.formula.iterations, precision)
-    raw = [layout.material_record(scene, precision), orbit]
+def uploaded(scene: Scene, precision: Precision) -> list[npt.NDArray[Any]]:
+    orbit = records.orbit_record(scene.chain, scene.formula.iterations, precision)
+    raw = [records.material_record(scene, precision), orbit]
     return [
         *(record.reshape(1).view(np.uint8) for record in raw),
         np.array(write_formula(scene.chain).constants, precision),
@@ -127,7 +127,7 @@ def quantity(
     lanes = lanes or best_lanes(device(), precision)
     built = build(scene, QUANTITIES, precision, lanes)
     ways = [planes_of(each, precision, lanes) for each in (normals, views)]
-    arguments = [*ways, *records(scene, precision)]
+    arguments = [*ways, *uploaded(scene, precision)]
     planes = launch(device(), built, "quantities", points, 1, precision, lanes, *arguments)
     return np.asarray(planes[0], float)
 
@@ -297,7 +297,7 @@ def test_traps_against_numpy(name: str) -> None:
         4,
         precision,
         lanes,
-        *records(scene, precision),
+        *uploaded(scene, precision),
     )
     expected = trap_by_numpy(scene, points)
     assert np.isfinite(expected).all()
@@ -310,7 +310,7 @@ def test_an_orbit_that_starts_outside_has_its_start() -> None:
     lanes = best_lanes(device(), "float32")
     built = build(scene, TRAP_KERNEL, "float32", lanes)
     point = np.array([[0.0, 7.0, 0.0]])
-    found = launch(device(), built, "traps", point, 4, "float32", lanes, *records(scene, "float32"))
+    found = launch(device(), built, "traps", point, 4, "float32", lanes, *uploaded(scene, "float32"))
     np.testing.assert_allclose(found[:, 0], trap_distances(point[0]), rtol=1e-6)
 
 
@@ -327,7 +327,7 @@ def colors(scene: Scene, table: Floats, quantities: Floats) -> Floats:
         3,
         "float32",
         lanes,
-        records(scene, "float32")[0],
+        uploaded(scene, "float32")[0],
         table.astype(np.float32),
     ).T.astype(float)
 

@@ -10,9 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
-from clfractal.render.compose import Composed, compose, composed_channels, eye_regions, eye_size, picture_size
-from clfractal.render.film import Film
-from clfractal.render.tiles import Region
+from clfractal.pictures.compose import (
+    Composed,
+    compose,
+    composed_channels,
+    eye_regions,
+    eye_size,
+    picture_size,
+)
+from clfractal.pictures.film import Film
+from clfractal.pictures.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, films, stereo
 
 

@@ -14,11 +14,11 @@ from PIL import Image
 from clfractal.errors import FileError
 from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
-from clfractal.render.compose import Composed, eye_regions, eye_size
-from clfractal.render.film import Film
-from clfractal.render.outputs import check_views, pair_paths, save_outputs, save_views
-from clfractal.render.store import JournalFilm
-from clfractal.render.tiles import Region
+from clfractal.pictures.compose import Composed, eye_regions, eye_size
+from clfractal.pictures.film import Film
+from clfractal.pictures.outputs import check_views, pair_paths, save_outputs, save_views
+from clfractal.pictures.store import JournalFilm
+from clfractal.pictures.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, eyes, filled, stereo
 
 

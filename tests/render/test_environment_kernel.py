@@ -16,7 +16,7 @@ from scipy import stats
 
 from clfractal.device.select import choose, has_float64
 from clfractal.device.structs import Precision
-from clfractal.render.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment
+from clfractal.renderers.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment
 from tests.render.environment_kernel import ask, settings_of
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -265,7 +265,7 @@ def test_large_maps_have_small_tables() -> None:
 
 def test_means_and_maxima_of_cells() -> None:
     """Cells that do not fit the pixels, compared with a fine sum over the blended light."""
-    from clfractal.render import environment
+    from clfractal.renderers import environment
 
     pixels = a_map(9)
     mean_bounds = (0.999, 1.02)

@@ -17,11 +17,11 @@ from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
 from clfractal.files.png import read_texts
 from clfractal.files.srgb import encode8
-from clfractal.render.film import Film
-from clfractal.render.outputs import check_output, save_outputs
-from clfractal.render.store import JournalFilm
-from clfractal.render.tiled import TiledStore
-from clfractal.render.tiles import Region
+from clfractal.pictures.film import Film
+from clfractal.pictures.outputs import check_output, save_outputs
+from clfractal.pictures.store import JournalFilm
+from clfractal.pictures.tiled import TiledStore
+from clfractal.pictures.tiles import Region
 from tests.files.limits import file_size_limit
 
 ALL = tuple(CHANNELS)
@@ -192,9 +192,9 @@ def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 import numpy as np
-from clfractal.render.film import Film
-from clfractal.render.outputs import save_outputs
-from clfractal.render.store import JournalFilm
+from clfractal.pictures.film import Film
+from clfractal.pictures.outputs import save_outputs
+from clfractal.pictures.store import JournalFilm
 
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

@@ -14,8 +14,8 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import best_lanes
 from clfractal.formulas import reference
 from clfractal.formulas.language import Chain
-from clfractal.render.film import Film
-from clfractal.render.points import escape
+from clfractal.pictures.film import Film
+from clfractal.renderers.points import escape
 from tests.render.shots import Floats, points_of, scene_of, shoot
 
 ITERATIONS = 250

@@ -9,10 +9,10 @@ import pytest
 from pyopencl.tools import match_dtype_to_c_struct
 
 from clfractal.device import cache
-from clfractal.device.layout import verify
 from clfractal.device.select import choose, has_float64
+from clfractal.device.struct_layout import verify
 from clfractal.device.structs import Precision, Struct
-from clfractal.render.layout import STRUCTS
+from clfractal.renderers.records import STRUCTS
 
 pytestmark = pytest.mark.conformance
 

@@ -10,11 +10,11 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.errors import FileError, SceneError
-from clfractal.render.engine import Progress, render
-from clfractal.render.film import Film
+from clfractal.pictures.film import Film
 from clfractal.scene.layout import Layout
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.work.engine import Progress, render
 from tests.render.shots import BALL, BALL_ITERATIONS, CHANNELS, plan_of, shoot, stacked
 
 # A surface, a cut plane and a volume, as the thesis's figure 9 has them.

@@ -10,14 +10,14 @@ import pytest
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.errors import SceneError
-from clfractal.render.plan import (
+from clfractal.pictures.tiles import Region
+from clfractal.renderers.plan import (
     FLOAT32_STEPS_PER_PIXEL,
     choose_precision,
     finest_steps,
     make_plan,
     make_region,
 )
-from clfractal.render.tiles import Region
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,

@@ -15,7 +15,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
-from clfractal.render.plan import choose_precision
+from clfractal.renderers.plan import choose_precision
 from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene

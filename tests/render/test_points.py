@@ -17,7 +17,7 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import write_formula
-from clfractal.render import layout, points
+from clfractal.renderers import points, records
 from tests.formulas.opencl_batch import batch_text, compile_text, kernel_file, launch
 from tests.formulas.test_counts import CASES, TABLES, chain_of
 
@@ -46,7 +46,7 @@ def only(kernel: str) -> str:
 
 
 def orbit_bytes(chain: Chain, iterations: int, precision: Precision, bailout: float | None) -> Any:
-    return layout.orbit_record(chain, iterations, precision, bailout).reshape(1).view(np.uint8)
+    return records.orbit_record(chain, iterations, precision, bailout).reshape(1).view(np.uint8)
 
 
 def table(case: str) -> Floats:

@@ -14,8 +14,8 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.files.exr import write_exr
 from clfractal.files.srgb import encode
-from clfractal.render.film import Film
-from clfractal.render.outputs import save_outputs
+from clfractal.pictures.film import Film
+from clfractal.pictures.outputs import save_outputs
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all

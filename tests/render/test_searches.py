@@ -20,7 +20,7 @@ from clfractal.formulas.backends import NumpyBackend
 from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.language import Chain
 from clfractal.formulas.reference import apply, constant_of, space_to_state
-from clfractal.render.film import Film
+from clfractal.pictures.film import Film
 from clfractal.scene.checks import used_bounds
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all

@@ -10,14 +10,14 @@ import pytest
 
 from clfractal.device import compiler, program
 from clfractal.device.select import Device
-from clfractal.pair import prepare_pair, render_eyes
-from clfractal.render import surface, volume
-from clfractal.render.film import Film
-from clfractal.render.stereo import eye_views, parallax
-from clfractal.render.view import View, scene_view
+from clfractal.optics.stereo import eye_views, parallax
+from clfractal.optics.view import View, scene_view
+from clfractal.pictures.film import Film
+from clfractal.renderers import surface, volume
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName
 from clfractal.voxels import fill as voxels
+from clfractal.work.pair import prepare_pair, render_eyes
 from tests.render.shots import BALL, BALL_RADIUS, CHANNELS, points_of, scene_of, shoot, stacked
 
 SIZE = (64, 48)

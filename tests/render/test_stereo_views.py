@@ -17,7 +17,7 @@ from hypothesis import settings as limits
 from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
-from clfractal.render.stereo import (
+from clfractal.optics.stereo import (
     NEAREST,
     attitude,
     degrees,
@@ -26,7 +26,7 @@ from clfractal.render.stereo import (
     parallax,
     relation,
 )
-from clfractal.render.view import View, camera_view, eye_view, middle_view, scene_view
+from clfractal.optics.view import View, camera_view, eye_view, middle_view, scene_view
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, EyeName, Stereo

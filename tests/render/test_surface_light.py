@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.render.film import Film
+from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,

@@ -18,7 +18,7 @@ from clfractal import resources
 from clfractal.device.select import Device
 from clfractal.files.environment import read_environment
 from clfractal.files.exr import write_exr
-from clfractal.render.film import Film
+from clfractal.pictures.film import Film
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import (

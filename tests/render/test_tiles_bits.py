@@ -11,12 +11,12 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes, best_lanes
-from clfractal.render import engine, loop
-from clfractal.render.engine import Progress
-from clfractal.render.film import Film
-from clfractal.render.store import JournalFilm
-from clfractal.render.tiles import TileGrid
+from clfractal.pictures.film import Film
+from clfractal.pictures.store import JournalFilm
+from clfractal.pictures.tiles import TileGrid
 from clfractal.scene.model import Scene
+from clfractal.work import engine, loop
+from clfractal.work.engine import Progress
 from tests.render.shots import CHANNELS, ORTHOGRAPHIC, PERSPECTIVE, plan_of, scene_of, shoot, stacked
 
 SIZE = (100, 75)  # no multiple of a tile's side, in neither direction

@@ -13,11 +13,11 @@ import pytest
 from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes, best_lanes
 from clfractal.files.volume import Volume, write_volume
-from clfractal.render import engine, loop
-from clfractal.render.tiles import TileGrid
+from clfractal.pictures.tiles import TileGrid
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
+from clfractal.work import engine, loop
 from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, shoot, stacked
 from tests.render.test_tiles_bits import close, same
 from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from clfractal.device.select import choose
 from clfractal.errors import DeviceError
 from clfractal.files.volume import Volume, write_volume
-from clfractal.render.engine import render
-from clfractal.render.film import Film
-from clfractal.render.plan import make_plan
+from clfractal.pictures.film import Film
+from clfractal.renderers.plan import make_plan
 from clfractal.scene.load import dump_scene, load_scene
+from clfractal.work.engine import render
 from tests.scene.test_messages import error_of, marked
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"

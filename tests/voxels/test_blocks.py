@@ -9,8 +9,14 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clfractal.render.plan import make_plan
-from clfractal.render.volume import TRANSFER_SIZE, transfer_table, unseen_sample, value_range, volume_record
+from clfractal.renderers.plan import make_plan
+from clfractal.renderers.volume import (
+    TRANSFER_SIZE,
+    transfer_table,
+    unseen_sample,
+    value_range,
+    volume_record,
+)
 from clfractal.voxels.blocks import BLOCK_BYTES, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from tests.voxels.grids import device, filled, volume_scene

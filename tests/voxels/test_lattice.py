@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from clfractal.device.layout import verify
 from clfractal.device.select import has_float64
+from clfractal.device.struct_layout import verify
 from clfractal.device.structs import Precision
 from clfractal.scene.volume import Box
 from clfractal.voxels.lattice import (

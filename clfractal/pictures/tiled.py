@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.render.tiles import Region, Tile, TileGrid
+from clfractal.pictures.tiles import Region, Tile, TileGrid
 
 Floats = npt.NDArray[np.float32]
 Bands = Iterator[tuple[int, dict[str, Floats]]]

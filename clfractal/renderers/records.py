@@ -11,9 +11,9 @@ import numpy as np
 from clfractal.device.orbit import ORBIT, Record
 from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.render.environment import PackedEnvironment, material_fields
-from clfractal.render.tiles import Region
-from clfractal.render.view import View
+from clfractal.optics.view import View
+from clfractal.pictures.tiles import Region
+from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.scene.checks import used_bounds
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene

@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from clfractal.comfort import fitted
 from clfractal.device.select import Device
-from clfractal.job import Job, prepare
-from clfractal.render import engine
-from clfractal.render.compose import APART, Composed, Side, composed_channels, eye_regions, picture_size
-from clfractal.render.outputs import pair_paths, save_views
-from clfractal.render.plan import make_region
-from clfractal.render.split import Share
-from clfractal.render.tiled import Picture, TiledStore
-from clfractal.render.tiles import Region, TileGrid
-from clfractal.render.view import scene_view
+from clfractal.optics.view import scene_view
+from clfractal.pictures.compose import APART, Composed, Side, composed_channels, eye_regions, picture_size
+from clfractal.pictures.outputs import pair_paths, save_views
+from clfractal.pictures.tiled import Picture, TiledStore
+from clfractal.pictures.tiles import Region, TileGrid
+from clfractal.renderers.plan import make_region
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
+from clfractal.work import engine
+from clfractal.work.comfort import fitted
+from clfractal.work.job import Job, prepare
+from clfractal.work.split import Share
 
 # What tells how a pair is shown, and changes neither eye's picture.
 _SHOWN = ("mode", "swap", "method", "glasses", "colors")

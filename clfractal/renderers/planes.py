@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from clfractal.device.orbit import Record, orbit_record
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.render.escape_colors import (
+from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
     escape_colors_values,
     escape_defines,

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from clfractal import job as jobs
 from clfractal.device.select import Device
 from clfractal.errors import SceneError, Where
-from clfractal.render import engine
-from clfractal.render.film import Film
-from clfractal.render.stereo import degrees, eye_distance, eye_views, parallax
-from clfractal.render.view import View, scene_view
+from clfractal.optics.stereo import degrees, eye_distance, eye_views, parallax
+from clfractal.optics.view import View, scene_view
+from clfractal.pictures.film import Film
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo, StereoPlane
+from clfractal.work import engine
+from clfractal.work import job as jobs
 
 Floats = npt.NDArray[np.float64]
 Ends = tuple[float, float]

@@ -13,7 +13,7 @@ from clfractal.errors import FileError, Where
 from clfractal.files import atomic
 from clfractal.files.channels import CHANNELS, VIEWS, in_view
 from clfractal.files.png import Bits, stream_png, write_png
-from clfractal.render.tiled import Floats, Picture
+from clfractal.pictures.tiled import Floats, Picture
 
 # Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
 _MATRICES = ("worldToCamera", "worldToNDC")

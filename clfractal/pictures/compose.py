@@ -11,10 +11,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clfractal.render.anaglyph import matrices, mix
-from clfractal.render.film import Film
-from clfractal.render.tiled import Bands, Floats, Picture
-from clfractal.render.tiles import Region
+from clfractal.pictures.anaglyph import matrices, mix
+from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import Bands, Floats, Picture
+from clfractal.pictures.tiles import Region
 from clfractal.scene.stereo import Mode, Stereo
 
 Side = Literal["left", "right"]

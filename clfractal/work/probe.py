@@ -11,12 +11,12 @@ from typing import Any
 
 from clfractal.device import probe, tune
 from clfractal.device.select import DeviceInfo, by_key, vectorises_across_work_items
-from clfractal.render.film import Film
-from clfractal.render.loop import render_one
-from clfractal.render.plan import make_plan
+from clfractal.pictures.film import Film
+from clfractal.renderers.plan import make_plan
 from clfractal.scene.load import load_scene
+from clfractal.work.loop import render_one
 
-JOB = "clfractal.render.probe:lanes_job"
+JOB = "clfractal.work.probe:lanes_job"
 _SIDE = 256
 _RENDERS = 4
 _SCENE = f"""\

@@ -16,12 +16,12 @@ from clfractal.device import tune
 from clfractal.device.select import Device, has_float64
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.document import write_document
-from clfractal.render.outputs import save_outputs
-from clfractal.render.plan import Plan, PrecisionChoice, choose_precision, make_plan
-from clfractal.render.probe import probe_for
-from clfractal.render.tiled import Picture
-from clfractal.render.view import scene_view
+from clfractal.optics.view import scene_view
+from clfractal.pictures.outputs import save_outputs
+from clfractal.pictures.tiled import Picture
+from clfractal.renderers.plan import Plan, PrecisionChoice, choose_precision, make_plan
 from clfractal.scene.model import Scene
+from clfractal.work.probe import probe_for
 
 MAX_SAMPLES = 65_536
 PRECISIONS = ("auto", "float32", "float64")

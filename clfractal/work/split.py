@@ -9,13 +9,13 @@ import numpy as np
 from clfractal.device import tune
 from clfractal.device.select import Device, has_float64
 from clfractal.files.channels import CHANNELS
-from clfractal.render.film import Film
-from clfractal.render.loop import Progress, ProgressCallback, render_one
-from clfractal.render.plan import Plan, choose_precision, make_plan
-from clfractal.render.probe import probe_for
-from clfractal.render.tiled import TiledStore
-from clfractal.render.worker import Shared
+from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import TiledStore
+from clfractal.renderers.plan import Plan, choose_precision, make_plan
+from clfractal.renderers.worker import Shared
 from clfractal.scene.model import Scene
+from clfractal.work.loop import Progress, ProgressCallback, render_one
+from clfractal.work.probe import probe_for
 
 
 def render_views(

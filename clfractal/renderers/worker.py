@@ -20,8 +20,8 @@ from clfractal.device.compiler import Argument, Warm
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText
 from clfractal.files.channels import CHANNELS
-from clfractal.render.plan import Plan
-from clfractal.render.tiles import TILE, TileGrid
+from clfractal.pictures.tiles import TILE, TileGrid
+from clfractal.renderers.plan import Plan
 from clfractal.scene.model import Scene
 
 TILE_PIXELS = TILE * TILE

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clfractal.device.select import Device
-from clfractal.render.cut_plane import CutPlaneWorker
-from clfractal.render.plan import Plan
-from clfractal.render.surface import SurfaceWorker
-from clfractal.render.volume import VolumeWorker
-from clfractal.render.worker import Shared, TileWorker
+from clfractal.renderers.cut_plane import CutPlaneWorker
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.surface import SurfaceWorker
+from clfractal.renderers.volume import VolumeWorker
+from clfractal.renderers.worker import Shared, TileWorker
 from clfractal.scene.model import Scene
 
 WORKERS: dict[str, type[TileWorker]] = {

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
-from clfractal.render.tiled import Bands, Floats, check_tile
-from clfractal.render.tiles import TILE, Region, TileGrid
+from clfractal.pictures.tiled import Bands, Floats, check_tile
+from clfractal.pictures.tiles import TILE, Region, TileGrid
 
 
 class Film:
@@ -108,7 +108,7 @@ class Film:
         Raises:
             FileError: it cannot be written.
         """
-        from clfractal.render.outputs import save_outputs
+        from clfractal.pictures.outputs import save_outputs
 
         save_outputs(self, [path], **settings)
 
@@ -129,6 +129,6 @@ class Film:
         """What a notebook shows; None (the text form instead) if there are no colours."""
         if not {"R", "G", "B"} <= set(self.channels):
             return None
-        from clfractal.render.outputs import png_bytes
+        from clfractal.pictures.outputs import png_bytes
 
         return png_bytes(self)

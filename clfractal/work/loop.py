@@ -12,11 +12,11 @@ import pyopencl as cl
 
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError
-from clfractal.render.plan import Plan
-from clfractal.render.tiled import TiledStore
-from clfractal.render.tiles import TILE, Tile
-from clfractal.render.worker import Batch, Shared, TileWorker
-from clfractal.render.workers import make_worker
+from clfractal.pictures.tiled import TiledStore
+from clfractal.pictures.tiles import TILE, Tile
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.worker import Batch, Shared, TileWorker
+from clfractal.renderers.workers import make_worker
 from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float32]

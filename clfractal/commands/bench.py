@@ -14,19 +14,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from clfractal.commands.shell import Shell
 from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, DeviceError, Where
 from clfractal.files.atomic import atomic_writer
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.job import Job, prepare
-from clfractal.render import engine
-from clfractal.render.film import Film
-from clfractal.render.volume import settings_of
+from clfractal.pictures.film import Film
+from clfractal.renderers.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.shell import Shell
 from clfractal.voxels.fill import fill_grid
+from clfractal.work import engine
+from clfractal.work.job import Job, prepare
 
 REPETITIONS = 7
 STILL_REPETITIONS = 3

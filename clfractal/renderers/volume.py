@@ -15,11 +15,11 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
-from clfractal.render import layout
-from clfractal.render.plan import Plan
-from clfractal.render.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
-from clfractal.render.view import scene_view
-from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
+from clfractal.optics.view import scene_view
+from clfractal.renderers import records
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
+from clfractal.renderers.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
@@ -67,7 +67,7 @@ VOLUME = Struct(
     ],
 )
 
-STRUCTS = (layout.VIEW, layout.LIGHT, layout.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
+STRUCTS = (records.VIEW, records.LIGHT, records.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
 Floats = npt.NDArray[np.float32]
 
 
@@ -84,7 +84,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         **tile_defines(plan),
         "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
-        "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
+        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
         "TRANSFER_SIZE": TRANSFER_SIZE,
         "SURFACE": int(settings.transfer.opacity is None),
         "VALUE_IS_FLOAT": int(grid.kind == "float"),
@@ -136,11 +136,11 @@ class VolumeWorker(TileWorker):
         blocks = self.shared.once(f"{key} {unseen}", lambda: seen_blocks(grid, unseen, self.on_compile))
         four = (0, 1, 2, 3)
         return [
-            layout.view_record(scene_view(scene), width, height, plan.region, precision),
+            records.view_record(scene_view(scene), width, height, plan.region, precision),
             volume_record(scene, plan, self.grid),
             grid_record(scene, self.grid, precision),
-            layout.material_record(scene, precision),
-            layout.light_records(scene, precision),
+            records.material_record(scene, precision),
+            records.light_records(scene, precision),
             transfer_table(scene, value_range(scene, self.grid)),
             self.grid.table,
             blocks,
@@ -234,8 +234,8 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
         "samples": plan.samples,
         "min_samples": min(settings.used_min_samples, plan.samples),
         "noise": settings.noise or 0.0,
-        "filter": layout.FILTERS.index(settings.filter),
-        "filter_width": width if width is not None else layout.FILTER_WIDTHS[settings.filter],
+        "filter": records.FILTERS.index(settings.filter),
+        "filter_width": width if width is not None else records.FILTER_WIDTHS[settings.filter],
         "seed": settings.seed,
         "light_count": len(scene.lights),
     }
@@ -305,7 +305,7 @@ def _mixed(
 
 def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
     """The cut planes, and the formula that they show, in the kernel's order."""
-    own = layout.orbit_record(scene.chain, scene.formula.iterations, precision)
+    own = records.orbit_record(scene.chain, scene.formula.iterations, precision)
     return [
         plane_records(scene, precision),
         np.stack([own, *plane_orbits(scene, precision)]),

@@ -9,12 +9,12 @@ import numpy.typing as npt
 
 from clfractal.device.source import FlatText, flatten
 from clfractal.formulas.opencl import write_formula
-from clfractal.render import layout
-from clfractal.render.environment import pack_environment
-from clfractal.render.plan import Plan
-from clfractal.render.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
-from clfractal.render.view import scene_view
-from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
+from clfractal.optics.view import scene_view
+from clfractal.renderers import records
+from clfractal.renderers.environment import pack_environment
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
+from clfractal.renderers.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -40,7 +40,7 @@ def defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {
         **tile_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
-        "LIGHT_DIRECTIONAL": layout.LIGHT_DIRECTIONAL,
+        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
         **feature_defines(scene),
         **coloring_defines(scene.coloring),
         **plane_defines(scene),
@@ -53,7 +53,7 @@ def feature_defines(scene: Scene) -> dict[str, object]:
     points = renderer.used_points
     normal_counts = {"gradient": points.count, "eight_triangles_shading": 8}
     positions = points.count > 1 and (renderer.normal != "gradient" or scene.coloring.by == "residual")
-    rays = layout.hemisphere_rays(scene)
+    rays = records.hemisphere_rays(scene)
     return {
         "SEARCH_DISTANCE": 0,
         "SEARCH_STEPS": 1,
@@ -93,7 +93,7 @@ def coloring_defines(coloring: Coloring) -> dict[str, object]:
 def program_text(scene: Scene, plan: Plan) -> FlatText:
     """The whole text of the scene's program."""
     formula = write_formula(scene.chain)
-    generated = {"formula.h": formula.text, "structs.h": layout.struct_text() + CUT_PLANE.c_text()}
+    generated = {"formula.h": formula.text, "structs.h": records.struct_text() + CUT_PLANE.c_text()}
     return flatten("surface.cl", generated=generated, defines=defines(scene, plan), user=["formula.h"])
 
 
@@ -113,17 +113,17 @@ class SurfaceWorker(TileWorker):
         surroundings = scene.surroundings
         packed = pack_environment(surroundings.pixels) if surroundings is not None else None
         return [
-            layout.view_record(scene_view(scene), width, height, plan.region, plan.precision),
-            layout.march_record(scene, plan.samples, plan.precision),
+            records.view_record(scene_view(scene), width, height, plan.region, plan.precision),
+            records.march_record(scene, plan.samples, plan.precision),
             np.stack(
                 [
-                    layout.orbit_record(scene.chain, scene.formula.iterations, plan.precision),
+                    records.orbit_record(scene.chain, scene.formula.iterations, plan.precision),
                     *plane_orbits(scene, plan.precision),
                 ]
             ),
             np.array(formula.constants, plan.precision),
-            layout.material_record(scene, plan.precision, packed),
-            layout.light_records(scene, plan.precision),
+            records.material_record(scene, plan.precision, packed),
+            records.light_records(scene, plan.precision),
             self._palette(),
             packed.data if packed is not None else np.zeros(4, np.float32),
             *([plane_records(scene, plan.precision), plane_palettes(scene)] if scene.cut_planes else []),

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.files.mesh import Mesh
-from clfractal.render.points import distances
+from clfractal.renderers.points import distances
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import SIZE, palette_table

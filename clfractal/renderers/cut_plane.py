@@ -8,17 +8,17 @@ from clfractal.device.orbit import ORBIT, Record, orbit_record
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
-from clfractal.render.escape_colors import (
+from clfractal.optics.view import scene_view
+from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
     escape_colors_record,
     escape_defines,
     escape_palette,
 )
-from clfractal.render.layout import FILTER_WIDTHS, FILTERS, VIEW, view_record
-from clfractal.render.plan import Plan
-from clfractal.render.surface import PALETTE_SIZE
-from clfractal.render.view import scene_view
-from clfractal.render.worker import KernelArgument, TileWorker, channel_slots, tile_defines
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.records import FILTER_WIDTHS, FILTERS, VIEW, view_record
+from clfractal.renderers.surface import PALETTE_SIZE
+from clfractal.renderers.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 

@@ -15,7 +15,7 @@ from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
-from clfractal.render import layout
+from clfractal.renderers import records
 
 Floats = npt.NDArray[np.float64]
 
@@ -103,12 +103,12 @@ def _run(
     if not np.isfinite(array).all():
         raise ValueError("points must be finite")
     formula = write_formula(chain)
-    generated = {"formula.h": formula.text, "structs.h": layout.struct_text()}
+    generated = {"formula.h": formula.text, "structs.h": records.struct_text()}
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
     text = flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
     built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
     kernel = built.kernel(kernel_name)
-    orbit = layout.orbit_record(chain, iterations, precision, bailout).reshape(1)
+    orbit = records.orbit_record(chain, iterations, precision, bailout).reshape(1)
     constants = np.array(formula.constants, precision)
     result = np.empty((planes, len(array)))
     with device.failures("evaluating points"):

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
-from clfractal.render.film import Film
-from clfractal.render.tiled import Bands, Floats, check_tile
-from clfractal.render.tiles import Region, TileGrid
+from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import Bands, Floats, check_tile
+from clfractal.pictures.tiles import Region, TileGrid
 
 
 class JournalFilm:

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import SceneError, Where
-from clfractal.render.view import View, eye_view, middle_view
+from clfractal.optics.view import View, eye_view, middle_view
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Eye, EyeName, Stereo
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clfractal.device.select import Device
-from clfractal.render.loop import Progress as Progress
-from clfractal.render.loop import ProgressCallback as ProgressCallback
-from clfractal.render.loop import render_one
-from clfractal.render.loop import render_tile as render_tile
-from clfractal.render.plan import Plan
-from clfractal.render.split import render_views
-from clfractal.render.tiled import TiledStore
-from clfractal.render.worker import Shared as Shared
+from clfractal.pictures.tiled import TiledStore
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.worker import Shared as Shared
 from clfractal.scene.model import Scene
+from clfractal.work.loop import Progress as Progress
+from clfractal.work.loop import ProgressCallback as ProgressCallback
+from clfractal.work.loop import render_one
+from clfractal.work.loop import render_tile as render_tile
+from clfractal.work.split import render_views
 
 
 def render(

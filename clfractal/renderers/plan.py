@@ -11,8 +11,8 @@ import numpy as np
 from clfractal.device.structs import Precision
 from clfractal.errors import SceneError, Where
 from clfractal.files.channels import check_channels
-from clfractal.render.tiles import Region
-from clfractal.render.view import View, scene_view
+from clfractal.optics.view import View, scene_view
+from clfractal.pictures.tiles import Region
 from clfractal.scene.checks import used_bounds, used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer

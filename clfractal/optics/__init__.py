@@ -1,0 +1,1 @@
+"""Where eyes are and what they see: view planes, frusta, parallax."""

@@ -1,1 +1,0 @@
-"""Rendering: from a scene and a plan to a film of named channels."""

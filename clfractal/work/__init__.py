@@ -1,0 +1,1 @@
+"""How every picture is made: jobs of views, engines, executors."""
