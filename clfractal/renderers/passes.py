@@ -49,11 +49,8 @@ _KEPT: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(_OF_NOISE, ()),
     "nearest": _DATA,
     "depth": ("Z",),
-    **{
-        f"{what}_{axis.lower()}": (f"{letter}.{axis}",)
-        for what, letter in (("normal", "N"), ("point", "P"))
-        for axis in "XYZ"
-    },
+    **{f"normal_{axis.lower()}": (f"N.{axis}",) for axis in "XYZ"},
+    **{f"point_{axis.lower()}": (f"P.{axis}",) for axis in "XYZ"},
     "smooth": ("iterations",),
     "steps": ("steps",),
 }

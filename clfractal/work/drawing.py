@@ -1,4 +1,4 @@
-"""One view on one device: its program, what that reads, and launches of it. What is equal from one view to the next stays."""
+"""One view on one device: its program, what that reads, and its launches. What is equal from view to view stays."""
 
 from __future__ import annotations
 

@@ -178,9 +178,9 @@ class Engine:
     ) -> Refinement:
         """Films of a scene from coarse to finished: every 8th, 4th and 2nd pixel, then all with more and more samples.
 
-        Each is a film of the whole size. The last has the bits of `render`. What passes hand on stays on the device, some 70
-        bytes a pixel (twice that in float64); where that does not fit, the samples are made in one pass. In a notebook the
-        result shows itself, and is redrawn with every pass.
+        Each is a film of the whole size. The last has the bits of `render`. What passes hand on stays on the device, some
+        70 bytes a pixel (twice that in float64); where that does not fit, the samples are made in one pass. In a
+        notebook the result shows itself, and is redrawn with every pass.
 
         Arguments and errors as of `render`.
         """

@@ -118,8 +118,8 @@ def _launched(
 class _Cutter:
     """Cuts an item into launches; work is counted in samples of a packet.
 
-    Most launches are of whole tiles. A tile that is too heavy is rendered in parts: some of its packets with all samples, or
-    if one work-group is still too heavy some of its samples, down to one sample of one packet.
+    Most launches are of whole tiles. A tile that is too heavy is rendered in parts: some of its packets with all samples,
+    or if one work-group is still too heavy some of its samples, down to one sample of one packet.
     """
 
     def __init__(self, drawing: Drawing, item: WorkItem, *, keep: bool) -> None:
@@ -178,10 +178,7 @@ class _Cutter:
     def _some_packets(self, first: int, size: float) -> tuple[int, int]:
         """Packets of a tile from the first on: whole groups with all samples, one group, or a part of one."""
         group, samples = self.drawing.group, self.end - self.first
-        if size >= group:
-            count = max(int(size / samples) // group * group, group)
-        else:
-            count = max(int(size), 1)
+        count = max(int(size / samples) // group * group, group) if size >= group else max(int(size), 1)
         return first, min(first + count, self.drawing.packets)
 
     def _span(self, tiles: Tiles, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:

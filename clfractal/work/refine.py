@@ -6,6 +6,7 @@ import time
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 from importlib import import_module
+from itertools import pairwise
 
 import numpy as np
 
@@ -85,7 +86,7 @@ def _ranges(samples: int) -> list[tuple[int, int]]:
     ends = [0, 1]
     while ends[-1] < samples:
         ends.append(min(2 * ends[-1], samples))
-    return list(zip(ends, ends[1:], strict=False))
+    return list(pairwise(ends))
 
 
 def _fits(job: Job, executor: LocalExecutor) -> bool:

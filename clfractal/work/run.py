@@ -26,8 +26,8 @@ Tiles = npt.NDArray[np.int32]
 class WorkItem:
     """A part of a job. It may be cut by tiles as one likes.
 
-    By samples it may be cut only in order, on one device: sums of floats keep their order, so each range of a tile's samples
-    goes on from what the one before left there.
+    By samples it may be cut only in order, on one device: sums of floats keep their order, so each range of a tile's
+    samples goes on from what the one before left there.
 
     Attributes:
         view: number of the view in the job.
@@ -144,8 +144,8 @@ def run(
     Args:
         stores: where the tiles of each of the job's views go.
         executor: does the work.
-        progress: called after each launch. An exception in it, or a KeyboardInterrupt, ends the work between two tiles; what
-            is finished is in the stores.
+        progress: called after each launch. An exception in it, or a KeyboardInterrupt, ends the work between two tiles;
+            what is finished is in the stores.
         token: ends the work in the same way, with Stopped.
         samples: the first sample and the one after the last, for a picture that is made in passes: then all tiles are
             rendered, also those that are there. None: all samples of the tiles that are not.
