@@ -17,7 +17,7 @@ from typing import Literal
 
 from clfractal.formulas.decisions import Decisions, Question, replayed
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
-from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number
+from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
 
 # How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
@@ -59,14 +59,21 @@ def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap =
         if found is not None:
             return found
     written = _ChainWriter(chain, scalar_rule, dual_map).write()
+    result = written.filled(chain)
+    assert result is not None, "a text fits the chain that it was written for"
     with _LOCK:
         _WRITTEN[key] = [*_WRITTEN.get(key, ())[-(_MOST_TEXTS - 1) :], written]
         _WRITTEN.move_to_end(key)
         if len(_WRITTEN) > _MOST_STRUCTURES:
             _WRITTEN.popitem(last=False)
-    result = written.filled(chain)
-    assert result is not None, "a text fits the chain that it was written for"
     return result
+
+
+def forget_texts() -> None:
+    """Writes every text anew from now on."""
+    write_formula.cache_clear()
+    with _LOCK:
+        _WRITTEN.clear()
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,12 +212,22 @@ class _ChainWriter:
 
     def _emitter(self, index: int, number_type: NumberType) -> Emitter:
         bound = self.links[index].bound
-        bindings = {f"point_{v}": Value(f"c.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
+        bindings = {point_name(v): self._point_value(index, i) for i, v in enumerate(bound.formula.variables)}
         bindings |= {v: Value(f"z.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
         decisions = self.decisions[index]
         return Emitter(
             number_type, bindings | _parameters(bound, decisions), self.constants, index, decisions, lines=[]
         )
+
+    def _point_value(self, index: int, component: int) -> Value:
+        """`point_x` and its like: the constant that is added, which in a Julia set is not the point in space."""
+        bound = self.links[index].bound
+        name = point_name(bound.formula.variables[component])
+        rule = bound.formula.derivative
+        used = bound.formula.point_map or (rule is not None and name in names_in(rule))
+        if bound.add == "constant" and used:
+            return Value(self.constants.text((index, "julia", component)), "flat")
+        return Value(f"c.s{component}", "varying")
 
     def _map(self, emitter: Emitter, bound: BoundFormula) -> list[Value]:
         emitter.lets = dict(bound.formula.let)
