@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from clfractal.errors import FormulaError, Where, unknown_name
-from clfractal.formulas.evaluate import MAX_EXPONENT, evaluate_constant
+from clfractal.formulas.evaluate import MAX_EXPONENT, as_function, finite
 from clfractal.formulas.model import MAX_REPEAT, BoundFormula, Formula, inside
 from clfractal.formulas.nodes import Call, Node, names_in, walk
 
@@ -22,16 +24,17 @@ def bind(
     where: Where | None = None,
     *,
     distance_bailout: float | None = None,
+    live: Sequence[str] = (),
 ) -> BoundFormula:
     """The formula with values for its parameters; what is not given has its default.
 
-    `julia` (one number for each variable) adds this constant in place of the point.
+    `julia` (one number for each variable) adds this constant in place of the point. `live` names parameters whose
+    values never become part of the code.
 
     Raises:
         FormulaError: an unknown parameter, a value out of range, a julia of the wrong length, or values that
-        give the
-            formula no meaning (no whole repeat, a degree below 1, a division by zero). Its place is `where`'s
-            path with `.parameters.NAME`, `.julia`, `.bailout`.
+            give the formula no meaning (no whole repeat, a degree below 1, a division by zero). Its place is
+            `where`'s path with `.parameters.NAME`, `.live.INDEX`, `.julia`, `.bailout`.
     """
     where = where or Where()
     known = [parameter.name for parameter in formula.parameters]
@@ -49,6 +52,7 @@ def bind(
         _check_julia(formula, julia, inside(where, "julia")),
         check_radius(bailout, inside(where, "bailout")),
         check_radius(distance_bailout, inside(where, "distance_bailout")),
+        _check_live(live, known, inside(where, "live")),
     )
     _check_derived(bound, where)
     _check_constants(bound, where)
@@ -64,6 +68,15 @@ def check_radius(value: object, where: Where) -> float | None:
             f"must be a number above 0 and at most {MAX_BAILOUT:g}, got {str(value)[:60]}", where
         )
     return float(value)
+
+
+def _check_live(live: object, known: Sequence[str], where: Where) -> frozenset[str]:
+    if not isinstance(live, (list, tuple)):
+        raise FormulaError("must be a list of names of parameters", where)
+    for index, name in enumerate(live):
+        if name not in known:
+            raise FormulaError(unknown_name("parameter", str(name), known), inside(where, str(index)))
+    return frozenset(live)
 
 
 def _check_julia(formula: Formula, julia: object, where: Where) -> tuple[float, ...] | None:
@@ -138,39 +151,53 @@ def _with_values(bound: BoundFormula) -> str:
     return f" with {shown}" if shown else ""
 
 
-def _check_constants(bound: BoundFormula, where: Where) -> None:
-    """Refuses values that make a divisor zero or an exponent huge, outside the branches of a `where`."""
-    constants: dict[str, float] = dict(bound.values)
-    for key, node in [
-        *bound.formula.let,
-        *((v, m) for v, m in zip(bound.formula.variables, bound.formula.map, strict=True)),
-    ]:
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """One step of `_check_constants`: a value to look at, or (with no `function`) a constant `let` to remember."""
+
+    key: str
+    function: str | None
+    value: Callable[[Mapping[str, float]], Any]
+
+
+@lru_cache(maxsize=256)
+def _steps(formula: Formula) -> tuple[_Step, ...]:
+    """Divisors and exponents outside the branches of a `where` that parameters alone may decide, and what they use."""
+    found = []
+    constant = {parameter.name for parameter in formula.parameters}
+    for key, node in (*formula.let, *zip(formula.variables, formula.map, strict=True)):
         guarded = {
             id(p) for w in walk(node) if isinstance(w, Call) and w.function == "where" for p in walk(w)
         }
         for part in walk(node):
-            if not isinstance(part, Call) or id(part) in guarded:
-                continue
-            last = _constant(part.arguments[-1], constants)
-            if part.function in ("div", "mod") and last == 0:
-                raise FormulaError(f"division by zero in {key!r}{_with_values(bound)}", where)
-            if (
-                part.function in ("pow", "cpow_re", "cpow_im")
-                and last is not None
-                and abs(last) > MAX_EXPONENT
-            ):
-                raise FormulaError(
-                    f"an exponent in {key!r} must be at most {MAX_EXPONENT}{_with_values(bound)}", where
-                )
-        value = _constant(node, constants)
-        if value is not None and key not in bound.formula.variables:
-            constants[key] = value
+            if isinstance(part, Call) and id(part) not in guarded and part.function in _LAST:
+                last = part.arguments[-1]
+                if names_in(last) <= constant:
+                    found.append(_Step(key, part.function, as_function(last)))
+        if names_in(node) <= constant and key not in formula.variables:
+            found.append(_Step(key, None, as_function(node)))
+            constant.add(key)
+    return tuple(found)
 
 
-def _constant(node: Node, constants: Mapping[str, float]) -> float | None:
-    if names_in(node) <= constants.keys():
+# Functions whose last argument must not be zero, or not be large.
+_LAST = frozenset(("div", "mod", "pow", "cpow_re", "cpow_im"))
+
+
+def _check_constants(bound: BoundFormula, where: Where) -> None:
+    """Refuses values that make a divisor zero or an exponent huge, outside the branches of a `where`."""
+    constants: dict[str, float] = dict(bound.values)
+    for step in _steps(bound.formula):
         try:
-            return evaluate_constant(node, constants)
-        except FormulaError:
-            return None
-    return None
+            value = finite(step.value(constants))
+        except (FormulaError, KeyError):
+            continue  # no number, or it uses a `let` that is none
+        if step.function is None:
+            constants[step.key] = value
+        elif step.function in ("div", "mod"):
+            if value == 0:
+                raise FormulaError(f"division by zero in {step.key!r}{_with_values(bound)}", where)
+        elif abs(value) > MAX_EXPONENT:
+            raise FormulaError(
+                f"an exponent in {step.key!r} must be at most {MAX_EXPONENT}{_with_values(bound)}", where
+            )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -16,7 +17,7 @@ from clfractal.formulas.model import Formula, inside
 from clfractal.resources import folder
 
 _SOURCES = ("name", "file", "inline", "chain")
-_OPTIONS = ("parameters", "julia", "bailout", "distance_bailout")
+_OPTIONS = ("parameters", "live", "julia", "bailout", "distance_bailout")
 _IGNORED = ("iterations",)
 _CHAIN_KEYS = (
     *("title", "reference", "description", "chain", "bounds", "bailout", "distance_bailout"),
@@ -90,8 +91,8 @@ def resolve(spec: Mapping[str, Any], base_folder: Path | None = None, where: Whe
     Args:
         spec: one of `name` (of the library), `file`, `inline` (a formula's mapping), `chain` (a list of such
         mappings,
-            each with a `count`), and `parameters`, `julia`, `bailout`, `distance_bailout`. For a chain
-            `julia` goes to every link that adds the point, `parameters` is not allowed.
+            each with a `count`), and `parameters`, `live`, `julia`, `bailout`, `distance_bailout`. For a chain
+            `julia` goes to every link that adds the point, `parameters` and `live` are not allowed.
         base_folder: the folder that `file` is relative to and must stay in; None: files are not allowed.
         where: where the section stands; errors add the path below it, and the column inside an expression.
 
@@ -113,10 +114,14 @@ class _Resolver:
         data, place, source = self._data(key, spec, where)
         if "chain" not in data:
             link = self._link(spec, where, data, place, source)
-            return Chain((link,), title=link.bound.formula.title, source={**source, **_options(spec)})
-        if spec.get("parameters"):
-            message = "a chain has no parameters of its own; give them to its formulas"
-            raise FormulaError(message, inside(where, "parameters"))
+            try:
+                return Chain((link,), title=link.bound.formula.title, source={**source, **_options(spec)})
+            except FormulaError as error:
+                raise FormulaError(error.message, where) from None
+        for option, what in (("parameters", "give them to"), ("live", "name live ones in")):
+            if spec.get(option):
+                message = f"a chain has no parameters of its own; {what} its formulas"
+                raise FormulaError(message, inside(where, option))
         return self._links(spec, where, data, place, key)
 
     def _data(
@@ -168,6 +173,7 @@ class _Resolver:
             spec.get("bailout"),
             where,
             distance_bailout=spec.get("distance_bailout"),
+            live=spec.get("live") or (),
         )
         count = spec.get("count", 1)
         if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_COUNT:
@@ -177,7 +183,7 @@ class _Resolver:
 
     def _formula(self, data: Mapping[str, Any], place: Where, name: str) -> Formula:
         if place.file is None or self.base_folder is None:
-            return formula_from_mapping(data, place, name=name)
+            return _parsed_once(data, place, name)
         try:
             return formula_from_mapping(data, Where(), name=name)
         except FormulaError as error:
@@ -237,6 +243,25 @@ class _Resolver:
         if spec.get("julia") is None or data.get("add", "point") != "point" or entry.get("julia") is not None:
             return entry
         return {**entry, "julia": spec["julia"]}
+
+
+# Formulas that stood in scenes, the last used last: a scene whose numbers move keeps its formula.
+_PARSED: dict[tuple[str, str], Formula] = {}
+_MOST_PARSED = 64
+
+
+def _parsed_once(data: Mapping[str, Any], place: Where, name: str) -> Formula:
+    """`formula_from_mapping`, with the same object for the same content."""
+    try:
+        key = (name, json.dumps(data))
+    except (TypeError, ValueError, RecursionError):
+        # What is no plain data is told by the formula's own checks.
+        return formula_from_mapping(data, place, name=name)
+    formula = _PARSED.pop(key, None) or formula_from_mapping(data, place, name=name)
+    _PARSED[key] = formula
+    while len(_PARSED) > _MOST_PARSED:
+        _PARSED.pop(next(iter(_PARSED)), None)
+    return formula
 
 
 def safe_path(text: str, base_folder: Path, where: Where) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -22,12 +22,17 @@ class Link:
     bound: BoundFormula
     count: int = 1
 
+    @property
+    def structure(self) -> tuple[object, ...]:
+        """What its text depends on beside values of parameters."""
+        return (self.bound.formula, self.bound.add, self.count, self.bound.live)
+
 
 @dataclass(frozen=True, eq=False)
 class Chain:
     """Links applied in turn, from the first again after the last.
 
-    Radii and bounds follow from the links unless they are given.
+    Radii and bounds follow from the links unless they are given. Chains are equal that give the same picture.
 
     Attributes:
         bounds_override: (centre, radius) of a sphere that holds the set, in scene units.
@@ -53,6 +58,41 @@ class Chain:
         for link in self.links:
             if not 1 <= link.count <= MAX_COUNT:
                 raise FormulaError(f"count must be 1 to {MAX_COUNT}, got {link.count}", Where())
+        self._check_live()
+
+    def _check_live(self) -> None:
+        """Refuses values of live parameters that only another text could show."""
+        first = self.first
+        if first.live and first.add == "point" and not first.formula.point_map and first.start is None:
+            raise FormulaError(f"f(0) is no finite number with {_live_values(first)}", Where())
+        for link in self.links:
+            if link.bound.depends_on_live(link.bound.formula.degree) and self.degree <= 1:
+                raise FormulaError(
+                    f"degree must be above 1 where it follows from a live parameter, got {self.degree:g}"
+                    f" with {_live_values(link.bound)}",
+                    Where(),
+                )
+
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """All that a picture of the chain depends on."""
+        links = tuple((link.bound.key, link.count) for link in self.links)
+        radii = (self.bailout_override, self.distance_bailout_override, self.step_scale_override)
+        return (links, self.bounds_override, radii)
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self.key)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (isinstance(other, Chain) and self.key == other.key)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: the hash is another one in another process."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def first(self) -> BoundFormula:
@@ -125,6 +165,10 @@ class Chain:
     def step_scale(self) -> float:
         """Part of an estimated distance that is safe to step: the links' smallest."""
         return self.step_scale_override or min(link.bound.step_scale for link in self.links)
+
+
+def _live_values(bound: BoundFormula) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in bound.values.items() if name in bound.live)
 
 
 def single(bound: BoundFormula, source: Mapping[str, Any] | None = None) -> Chain:

@@ -2,7 +2,8 @@
 
 Every value is classified by what it depends on, and costs accordingly:
 
-- *constant*: only parameters. Evaluated here; a value that shapes no code is passed at run time in the array `k`.
+- *constant*: only parameters. Evaluated on the host; a value that shapes no code is passed at run time in the array `k`.
+  What a live parameter is in never shapes code: neither a value of 0 or 1, nor a condition, nor a whole exponent.
 - *flat*: the state, but with slope zero everywhere (`floor`, `sign`, a `where` of constants): a plain `real`.
 - *varying*: the state: `real` or `dual`, as the number type says.
 
@@ -12,15 +13,19 @@ Equal operations on equal operands become one statement, so formulas may repeat 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 
+from clfractal.formulas.decisions import Decisions
+from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.nodes import COMPARISONS, Call, Name, Node, Number, names_in, substitute
 
 NumberType = Literal["real", "dual"]
 _LIFTED = frozenset(("atan2", "min", "max", "mod"))
 _COMPLEX_POWERS = frozenset(("cpow_re", "cpow_im"))
+# Functions that cost so much that they are not written twice where operands can be chosen in place of results.
+_COSTLY = _COMPLEX_POWERS | {*("pow", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,18 +40,22 @@ class Value:
 
 @dataclass(slots=True)
 class Constants:
-    """Collects what the host passes at run time; `k[i]` in the text is `values[i]`."""
+    """Gives places to what the host passes at run time: `k[i]` in the text. Values come later."""
 
-    values: list[float] = field(default_factory=list)
-    _slots: dict[tuple[object, Node], int] = field(default_factory=dict)
+    owners: list[tuple[object, Node | None]] = field(default_factory=list)
+    _slots: dict[tuple[object, Node | None], int] = field(default_factory=dict)
 
-    def slot(self, owner: object, node: Node, value: float) -> str:
-        """The C text of a run-time constant; equal expressions of one owner share a slot."""
+    def slot(self, owner: object, node: Node | None = None) -> int:
+        """The place of a run-time constant; equal expressions of one owner share it."""
         key = (owner, node)
         if key not in self._slots:
-            self._slots[key] = len(self.values)
-            self.values.append(value)
-        return f"((real)(k[{self._slots[key]}]))"
+            self._slots[key] = len(self.owners)
+            self.owners.append(key)
+        return self._slots[key]
+
+    def text(self, owner: object, node: Node | None = None) -> str:
+        """The same as C text."""
+        return f"((real)(k[{self.slot(owner, node)}]))"
 
 
 def literal(value: float) -> Value:
@@ -63,7 +72,7 @@ class Emitter:
         bindings: the values of the names that expressions may use.
         constants: where run-time constants are collected.
         owner: distinguishes equal expressions with different parameter values (links of a chain).
-        evaluate: the number of a node that is constant in the state.
+        decisions: all that may be known of parameter values while writing.
         prefix: begins the names of this emitter's variables.
         lets: further names and their expressions, written where they are first used.
         lines: the statements so far.
@@ -74,12 +83,14 @@ class Emitter:
     bindings: dict[str, Value]
     constants: Constants
     owner: object
-    evaluate: Callable[[Node], float]
+    decisions: Decisions
     prefix: str = "t"
     lets: dict[str, Node] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     origins: dict[str, tuple[str, tuple[Value, ...]]] = field(default_factory=dict)
     _known: dict[tuple[str, ...], Value] = field(default_factory=dict)
+    # How many branches of run-time conditions surround what is written: values there need not be numbers.
+    _branches: int = 0
 
     def emit(self, node: Node) -> Value:
         """The value of an expression; appends the statements that compute it."""
@@ -131,12 +142,19 @@ class Emitter:
 
     def _constant(self, node: Node, operands: Iterable[Value]) -> Value:
         """A value known to the host: part of the text if it shapes code or is plain, else a run-time constant."""
-        value = self.evaluate(node)
-        known = all(operand.number is not None for operand in operands)
+        if all(operand.number is not None for operand in operands):
+            return literal(evaluate_constant(node, {}))
         # A run-time constant of 0 or 1 is usually a feature that is off: its operations vanish from the code.
-        if math.isfinite(value) and (known or value in (0.0, 1.0)):
-            return literal(value)
-        return Value(self.constants.slot(self.owner, node, value), "constant", node)
+        strict = self._branches == 0
+        number = self.decisions.folded(node, strict=strict)
+        if number is not None:
+            return literal(number)
+        return Value(self._passed(node, strict=strict), "constant", node)
+
+    def _passed(self, node: Node, *, strict: bool) -> str:
+        """The C text of a value that the host passes at run time; the truth of a condition is 1 or 0."""
+        self.decisions.place(node, self.constants.slot(self.owner, node), strict=strict)
+        return self.constants.text(self.owner, node)
 
     def _statement(self, c_type: str, kind: Literal["flat", "varying"], call: str, *arguments: str) -> Value:
         key = (call, *arguments)
@@ -257,6 +275,11 @@ class Emitter:
             self._operation("mul", exponent, literal(0.5)) if exponent.node is None else self._half(exponent)
         )
         modulus = self._power(square, half)
+        if exponent.node is not None and self.decisions.is_live(exponent.node):
+            # A live exponent may become negative, and (0 + 0i)^n is 0 then too; it is 1 for n = 0.
+            zero = Call("eq", (exponent.node, Number(0.0)))
+            origin = self._constant(Call("where", (zero, Number(1.0), Number(0.0))), [exponent])
+            modulus = self._select(f"less(R(0.0), {self._plain(square)})", modulus, origin)
         angle = self._operation("mul", self._operation("atan2", y, x), exponent)
         return (
             self._operation("mul", modulus, self._operation("cos", angle)),
@@ -307,13 +330,60 @@ class Emitter:
     def _where(self, node: Call) -> Value:
         """`where`: the branch that is not taken spoils neither the value nor a partial, since lanes are selected."""
         condition, yes, no = node.arguments
+        if self._is_live(condition):
+            return self._live_where(condition, yes, no)
         chosen = self._condition(condition)
         if isinstance(chosen, bool):
             return self.emit(yes if chosen else no)
-        a, b = self.emit(yes), self.emit(no)
+        return self._select(chosen, *self._branches_of(condition, yes, no))
+
+    def _select(self, chosen: str, a: Value, b: Value) -> Value:
+        """`a` in the lanes of the mask `chosen`, else `b`, of either number type."""
         if self.number_type == "dual" and "varying" in (a.kind, b.kind):
             return self._statement("dual", "varying", "dual_where", chosen, self._lift(a), self._lift(b))
         return self.choose(chosen, a, b)
+
+    def _live_where(self, condition: Node, yes: Node, no: Node) -> Value:
+        """`where` by live parameters alone: both branches are written, and the host decides which one is taken."""
+        if yes == no:
+            return self.emit(yes)
+        if isinstance(yes, Call) and isinstance(no, Call) and yes.function == no.function in _COSTLY:
+            pairs = zip(yes.arguments, no.arguments, strict=True)
+            operands = (a if a == b else Call("where", (condition, a, b)) for a, b in pairs)
+            return self.emit(Call(yes.function, tuple(operands)))
+        return self._select(self._live_condition(condition), *self._branches_of(condition, yes, no))
+
+    def _branches_of(self, condition: Node, yes: Node, no: Node) -> tuple[Value, Value]:
+        """Both branches. Where a live parameter is in the condition their constants need not be numbers."""
+        live = bool(self.decisions.live) and any(
+            value.node is not None and self.decisions.is_live(value.node)
+            for value in map(self._binding, sorted(names_in(condition)))
+        )
+        self._branches += live
+        try:
+            return self.emit(yes), self.emit(no)
+        finally:
+            self._branches -= live
+
+    def _is_live(self, node: Node) -> bool:
+        """Whether an expression is constant and uses a live parameter."""
+        if not self.decisions.live:
+            return False
+        closed = self._closed(node)
+        return closed is not None and self.decisions.is_live(closed)
+
+    def _live_condition(self, condition: Node) -> str:
+        """The mask of a condition that the host decides, so that every precision decides alike."""
+        closed = self._closed(condition)
+        assert closed is not None
+        return f"less(R(0.5), {self._passed(closed, strict=False)})"
+
+    def _closed(self, node: Node) -> Node | None:
+        """An expression that depends on parameters alone, with names of `let` filled in; None for any other."""
+        names = {name: self._binding(name) for name in sorted(names_in(node))}
+        if any(value.kind != "constant" for value in names.values()):
+            return None
+        return substitute(node, {n: v.node for n, v in names.items() if v.node})
 
     def choose(self, chosen: str, a: Value, b: Value) -> Value:
         """`a` in the lanes of the mask `chosen`, else `b`, both plain numbers."""
@@ -324,14 +394,16 @@ class Emitter:
 
     def _decided(self, condition: Node) -> bool | None:
         """The truth of a condition that depends on parameters alone: only the branch taken is written."""
-        names = {name: self._binding(name) for name in sorted(names_in(condition))}
-        if any(value.kind != "constant" for value in names.values()):
+        closed = self._closed(condition)
+        if closed is None or self.decisions.is_live(closed):
             return None
-        return bool(self.evaluate(substitute(condition, {n: v.node for n, v in names.items() if v.node})))
+        return self.decisions.truth(closed)
 
     def _condition(self, node: Node) -> str | bool:
         """A condition as the text of a mask, or its truth when it is known now."""
         assert isinstance(node, Call)
+        if self._is_live(node):
+            return self._live_condition(node)
         if node.function == "not":
             inner = self._condition(node.arguments[0])
             return (not inner) if isinstance(inner, bool) else f"(~{inner})"

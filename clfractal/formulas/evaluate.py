@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from operator import itemgetter
 from typing import Any, Protocol
 
 from clfractal.errors import FormulaError, Where
@@ -79,10 +80,40 @@ def evaluate_constant(node: Node, values: Mapping[str, float]) -> float:
     Raises:
         FormulaError: a name without a value, or a result that is not a finite number.
     """
-    value = float(evaluate(node, {name: float(value) for name, value in values.items()}))
-    if not math.isfinite(value):
+    return finite(evaluate(node, {name: float(value) for name, value in values.items()}))
+
+
+def finite(value: Any) -> float:
+    """The value as a float; FormulaError unless it is a finite number."""
+    number = float(value)
+    if not math.isfinite(number):
         raise FormulaError("is not a finite number", Where())
-    return value
+    return number
+
+
+def as_function(node: Node) -> Callable[[Mapping[str, float]], Any]:
+    """The tree as a Python function of the values of its names, which must be floats.
+
+    It gives exactly what `evaluate` gives, some ten times faster; making it costs as much as a few evaluations.
+    A name without a value raises KeyError.
+    """
+    if isinstance(node, Number):
+        number = node.value
+        return lambda values: number
+    if isinstance(node, Name):
+        return itemgetter(node.name)
+    function = _FLOAT_FUNCTIONS[node.function]
+    parts = [as_function(argument) for argument in node.arguments]
+    if len(parts) == 1:
+        (only,) = parts
+        return lambda values: function(only(values))
+    if len(parts) == 2:
+        first, second = parts
+        return lambda values: function(first(values), second(values))
+    first, second, third = parts
+    if node.function == "where":
+        return lambda values: second(values) if first(values) else third(values)
+    return lambda values: function(first(values), second(values), third(values))
 
 
 def whole(value: Any) -> int | None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, Literal, TypeAlias
 
 from clfractal.errors import FormulaError, Where
-from clfractal.formulas.evaluate import evaluate_constant
-from clfractal.formulas.nodes import Node, Number, substitute
+from clfractal.formulas.evaluate import as_function, finite
+from clfractal.formulas.nodes import Node, Number, names_in, substitute
 
 Add: TypeAlias = Literal["point", "constant", "none"]
 
@@ -35,7 +37,8 @@ def inside(where: Where, *parts: str) -> Where:
 class Parameter:
     """A named number of a formula.
 
-    `baked` ones shape the generated code (a change recompiles it); the others are passed at run time.
+    `baked` ones shape the generated code (a change recompiles it); the others are passed at run time. So are
+    baked ones that a scene names as live.
     """
 
     name: str
@@ -74,9 +77,11 @@ class Parameter:
         return number
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Formula:
     """A map of three or four real variables that is iterated, as its file describes it.
+
+    Formulas are equal only if they are one object: the catalog gives one object for one content.
 
     Attributes:
         variables: names of the components of z; their order is the order of `map`.
@@ -124,6 +129,21 @@ class Formula:
         """The parameter of that name, or None."""
         return next((parameter for parameter in self.parameters if parameter.name == name), None)
 
+    def function(self, node: Node) -> Callable[[Mapping[str, float]], Any]:
+        """One of the formula's expressions as a function of the values of its names; made once and kept."""
+        known = self._functions.get(id(node))
+        if known is None or known[0] is not node:
+            self._functions[id(node)] = known = (node, as_function(node))
+        return known[1]
+
+    @cached_property
+    def _functions(self) -> dict[int, tuple[Node, Callable[[Mapping[str, float]], Any]]]:
+        return {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: functions that were made of them cannot be sent to another process."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
 
 @dataclass(frozen=True, eq=False)
 class BoundFormula:
@@ -133,6 +153,7 @@ class BoundFormula:
         values: parameter name to value (whole for `int`).
         julia: the constant that is added, one number for each variable, or None.
         bailout_override, distance_bailout_override: radii that replace the formula's own.
+        live: names of parameters whose values never become part of the code.
     """
 
     formula: Formula
@@ -140,6 +161,20 @@ class BoundFormula:
     julia: tuple[float, ...] | None = None
     bailout_override: float | None = None
     distance_bailout_override: float | None = None
+    live: frozenset[str] = frozenset()
+
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """Equal for two bound formulas that are the same in everything; bytes, since 0.0 == -0.0."""
+        numbers = (*self.values.values(), *(self.julia or ()))
+        return (
+            self.formula,
+            struct.pack(f"{len(numbers)}d", *numbers),
+            self.julia is None,
+            self.bailout_override,
+            self.distance_bailout_override,
+            self.live,
+        )
 
     @property
     def add(self) -> Add:
@@ -217,9 +252,17 @@ class BoundFormula:
     @property
     def baked(self) -> Mapping[str, float]:
         """The values that shape the code."""
-        return {p.name: self.values[p.name] for p in self.formula.parameters if p.baked}
+        return {
+            p.name: self.values[p.name]
+            for p in self.formula.parameters
+            if p.baked and p.name not in self.live
+        }
 
-    @property
+    def depends_on_live(self, node: Node) -> bool:
+        """Whether an expression uses a live parameter."""
+        return bool(self.live) and not self.live.isdisjoint(names_in(node))
+
+    @cached_property
     def start(self) -> tuple[float, ...] | None:
         """f(0), for `add: point`: iteration may begin at z = f(0) + C with count 1 and derivative identity.
 
@@ -228,13 +271,16 @@ class BoundFormula:
         """
         if self.formula.point_map:
             return None
-        state = (0.0,) * len(self.formula.variables)
+        formula = self.formula
+        let = [(name, formula.function(node)) for name, node in formula.let]
+        components = [formula.function(node) for node in formula.map]
+        state = (0.0,) * len(formula.variables)
         for _ in range(self.repeat):
-            names = {**self.values, **dict(zip(self.formula.variables, state, strict=True))}
+            names = {**self.values, **dict(zip(formula.variables, state, strict=True))}
             try:
-                for name, node in self.formula.let:
-                    names[name] = evaluate_constant(node, names)
-                state = tuple(evaluate_constant(node, names) for node in self.formula.map)
+                for name, value in let:
+                    names[name] = finite(value(names))
+                state = tuple(finite(component(names)) for component in components)
             except FormulaError:
                 return None
         return state
@@ -243,8 +289,10 @@ class BoundFormula:
     def _converted(self) -> bool:
         return self.formula.add == "point" and self.julia is not None
 
+    @cached_property
+    def _names(self) -> Mapping[str, float]:
+        return {**self.values, "julia": self.julia_size}
+
     def value(self, node: Node) -> float:
         """The value of an expression of parameters; `julia` in it is |C| of a Julia set, else 0."""
-        names = dict(self.values)
-        names["julia"] = self.julia_size
-        return evaluate_constant(node, names)
+        return finite(self.formula.function(node)(self._names))

@@ -1,20 +1,23 @@
 """Writes a chain of formulas as OpenCL C over packets: the functions that `kernels/orbit.h` iterates.
 
 The text depends on what shapes code (the expressions, baked parameters, counts); everything else is in `constants`, the
-values of the kernel argument `k`, so that dragging a parameter recompiles nothing.
+values of the kernel argument `k`, so that dragging a parameter recompiles nothing. A text is kept with all that it
+depends on, so that it is written once for all parameter values that give it (`write_formula`).
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from threading import Lock
 from typing import Literal
 
+from clfractal.formulas.decisions import Decisions, Question, replayed
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
-from clfractal.formulas.evaluate import evaluate_constant
-from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Node, Number
+from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
 
 # How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
@@ -26,7 +29,7 @@ class FormulaText:
     """A chain in OpenCL C.
 
     Attributes:
-        text: the definitions that `kernels/orbit.h` expects before it.
+        text: the definitions that `kernels/orbit.h` expects before it. Equal texts are one object.
         constants: values of the run-time array `k`, in order; never empty.
         logarithmic: the degree is above 1, so that distances follow |z| log|z|.
         has_derivative: every link carries a scalar rule, so marching needs no Jacobian.
@@ -43,10 +46,102 @@ def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap =
     """The chain's functions over `real` and `dual`.
 
     `scalar_rule=False` leaves out the formulas' own derivative, so that marching uses the Jacobian throughout.
-    A map that uses the point (`point_x`) is always written operation by operation. The texts of the last chains are
-    kept: a render asks for its own twice, and each eye of a pair asks again.
+    A map that uses the point (`point_x`) is always written operation by operation.
+
+    Writing takes milliseconds, so texts are kept. For other parameter values the text is the same if all
+    decisions are that were made while writing it; then only the constants are computed.
     """
-    return _ChainWriter(chain, scalar_rule, dual_map).write()
+    key = (*(link.structure for link in chain.links), scalar_rule, dual_map)
+    with _LOCK:
+        known = list(_WRITTEN.get(key, ()))
+    for written in reversed(known):
+        found = written.filled(chain)
+        if found is not None:
+            return found
+    written = _ChainWriter(chain, scalar_rule, dual_map).write()
+    result = written.filled(chain)
+    assert result is not None, "a text fits the chain that it was written for"
+    with _LOCK:
+        _WRITTEN[key] = [*_WRITTEN.get(key, ())[-(_MOST_TEXTS - 1) :], written]
+        _WRITTEN.move_to_end(key)
+        if len(_WRITTEN) > _MOST_STRUCTURES:
+            _WRITTEN.popitem(last=False)
+    return result
+
+
+def forget_texts() -> None:
+    """Writes every text anew from now on."""
+    write_formula.cache_clear()
+    with _LOCK:
+        _WRITTEN.clear()
+
+
+@dataclass(frozen=True, slots=True)
+class _Written:
+    """A text, and what must be the same of another chain for it to be that chain's text.
+
+    It is compared with chains of the same formulas, counts, additions and live parameters only.
+
+    Attributes:
+        logarithmic: whether the degree is above 1.
+        offset: which components of f(0) are added at the start; None if iteration starts at z = 0.
+        repeats: how often each link's map is applied; None if it is passed at run time.
+        questions: what each link's parameters were asked.
+        owners: of each run-time constant whose it is, and its expression.
+    """
+
+    text: str
+    logarithmic: bool
+    has_derivative: bool
+    offset: tuple[bool, ...] | None
+    repeats: tuple[int | None, ...]
+    questions: tuple[tuple[Question, ...], ...]
+    owners: tuple[object, ...]
+
+    def filled(self, chain: Chain) -> FormulaText | None:
+        """The text with the chain's constants; None if the chain has another text."""
+        if (chain.degree > 1) != self.logarithmic or _offset(chain) != self.offset:
+            return None
+        constants = [0.0] * max(len(self.owners), 1)
+        for link, repeat, questions in zip(chain.links, self.repeats, self.questions, strict=True):
+            if repeat is not None and link.bound.repeat != repeat:
+                return None
+            if replayed(questions, link.bound.values, constants) is None:
+                return None
+        for slot, owner in enumerate(self.owners):
+            if isinstance(owner, tuple):
+                constants[slot] = _passed(chain, *owner)
+        return FormulaText(self.text, tuple(constants), self.logarithmic, self.has_derivative)
+
+
+# The texts of the formulas that were used last, each with the oldest first.
+_WRITTEN: OrderedDict[tuple[object, ...], list[_Written]] = OrderedDict()
+_MOST_STRUCTURES, _MOST_TEXTS = 32, 8
+_LOCK = Lock()
+
+
+@lru_cache(maxsize=512)
+def _one(text: str) -> str:
+    """The same object for equal texts, so that comparing two takes no time."""
+    return text
+
+
+def _offset(chain: Chain) -> tuple[bool, ...] | None:
+    """Which components of f(0) the start adds; None if iteration starts at z = 0, or no point is added."""
+    first = chain.first
+    if first.add != "point" or first.start is None:
+        return None
+    return tuple(bool(first.live) or value != 0 for value in first.start)
+
+
+def _passed(chain: Chain, index: int, what: str, component: int) -> float:
+    """A run-time constant that is no expression."""
+    bound = chain.links[index].bound
+    if what == "repeat":
+        return float(bound.repeat)
+    numbers = bound.julia if what == "julia" else bound.start
+    assert numbers is not None
+    return numbers[component]
 
 
 def operations_per_application(chain: Chain) -> float:
@@ -71,15 +166,16 @@ class _ChainWriter:
         self.links: Sequence[Link] = chain.links
         self.size = chain.size
         self.constants = Constants()
+        self.decisions = [Decisions(link.bound) for link in self.links]
         has_rule = all(link.bound.derivative is not None for link in self.links)
         self.has_derivative = scalar_rule and has_rule
         first = self.links[0].bound
-        self.offset = first.start if first.add == "point" else None
+        self.offset = _offset(chain)
         self.starts_at_zero = first.add == "point" and self.offset is None
         # The distance of the last solid belongs to the last application's formula.
         self.shape_link = self.links[-1] if self.links[-1].bound.formula.shape is not None else None
 
-    def write(self) -> FormulaText:
+    def write(self) -> _Written:
         logarithmic = self.chain.degree > 1
         parts = [
             f"#define STATE_SIZE {self.size}",
@@ -99,18 +195,39 @@ class _ChainWriter:
         if self.has_derivative:
             parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
             parts.append(self._dispatch("real", derivative=True))
-        constants = tuple(self.constants.values) or (0.0,)
-        return FormulaText("\n".join(parts) + "\n", constants, logarithmic, self.has_derivative)
+        return _Written(
+            _one("\n".join(parts) + "\n"),
+            logarithmic,
+            self.has_derivative,
+            self.offset,
+            tuple(None if self._repeats_at_run_time(link) else link.bound.repeat for link in self.links),
+            tuple(tuple(each.questions) for each in self.decisions),
+            tuple(owner for owner, _ in self.constants.owners),
+        )
+
+    def _repeats_at_run_time(self, link: Link) -> bool:
+        return link.bound.depends_on_live(link.bound.formula.repeat)
 
     # --- one link ---
 
     def _emitter(self, index: int, number_type: NumberType) -> Emitter:
         bound = self.links[index].bound
-        bindings = {f"point_{v}": Value(f"c.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
+        bindings = {point_name(v): self._point_value(index, i) for i, v in enumerate(bound.formula.variables)}
         bindings |= {v: Value(f"z.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
+        decisions = self.decisions[index]
         return Emitter(
-            number_type, bindings | _parameters(bound), self.constants, index, _evaluator(bound), lines=[]
+            number_type, bindings | _parameters(bound, decisions), self.constants, index, decisions, lines=[]
         )
+
+    def _point_value(self, index: int, component: int) -> Value:
+        """`point_x` and its like: the constant that is added, which in a Julia set is not the point in space."""
+        bound = self.links[index].bound
+        name = point_name(bound.formula.variables[component])
+        rule = bound.formula.derivative
+        used = bound.formula.point_map or (rule is not None and name in names_in(rule))
+        if bound.add == "constant" and used:
+            return Value(self.constants.text((index, "julia", component)), "flat")
+        return Value(f"c.s{component}", "varying")
 
     def _map(self, emitter: Emitter, bound: BoundFormula) -> list[Value]:
         emitter.lets = dict(bound.formula.let)
@@ -135,7 +252,7 @@ class _ChainWriter:
                 texts.append(self._full(number_type, value))
             elif bound.add == "constant":
                 assert bound.julia is not None
-                slot = self.constants.slot((index, "julia", i), Number(0.0), bound.julia[i])
+                slot = self.constants.text((index, "julia", i))
                 added = emitter.combine("add", value, Value(slot, "flat"))
                 texts.append(self._full(number_type, added))
             elif number_type == "dual" and i < 3:
@@ -158,7 +275,10 @@ class _ChainWriter:
         head = (
             f"INLINE {state} {number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
         )
-        if bound.repeat == 1:
+        times = str(bound.repeat)
+        if self._repeats_at_run_time(self.links[index]):
+            times = f"(int)(k[{self.constants.slot((index, 'repeat', 0))}])"
+        if times == "1":
             # A map written by its Jacobian is made of real statements; what is added to it is not.
             adder = self._adder(index, number_type) if emitter.number_type != number_type else emitter
             texts = self._add_constant(index, number_type, adder, mapped)
@@ -166,7 +286,7 @@ class _ChainWriter:
             return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
         # The map several times, then the constant: `next` names what one pass of the map gives.
         passes = [
-            f"for (int pass = 0; pass < {bound.repeat}; ++pass) {{",
+            f"for (int pass = 0; pass < {times}; ++pass) {{",
             *("    " + line for line in emitter.lines),
         ]
         inner = ", ".join(self._full(number_type, value) for value in mapped)
@@ -179,9 +299,7 @@ class _ChainWriter:
 
     def _adder(self, index: int, number_type: NumberType) -> Emitter:
         """Writes statements after those of the map."""
-        return Emitter(
-            number_type, {}, self.constants, index, _evaluator(self.links[index].bound), prefix="u"
-        )
+        return Emitter(number_type, {}, self.constants, index, self.decisions[index], prefix="u")
 
     def _by_local_jacobian(self, index: int) -> tuple[Emitter, list[str]]:
         """The map over dual numbers by its own Jacobian: real statements, and a dual expression for each component."""
@@ -260,7 +378,12 @@ class _ChainWriter:
         components = names if number_type == "real" else [f"dual_coordinate_{a[-1]}({a})" for a in names]
         bindings = {v: Value(f"c->s{i}", "varying") for i, v in enumerate(bound.formula.variables[:3])}
         emitter = Emitter(
-            number_type, bindings | _parameters(bound), self.constants, 0, _evaluator(bound), prefix="p"
+            number_type,
+            bindings | _parameters(bound, self.decisions[0]),
+            self.constants,
+            0,
+            self.decisions[0],
+            prefix="p",
         )
         lines = [f"c->s{i} = {component};" for i, component in enumerate(components)]
         if self.size == 4:
@@ -271,9 +394,9 @@ class _ChainWriter:
             lines += [f"z->s{i} = {zero};" for i in range(self.size)]
         else:
             lines.append("*z = *c;")
-            for i, value in enumerate(self.offset or ()):
-                if value != 0:
-                    slot = self.constants.slot((0, "start", i), Number(0.0), value)
+            for i, added in enumerate(self.offset or ()):
+                if added:
+                    slot = self.constants.text((0, "start", i))
                     component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
                     lines.append(f"{component} += {slot};")
         name = "start" if number_type == "real" else "dual_start"
@@ -311,18 +434,13 @@ def _cost(lines: Sequence[str]) -> int:
     return sum(_COSTS.get(line.partition("= ")[2].partition("(")[0], 1) for line in lines)
 
 
-def _parameters(bound: BoundFormula) -> dict[str, Value]:
+def _parameters(bound: BoundFormula, decisions: Decisions) -> dict[str, Value]:
     """Baked parameters as literals, the others as names that `Emitter` turns into slots of `k`."""
     baked = bound.baked
     return {
-        name: literal(value) if name in baked else Value("", "constant", Name(name))
-        for name, value in bound.values.items()
+        name: literal(decisions.exact(name)) if name in baked else Value("", "constant", Name(name))
+        for name in bound.values
     }
-
-
-def _evaluator(bound: BoundFormula) -> Callable[[Node], float]:
-    values: Mapping[str, float] = dict(bound.values)
-    return lambda node: float(evaluate_constant(node, values))
 
 
 def _function(head: str, lines: Sequence[str], tail: str | None) -> str:

@@ -7,10 +7,12 @@ from pydantic import Field, model_validator
 from clfractal.scene.base import Coordinate, Number, Section, problem
 
 MAX_LINKS = 64
+MAX_LIVE = 32
 
 Source = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
 Bailout = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)]
 Julia = Annotated[tuple[Coordinate, ...], Field(strict=False, min_length=3, max_length=4)]
+Live = Annotated[tuple[Source, ...], Field(strict=False, max_length=MAX_LIVE)]
 
 
 class _Source(Section):
@@ -18,6 +20,7 @@ class _Source(Section):
     file: Source | None = Field(None, description="a formula file, in the scene's folder or below")
     inline: dict[str, Any] | None = Field(None, description="a formula, written here")
     parameters: dict[str, Number] = Field({}, description="values of its parameters")
+    live: Live = Field((), description="names of parameters that may move without building the program anew")
     julia: Julia | None = Field(None, description="the added constant: a number for each variable")
 
 
@@ -47,6 +50,8 @@ class FormulaSpec(_Source):
         _check_source(self, ("name", "file", "inline", "chain"))
         if self.chain is not None and self.parameters:
             raise problem("belongs to the members of a chain, not to the chain", "parameters")
+        if self.chain is not None and self.live:
+            raise problem("belongs to the members of a chain, not to the chain", "live")
         return self
 
     def mapping(self) -> dict[str, Any]:
@@ -58,7 +63,7 @@ class FormulaSpec(_Source):
 def _without_empty(spec: dict[str, Any]) -> dict[str, Any]:
     if "chain" in spec:
         spec["chain"] = [_without_empty(link) for link in spec["chain"]]
-    return {key: value for key, value in spec.items() if key != "parameters" or value}
+    return {key: value for key, value in spec.items() if key not in ("parameters", "live") or value}
 
 
 def _check_source(spec: Section, keys: tuple[str, ...]) -> None:

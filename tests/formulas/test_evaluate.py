@@ -12,9 +12,9 @@ from hypothesis import assume, given
 
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.backends import Dual, DualBackend, MpmathBackend, NumpyBackend, seeded
-from clfractal.formulas.evaluate import TINY, evaluate, evaluate_constant
+from clfractal.formulas.evaluate import TINY, as_function, evaluate, evaluate_constant
 from clfractal.formulas.language import Call, Name, Node, Number, parse
-from tests.formulas.trees import VARIABLES, coordinates, tame_tree
+from tests.formulas.trees import VARIABLES, any_tree, coordinates, tame_tree
 
 
 def with_numpy(node: Node, point: tuple[float, ...]) -> float:
@@ -53,6 +53,12 @@ def test_python_floats_and_numpy_agree(node: Node, x: float, y: float, z: float)
     names = {v: c + 1e-13 for v, c in zip(VARIABLES, point, strict=True)}
     assume(abs(float(evaluate(node, names)) - value) < 1e-9 * (1 + abs(value)))
     assert other == pytest.approx(value, rel=1e-8, abs=1e-8)
+
+
+@given(any_tree | tame_tree, coordinates, coordinates, coordinates)
+def test_a_function_made_of_a_tree_gives_the_same_bits(node: Node, x: float, y: float, z: float) -> None:
+    names = dict(zip(VARIABLES, (x, y, z), strict=True))
+    assert repr(as_function(node)(names)) == repr(evaluate(node, names))
 
 
 _CONVENTIONS = [

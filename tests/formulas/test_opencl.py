@@ -62,6 +62,10 @@ SPECS: dict[str, Any] = {
     "with the point inside": {
         "inline": {**UNUSUAL, "map": ["x*x + point_y", "y*point_x - z", "z*z", "w*point_z"]}
     },
+    "with the constant of a Julia set inside": {
+        "inline": {**UNUSUAL, "map": ["x*x + point_y", "y*point_x - z", "z*z", "w*point_z"]},
+        "julia": [0.3, -0.2, 0.6, 0.1],
+    },
 }
 
 # The states of every step, over real and dual numbers, and the scalar derivative.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from clfractal.errors import SceneError
+from clfractal.errors import FormulaError, SceneError
 from clfractal.files.channels import CHANNELS
 from clfractal.formulas import catalog
 from clfractal.scene import environment
@@ -71,9 +71,15 @@ SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
 TRIPLE = [name for name in SINGLE if len(catalog.load(name).variables) == 3]
 
 
+def _named(name: str, live: int) -> dict[str, Any]:
+    """A formula of the library; some of its parameters are live."""
+    chosen = [parameter.name for parameter in catalog.load(name).parameters][:live]
+    return {"name": name, "live": chosen} if chosen else {"name": name}
+
+
 def sources(names: list[str]) -> st.SearchStrategy[dict[str, Any]]:
     """A formula of the library or one written in the scene."""
-    named = st.sampled_from(names).map(lambda name: {"name": name})
+    named = st.builds(_named, st.sampled_from(names), st.integers(0, 2))
     return named | inline.map(lambda mapping: {"inline": mapping})
 
 
@@ -277,3 +283,24 @@ def test_the_schema_describes_every_key() -> None:
         "top": [0.25, 0.35, 0.5],
         "bottom": [0.02, 0.02, 0.03],
     }
+
+
+def test_live_parameters_are_part_of_a_scene() -> None:
+    links = [{"name": "mandelbulb", "live": ["power"]}, {"name": "mandelbox"}]
+    for formula in ({"name": "mandelbulb", "live": ["power", "phi_phase"]}, {"chain": links}):
+        scene = load_scene({"version": 1, "formula": formula, "camera": {}})
+        assert load_scene(dump_scene(scene)) == scene
+        assert load_scene(json.loads(json.dumps(scene.resolved()))) == scene
+        first = scene.formula if scene.formula.chain is None else scene.formula.chain[0]
+        assert first.live[0] == "power"
+        assert scene.chain.first.live == set(first.live)
+    plain = load_scene({"version": 1, "formula": {"name": "mandelbulb", "live": []}, "camera": {}})
+    assert "live" not in dump_scene(plain)
+    assert "may move" in json.dumps(schema())
+
+
+def test_a_live_parameter_that_is_none_is_told_with_its_place() -> None:
+    text = "version: 1\nformula: {name: mandelbulb,\n          live: [powre]}\ncamera: {}\n"
+    with pytest.raises(FormulaError) as caught:
+        load_scene(text)
+    assert str(caught.value) == "scene:3:18: formula.live.0: unknown parameter 'powre'; did you mean 'power'?"
