@@ -286,7 +286,7 @@ def test_mistakes_are_one_line(arguments: tuple[str, ...], parts: tuple[str, ...
 def test_without_scikit_image(shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     told = shell("mesh", "ball.yaml", "-o", "m.ply")
-    assert told.is_one_line(2, "clfractal mesh: needs scikit-image: pip install 'clfractal[mesh]'")
+    assert told.is_one_line(2, "clfractal mesh: needs scikit-image: pip install scikit-image")
 
 
 def test_a_scene_in_a_volume_that_does_not_load(shell: InProcess) -> None:

@@ -103,7 +103,7 @@ def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: 
 
 def _check_library() -> None:
     if importlib.util.find_spec("skimage") is None:
-        raise FileError("needs scikit-image: pip install 'clfractal[mesh]'", Where("clfractal mesh"))
+        raise FileError("needs scikit-image: pip install scikit-image", Where("clfractal mesh"))
 
 
 def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
