@@ -47,6 +47,10 @@ class ClfractalError(Exception):
         super().__init__(self.where.prefix() + self.message)
 
 
+class Stopped(Exception):  # noqa: N818 - nothing went wrong
+    """The work was cancelled by whoever had asked for it; nothing is wrong, and there is no result."""
+
+
 class SceneError(ClfractalError):
     """A scene file, or an override of one of its keys, is wrong."""
 

@@ -1,4 +1,4 @@
-"""The rules of the house: how long a file may be, who uses which library. (`make lint` checks the directions of imports.)"""
+"""The rules of the house: how long a file may be, who uses which library. (`make lint` checks who imports whom.)"""
 
 from __future__ import annotations
 

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import pyopencl as cl
 
 from clfractal.device import cache
+from clfractal.device.loaded import LoadedPrograms
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, unknown_name
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
@@ -58,11 +59,15 @@ class DeviceInfo:
 
 
 class Device:
-    """An OpenCL device; context and command queue (in order, profiling on) are made when first needed."""
+    """An OpenCL device; context and command queue (in order, profiling on) are made when first needed.
+
+    `loaded` keeps programs of this context, and goes with it.
+    """
 
     def __init__(self, info: DeviceInfo, cl_device: cl.Device) -> None:
         self.info = info
         self.cl_device = cl_device
+        self.loaded = LoadedPrograms()
 
     def __repr__(self) -> str:
         return f"Device({self.info.index} {self.info.name!r})"

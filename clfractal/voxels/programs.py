@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
-from weakref import WeakKeyDictionary
 
 import pyopencl as cl
 
@@ -35,10 +35,6 @@ NODE_POINTS = 64
 CHUNK = 4
 # Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
 PACKETS = 2
-
-# Programs of a device that are kept loaded: a box that is moved is filled again and again.
-MOST_LOADED = 64
-_loaded: WeakKeyDictionary[Device, dict[tuple[str, str], program.Program]] = WeakKeyDictionary()
 
 _BUFFER = Argument("buffer", 8192)
 _INT = Argument("scalar", dtype="int32")
@@ -70,16 +66,23 @@ class Built:
 
 
 def build_all(
-    device: Device, recipes: Sequence[Recipe], on_compile: Callable[[str], None] | None = None
+    device: Device,
+    recipes: Sequence[Recipe],
+    on_compile: Callable[[str], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
 ) -> list[Built]:
     """Builds programs, beside each other where they have to be compiled.
 
     Raises:
         KernelBuildError: a program does not compile.
         DeviceError: the driver failed.
+        Stopped: `stopped`, which is asked from other threads, answered True.
     """
     told: list[str] = []
-    loaded = _loaded.setdefault(device, {})
+    failed = threading.Event()
+
+    def nobody_waits() -> bool:
+        return failed.is_set() or (stopped is not None and stopped())
 
     def tell(line: str) -> None:
         if not told and on_compile is not None:
@@ -92,21 +95,25 @@ def build_all(
         if recipe.formula is not None:
             generated["formula.h"] = recipe.formula
         text = flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
-        key = (recipe.kernel, text.text)
-        if key in loaded:
-            return Built(loaded[key].kernel(recipe.kernel), recipe.items, recipe.group, 0.0)
         warm = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
         flags = program.math_flags(recipe.precision)
         built = program.build(
-            device, text.text, flags=flags, sources=text.sources, warm=warm, on_compile=tell
+            device,
+            text.text,
+            flags=flags,
+            sources=text.sources,
+            warm=warm,
+            on_compile=tell,
+            stopped=nobody_waits,
         )
-        if len(loaded) >= MOST_LOADED:
-            loaded.clear()
-        loaded[key] = built
         return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
 
     with ThreadPoolExecutor(max(len(recipes), 1)) as pool:
-        return list(pool.map(build, recipes))
+        try:
+            return list(pool.map(build, recipes))
+        except BaseException:  # an interrupt too: the other programs are not waited for
+            failed.set()
+            raise
 
 
 def nodes_recipe(chain: Chain, formula: FormulaText, lanes: int, precision: Precision) -> Recipe:
