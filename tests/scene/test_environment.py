@@ -17,7 +17,7 @@ from clfractal.files.environment import read_environment
 from clfractal.files.exr import write_exr
 from clfractal.scene.environment import environment_map, names
 from clfractal.scene.lighting import Environment
-from clfractal.scene.load import dump_scene, load_scene, with_overrides
+from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from tests.shell import SCENE, InProcess, process
 
@@ -131,11 +131,11 @@ def test_overrides_find_the_map_again(folder: Path) -> None:
     path = scene_file(folder, "file: sky.exr")
     scene = load_scene(path, overrides=["environment.file=maps/grey.exr"])
     assert (environment_map(scene) == 0.25).all()
-    again = with_overrides(scene, ["camera.fov=20"])
+    again = load_scene(scene.resolved(), overrides=["camera.fov=20"], folder=scene.folder)
     assert (environment_map(again) == 0.25).all()
     assert str(refusal(path, overrides=["environment.file=none.exr"])).startswith("--set environment.file: ")
     with pytest.raises(FileError):
-        with_overrides(scene, ["environment.file=none.exr"])
+        load_scene(scene.resolved(), overrides=["environment.file=none.exr"], folder=scene.folder)
 
 
 def test_copies_stay_in_the_folder(folder: Path) -> None:
