@@ -24,6 +24,8 @@ from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
 
 Source = Literal["bits", "bricks", "slab"]
 
+# Instead of a brick's number: all its voxels are outside, or inside as a whole.
+ALL_OUTSIDE, ALL_INSIDE = -1, -2
 FILL_KINDS = ("inside", "coverage", "iterations")
 NORMALS = ("gradient", "least_squares", "exact")
 SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
@@ -78,15 +80,15 @@ def build_all(
         DeviceError: the driver failed.
         Stopped: `stopped`, which is asked from other threads, answered True.
     """
-    told: list[str] = []
+    announced = threading.Event()
     failed = threading.Event()
 
     def nobody_waits() -> bool:
         return failed.is_set() or (stopped is not None and stopped())
 
-    def tell(line: str) -> None:
-        if not told and on_compile is not None:
-            told.append(line)
+    def announce(line: str) -> None:
+        if not announced.is_set() and on_compile is not None:
+            announced.set()
             on_compile(line)
 
     def build(recipe: Recipe) -> Built:
@@ -103,7 +105,7 @@ def build_all(
             flags=flags,
             sources=text.sources,
             warm=warm,
-            on_compile=tell,
+            on_compile=announce,
             stopped=nobody_waits,
         )
         return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
@@ -224,5 +226,7 @@ def _source_defines(source: Source, sample: Kind) -> dict[str, object]:
     return {
         **{f"SOURCE_{name.upper()}": number for number, name in enumerate(SOURCES)},
         "SOURCE": SOURCES.index(source),
+        "ALL_OUTSIDE": f"({ALL_OUTSIDE})",
+        "ALL_INSIDE": f"({ALL_INSIDE})",
         **_sample_defines(sample),
     }
