@@ -213,7 +213,8 @@ class Children:
         """Start children that are ordered, and clear away those that have ended by themselves."""
         while True:
             try:
-                some = self._idle or self._leases
+                with self._changed:
+                    some = self._idle or self._leases
                 lease, environment = self._orders.get(timeout=_SWEEP_S if some else None)
             except queue.Empty:
                 with self._changed:

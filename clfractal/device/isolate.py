@@ -83,6 +83,11 @@ def run(
     return _answer(folder, status, device.info.name, doing, timeout_s)
 
 
+def end_children() -> None:
+    """End the children that wait for jobs, and those that work: the next job gets a new one."""
+    children.pool.close()
+
+
 def _wait_for_child(folder: Path, timeout_s: float, stopped: Callable[[], bool] | None) -> int | None:
     """0 once a request is answered; else the child's exit status; None if it was killed for taking too long."""
     package_root = str(Path(clfractal.__file__).resolve().parent.parent)

@@ -65,6 +65,7 @@ def _run_stoppable(device: Device, job: str, stopped: Callable[[], bool], **argu
 @pytest.fixture
 def pool(monkeypatch: pytest.MonkeyPatch) -> Iterator[Children]:
     """A pool of two children of this test's own."""
+    isolate.end_children()  # so that none of the usual pool ends meanwhile
     found = Children(2)
     monkeypatch.setattr(children, "pool", found)
     yield found
@@ -115,6 +116,13 @@ def test_a_child_that_ended_meanwhile_is_replaced(device: Device) -> None:
     os.kill(process, signal.SIGKILL)
     assert _wait(lambda: not _is_running(process))
     assert _run(device, "echo_job", number=2)[0] == 3
+
+
+def test_children_can_be_ended(device: Device) -> None:
+    process = _run(device, "echo_job", number=1)[1]
+    isolate.end_children()
+    assert not _is_running(process)
+    assert _run(device, "echo_job", number=2)[1] != process
 
 
 def test_a_child_ends_by_itself_after_many_jobs(device: Device) -> None:
