@@ -28,6 +28,10 @@ class Where:
         return "".join(f"{part}: " for part in (place, self.path) if part)
 
 
+class Stopped(Exception):  # noqa: N818
+    """The work was cancelled, by its token or by whoever waited for it. No error: nothing is told to the user."""
+
+
 class ClfractalError(Exception):
     """Base of every error meant for the user.
 
@@ -45,10 +49,6 @@ class ClfractalError(Exception):
         if status is not None:
             self.status = status
         super().__init__(self.where.prefix() + self.message)
-
-
-class Stopped(Exception):  # noqa: N818 - nothing went wrong
-    """The work was cancelled by whoever had asked for it; nothing is wrong, and there is no result."""
 
 
 class SceneError(ClfractalError):
