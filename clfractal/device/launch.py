@@ -41,23 +41,32 @@ class Part(Generic[T]):
 
 @dataclass(slots=True)
 class Pace:
-    """How much work a launch takes to last as long as it should; it goes on from one picture to the next.
+    """How much work a launch takes to last as long as it should; what is learned serves the next picture, too.
 
     Attributes:
         size: work of the next launch, in units of the caller's.
         least, most: bounds of it.
         seconds: how long a launch should take.
+        slowest: units a second of the heaviest launch so far; None before the first.
     """
 
     size: float
     least: float = 1.0
     most: float = float("inf")
     seconds: float = BUDGET_SECONDS / IN_FLIGHT
+    slowest: float | None = None
+
+    def begin(self) -> None:
+        """Starts over with what is safe for the heaviest work so far: what came last may have been light."""
+        if self.slowest is not None:
+            self.size = float(np.clip(self.slowest * self.seconds, self.least, self.most))
 
     def learn(self, amount: float, milliseconds: float) -> None:
         """Sets the next size by what `amount` of work took."""
-        wanted = amount * self.seconds / max(1e-3 * milliseconds, 1e-6)
-        self.size = float(np.clip(wanted, self.least, min(max(amount, self.least) * GROWTH, self.most)))
+        rate = amount / max(1e-3 * milliseconds, 1e-6)
+        self.slowest = rate if self.slowest is None else min(self.slowest, rate)
+        largest = min(max(amount, self.least) * GROWTH, self.most)
+        self.size = float(np.clip(rate * self.seconds, self.least, largest))
 
 
 def wait(event: cl.Event, device: Device, doing: str) -> float:

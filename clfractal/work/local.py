@@ -100,6 +100,7 @@ def _launched(
     pace = drawing.pace
     pace.seconds = budget_seconds / IN_FLIGHT
     pace.most = float(drawing.capacity * cutter.per_tile)
+    pace.begin()
     tally = Tally(build_ms=drawing.build_ms)
     for span, milliseconds in in_launches(
         drawing.device, cutter.enqueue, pace, doing="rendering", token=token
