@@ -1,25 +1,34 @@
-# Needs only make and Python 3.11 or newer; everything else goes into .venv.
+# Needs only make and Python 3.11 or newer; everything else goes into .venv, what `make lint` needs into .venv-lint.
 #
 #   make demo          render a first picture
-#   make test          lint, then all tests, on the installed program
-#   make lint          style, types, import directions
+#   make test          all tests, on the installed program
+#   make lint          style, types, import directions: with exact versions of tools, so that it says the same everywhere
+#   make lowest        render, voxelize and mesh once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
+#
+# Another Python: `make test PYTHON=python3.12 VENV=.venv-3.12`. An environment keeps the Python that it was made with.
 
 SHELL := /bin/sh
 VENV := .venv
-BIN := $(VENV)/bin
+BIN := $(abspath $(VENV))/bin
+LINT := .venv-lint
+LOWEST := .venv-lowest
 # The tests run in a folder that holds links to them but no `clfractal`: they find the installed one.
 STAGE := build/stage
 # A worker for each core; compiling a kernel keeps one busy for seconds. Idle workers take tests of others.
 PARALLEL := -n auto --dist worksteal
 STAGED := tests benchmarks docs scenes README.md CHANGELOG.md pyproject.toml Makefile
 
-PYTHON := $(shell for python in python3.13 python3.12 python3.11 python3 python; do \
+# A version manager may answer for a Python that it does not have: only one that really runs is taken.
+PYTHON := $(shell for python in python3.14 python3.13 python3.12 python3.11 python3 python; do \
+	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
+# Versions that are low enough to be the lowest have no wheels for the newest Python.
+OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo test lint bench portability install clean
+.PHONY: demo test lint lowest bench portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -29,26 +38,48 @@ demo: $(VENV)/.installed
 
 install: $(VENV)/.installed
 
-test: lint $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(CURDIR)/$(BIN)/python -P -m pytest $(PARALLEL) $(ARGUMENTS)
+test: $(VENV)/.tested-with $(STAGE)/.linked
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest $(PARALLEL) $(ARGUMENTS)
 
-lint: $(VENV)/.tested-with
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy --strict
-	$(BIN)/lint-imports
+lint: $(LINT)/.installed
+	$(LINT)/bin/ruff check .
+	$(LINT)/bin/ruff format --check .
+	$(LINT)/bin/mypy --strict
+	$(LINT)/bin/lint-imports
+
+# The pictures and files are made in a folder outside the checkout, so that the installed program is what runs.
+lowest: $(LOWEST)/.installed
+	@rm -rf build/lowest && mkdir -p build/lowest
+	cd build/lowest && program=$(abspath $(LOWEST))/bin/clfractal && scene=$(CURDIR)/scenes/mandelbulb.yaml \
+		&& $$program --version && $$program check $$scene >checked.yaml \
+		&& $$program render checked.yaml --size 96x54 --samples 1 -o bulb.exr -o bulb.png \
+		&& $$program render bulb.exr -o again.png \
+		&& $$program voxelize $$scene --resolution 32 -o bulb.nrrd \
+		&& $$program mesh bulb.nrrd -o bulb.ply && $$program mesh $$scene --resolution 32 -o bulb.glb \
+		&& test -s bulb.exr -a -s bulb.png -a -s again.png -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb
 
 bench: $(VENV)/.installed
 	$(BIN)/clfractal bench
 
 portability: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && $(CURDIR)/$(BIN)/python -m tests.portability $(ARGUMENTS)
+	cd $(STAGE) && $(BIN)/python -m tests.portability $(ARGUMENTS)
 
-# A system without ensurepip (Debian's python3 without python3-venv) may still have pip.
+# An environment $(1) of the Python $(2). A system without ensurepip (Debian's python3 without python3-venv) may still
+# have pip.
+define environment
+	@test -n "$(2)" || { echo "clfractal needs Python 3.11 or newer on the PATH" >&2; exit 2; }
+	$(2) -m venv $(1) || { $(2) -m venv --clear --without-pip $(1) \
+		&& $(2) -m pip --python $(1)/bin/python install --quiet pip; }
+endef
+
 $(VENV)/bin/python:
-	@test -n "$(PYTHON)" || { echo "clfractal needs Python 3.11 or newer on the PATH" >&2; exit 2; }
-	$(PYTHON) -m venv $(VENV) || { $(PYTHON) -m venv --clear --without-pip $(VENV) \
-		&& $(PYTHON) -m pip --python $(VENV)/bin/python install --quiet pip; }
+	$(call environment,$(VENV),$(PYTHON))
+
+$(LINT)/bin/python:
+	$(call environment,$(LINT),$(PYTHON))
+
+$(LOWEST)/bin/python:
+	$(call environment,$(LOWEST),$(OLDEST))
 
 $(VENV)/.installed: $(SOURCES) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check .
@@ -58,10 +89,25 @@ $(VENV)/.tested-with: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[test]'
 	@touch $@
 
+$(LINT)/.installed: requirements-lint.txt | $(LINT)/bin/python
+	$(LINT)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps -r requirements-lint.txt
+	@touch $@
+
+# pip has no way to ask for the lowest versions; uv has. What the program depends on comes before the program itself, and
+# only as wheels: a version without one for this Python cannot be meant.
+$(LOWEST)/.installed: $(SOURCES) | $(LOWEST)/bin/python
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
+	$(LOWEST)/bin/uv pip compile --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
+		--only-binary :all: --extra mesh --output-file $(LOWEST)/versions.txt pyproject.toml
+	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --only-binary :all: \
+		--requirement $(LOWEST)/versions.txt
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps .
+	@touch $@
+
 $(STAGE)/.linked: Makefile
 	@rm -rf $(STAGE) && mkdir -p $(STAGE)
 	@for name in $(STAGED); do ln -s $(CURDIR)/$$name $(STAGE)/$$name; done
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
+	rm -rf $(VENV) .venv .venv-* build out .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -54,7 +54,7 @@ class NumbaRival:
 
             from benchmarks.rivals import numba_grid, numba_march, numba_plane
         except ImportError as error:
-            raise MissingError("Numba is not installed (pip install 'clfractal[bench]')") from error
+            raise MissingError("Numba is not installed (pip install numba)") from error
         self.name = f"Numba {numba.__version__}, {numba.get_num_threads()} threads"
         for row in self._wanted:
             if row == "hast2-grid512":

@@ -1,15 +1,18 @@
-"""Makes the gallery: docs/pictures/*.png and docs/gallery.md, from the scenes.
+"""Makes the gallery: docs/pictures/*.webp and docs/gallery.md, from the scenes.
 
     python docs/make_gallery.py             every picture (minutes), then the page
     python docs/make_gallery.py mandelbox   one picture, then the page
     python docs/make_gallery.py --page      only the page
 
-Each scene is rendered at its full size, and reduced in linear light. The page's words are the comment at the
-head of the scene's file, and the formula's own title and reference.
+Each scene is rendered at its full size, reduced in linear light to WIDTH pixels, and written with the highest quality
+that leaves the file small enough. Pages that show the picture of an earlier format get the new one. The gallery's words
+are the comment at the head of the scene's file, and the formula's own title and reference.
 """
 
 from __future__ import annotations
 
+import io
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,16 +30,17 @@ from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
-# 1920 x 1080 becomes 640 x 360, 2048 x 2048 becomes 512 x 512, or less where that makes too large a file.
-REDUCTIONS = (3, 4, 6, 8)
-LARGEST_FILE = 300_000  # bytes
+WIDTH = 1280  # pixels
+LARGEST_FILE = 200_000  # bytes
+# Of WebP, 0 to 100. Below the least one artefacts show at first sight; above the most one files only grow.
+QUALITIES = range(25, 96)
 
 Floats = npt.NDArray[np.float32]
 
 HEAD = """# Gallery
 
-Every scene in [`scenes/`](../scenes), rendered by this program and reduced to a third of its size or less. To make
-one at full size, and to see it from the other side:
+Every scene in [`scenes/`](../scenes), rendered by this program and reduced. To make one at full size, and to see it
+from the other side:
 
 ```console
 clfractal render scenes/mandelbulb.yaml -o bulb.png
@@ -76,13 +80,19 @@ def formula_line(scene: Path) -> str:
     return f"Formula {link}: {about['title']}. {about['reference']}."
 
 
+def file_of(name: str) -> Path:
+    """The picture of a scene: of the format that is written now, or of the earlier one if it was not made since."""
+    now, earlier = PICTURES / f"{name}.webp", PICTURES / f"{name}.png"
+    return earlier if earlier.exists() and not now.exists() else now
+
+
 def page() -> str:
     """The text of docs/gallery.md."""
     parts = [HEAD]
     for scene in scene_paths():
         title, *sentences = comment_of(scene)
         parts.append(f"## {title}\n")
-        parts.append(f"![{title}](pictures/{scene.stem}.png)\n")
+        parts.append(f"![{title}](pictures/{file_of(scene.stem).name})\n")
         parts.append(f"[`{scene.name}`](../scenes/{scene.name}). " + "\n".join(sentences) + "\n")
         parts.append(f"{formula_line(scene)}\n")
     return "\n".join(parts)
@@ -96,16 +106,40 @@ def make_picture(path: Path) -> None:
     # What is brighter than the screen can show is cut before it is averaged, as in the full picture.
     linear = np.clip(linear * np.float32(2.0**scene.output.exposure), 0, 1)
     coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
-    target = PICTURES / f"{path.stem}.png"
-    for reduction in REDUCTIONS:
-        if film.width % reduction or film.height % reduction:
-            continue
-        shown = picture(reduced(linear, reduction), reduced(coverage, reduction))
-        shown.save(target, optimize=True)
-        size = target.stat().st_size
-        if size <= LARGEST_FILE:
-            break
-    print(f"{target}: {size // 1000} kB, {film.header['seconds']:.1f} s", flush=True)
+    shown = picture(reduced(linear, WIDTH), reduced(coverage, WIDTH))
+    content, quality = small_enough(shown)
+    target = PICTURES / f"{path.stem}.webp"
+    target.write_bytes(content)
+    (PICTURES / f"{path.stem}.png").unlink(missing_ok=True)
+    size = len(content) // 1000
+    print(f"{target.name}: {size} kB, quality {quality}, {film.header['seconds']:.1f} s", flush=True)
+
+
+def small_enough(shown: Image.Image) -> tuple[bytes, int]:
+    """A WebP file of at most LARGEST_FILE bytes, and its quality: the highest of QUALITIES that is so small.
+
+    Raises:
+        ValueError: the lowest quality makes a larger file.
+    """
+    best: tuple[bytes, int] | None = None
+    low, high = QUALITIES.start, QUALITIES.stop
+    while low < high:  # sizes grow with quality: halve what is left
+        quality = (low + high) // 2
+        content = webp(shown, quality)
+        if len(content) <= LARGEST_FILE:
+            best, low = (content, quality), quality + 1
+        else:
+            high = quality
+    if best is None:
+        raise ValueError(f"is larger than {LARGEST_FILE // 1000} kB even at quality {QUALITIES.start}")
+    return best
+
+
+def webp(shown: Image.Image, quality: int) -> bytes:
+    """A WebP file, as small as the library makes one of that quality."""
+    file = io.BytesIO()
+    shown.save(file, "WEBP", quality=quality, method=6)
+    return file.getvalue()
 
 
 def beside(scene: Scene) -> Scene:
@@ -125,12 +159,25 @@ def picture(linear: Floats, coverage: Floats) -> Image.Image:
     return Image.fromarray(np.concatenate([colors, opacity], axis=-1))
 
 
-def reduced(linear: Floats, reduction: int) -> Floats:
-    """Means over squares of `reduction` pixels; shape (rows, columns, components), both divisible by it."""
+def reduced(linear: Floats, width: int) -> Floats:
+    """An array of shape (rows, columns, components), in linear light, made `width` columns wide; never wider than it was.
+
+    The filter's weights are none below 0, so edges get no rims.
+    """
     rows, columns, components = linear.shape
-    blocks = linear.reshape(rows // reduction, reduction, columns // reduction, reduction, components)
-    means: Floats = blocks.mean(axis=(1, 3), dtype=np.float32)
-    return means
+    if columns <= width:
+        return linear
+    size = (width, max(round(rows * width / columns), 1))
+    planes = [
+        np.asarray(Image.fromarray(linear[..., i]).resize(size, Image.Resampling.HAMMING))
+        for i in range(components)
+    ]
+    return np.clip(np.stack(planes, axis=-1), 0, 1)
+
+
+def relinked(text: str) -> str:
+    """A page's text, with pictures of the earlier format replaced by those that were made since."""
+    return re.sub(r"(?<=pictures/)(\w+)\.png(?=\))", lambda found: file_of(found[1]).name, text)
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -141,6 +188,8 @@ def main(arguments: Sequence[str]) -> None:
         if scene.stem in names or not arguments:
             make_picture(scene)
     (DOCS / "gallery.md").write_text(page(), "utf-8")
+    for other in (DOCS.parent / "README.md", *DOCS.glob("*.md")):
+        other.write_text(relinked(other.read_text("utf-8")), "utf-8")
 
 
 if __name__ == "__main__":

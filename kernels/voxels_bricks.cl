@@ -11,7 +11,7 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
                               __constant const struct Extent *extent) {
     const size_t brick = (size_t)first + get_global_id(1);
     if (brick >= count) return;
-    const surroundings around = surroundings_of(bricks[brick], numbers, extent);
+    const near_bricks around = near_bricks_of(bricks[brick], numbers, extent);
 #if SOURCE == SOURCE_BITS
     // Most are told by the voxels that are their own.
     __global const uchar *bytes = samples + brick * 64;
@@ -116,7 +116,7 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
                            __constant const struct Extent *extent) {
     const int brick = first + (int)get_global_id(1);
     if (brick >= count) return;
-    const surroundings around = surroundings_of(bricks[brick], numbers, extent);
+    const near_bricks around = near_bricks_of(bricks[brick], numbers, extent);
     neighbourhood n;
     load_neighbourhood(&n, samples, &around, extent);
     const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;

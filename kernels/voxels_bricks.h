@@ -22,27 +22,23 @@
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
-// Instead of a brick's number: all its voxels are outside, or inside as a whole.
-#define ALL_OUTSIDE -1
-#define ALL_INSIDE -2
-
 // Where a brick's voxels are.
 typedef struct {
     int x, y, z;   // the brick's place
-    int near[27];  // the evaluated bricks around it, x fastest; or one of these:
-} surroundings;
+    int near[27];  // the evaluated bricks around it, x fastest; or ALL_OUTSIDE, ALL_INSIDE
+} near_bricks;
 
 #if SOURCE == SOURCE_SLAB
-INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
-    surroundings around;
+INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
+    near_bricks around;
     around.x = PLACE_X(place);
     around.y = PLACE_Y(place);
     around.z = PLACE_Z(place);
     return around;
 }
 #else
-INLINE surroundings surroundings_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
-    surroundings around;
+INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
+    near_bricks around;
     around.x = PLACE_X(place);
     around.y = PLACE_Y(place);
     around.z = PLACE_Z(place);
@@ -84,7 +80,7 @@ INLINE uint2 octant_bits(__global const SAMPLE *samples, int number, int octant)
     return as_uint2(vload8(0, samples + (size_t)number * 64 + 8 * octant));
 }
 
-INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const surroundings *around,
+INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const near_bricks *around,
                                __constant const struct Extent *extent) {
     for (int z = 0; z < OCTANTS; ++z) {
         for (int y = 0; y < OCTANTS; ++y) {
@@ -140,11 +136,11 @@ INLINE float16 row_window(const row *r, int offset) {
 // Rows are loaded one by one.
 typedef struct {
     __global const SAMPLE *samples;
-    const surroundings *around;
+    const near_bricks *around;
     __constant const struct Extent *extent;
 } neighbourhood;
 
-INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const surroundings *around,
+INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const near_bricks *around,
                                __constant const struct Extent *extent) {
     n->samples = samples;
     n->around = around;
@@ -165,7 +161,7 @@ typedef struct {
 #if SOURCE == SOURCE_BRICKS
 // The row `y`, `z` (voxels from the brick's first, -8 to 15): the first of its three bricks in `near`, and the first of the
 // row's voxels in them (bricks are kept octant by octant: see voxels.h; its second four are an octant further on).
-INLINE int row_of(const surroundings *around, int y, int z, __constant const struct Extent *extent, int *first) {
+INLINE int row_of(const near_bricks *around, int y, int z, __constant const struct Extent *extent, int *first) {
     const int row_y = clamp(BRICK * around->y + y, 0, BRICK * extent->bricks[1] - 1);
     const int row_z = clamp(BRICK * around->z + z, 0, BRICK * extent->bricks[2] - 1);
     const int brick_y = (row_y >> 3) - around->y + 1, brick_z = (row_z >> 3) - around->z + 1;
@@ -181,7 +177,7 @@ INLINE float4 four_voxels(__global const SAMPLE *samples, int number, int place,
 
 INLINE row row_at(const neighbourhood *n, int y, int z) {
     int first;
-    const surroundings *around = n->around;
+    const near_bricks *around = n->around;
     const int place = row_of(around, y, z, n->extent, &first), next = place + OCTANT_VOXELS;
     const float4 own = four_voxels(n->samples, around->near[first + 1], place, n->extent);
     const float4 own_next = four_voxels(n->samples, around->near[first + 1], next, n->extent);

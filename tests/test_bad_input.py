@@ -255,6 +255,7 @@ def test_no_room_for_what_the_compiler_is_told(
 ) -> None:
     monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path_factory.mktemp("empty")))
     monkeypatch.setenv("CLFRACTAL_LANES", "1")
+    select.choose().loaded.clear()
     with file_size_limit(4096):
         ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
     assert ended.is_one_line(2, "clfractal-", "cannot be written: File too large")

@@ -20,6 +20,8 @@ from clfractal.commands import voxelize as voxelize_command
 from clfractal.files.srgb import encode
 from clfractal.files.volume import SCENE_KEY, Volume, read_volume, write_volume
 from clfractal.renderers.vertices import on_faces
+from clfractal.scene import given
+from clfractal.scene import load as load_module
 from clfractal.scene.load import load_scene
 from tests.shell import Ended, InProcess, command, environment
 
@@ -283,10 +285,34 @@ def test_mistakes_are_one_line(arguments: tuple[str, ...], parts: tuple[str, ...
     assert sorted(Path().iterdir()) == before
 
 
+def test_files_are_read_once(shell: InProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The scene, and the grid of others that it shows: such a grid may have a gigabyte."""
+    write_volume("theirs.nrrd", Volume(np.pad(np.ones((3, 3, 3)), 2)))
+    (tmp_path / "theirs.yaml").write_text(BALL + "renderer: {type: volume, file: theirs.nrrd}\n")
+    read: list[str] = []
+
+    def counted(module: Any, name: str) -> None:
+        original = getattr(module, name)
+
+        def call(*arguments: Any, **named: Any) -> Any:
+            read.append(name)
+            return original(*arguments, **named)
+
+        monkeypatch.setattr(module, name, call)
+
+    counted(load_module, "read_document")
+    counted(given, "read_given")
+    assert works(shell("voxelize", "theirs.yaml", "-o", "copy.nrrd"))
+    assert sorted(read) == ["read_document", "read_given"]
+    read.clear()
+    assert works(shell("mesh", "theirs.yaml", "-o", "copy.ply"))
+    assert sorted(read) == ["read_document", "read_given"]
+
+
 def test_without_scikit_image(shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     told = shell("mesh", "ball.yaml", "-o", "m.ply")
-    assert told.is_one_line(2, "clfractal mesh: needs scikit-image: pip install 'clfractal[mesh]'")
+    assert told.is_one_line(2, "clfractal mesh: needs scikit-image: pip install scikit-image")
 
 
 def test_a_scene_in_a_volume_that_does_not_load(shell: InProcess) -> None:
@@ -307,9 +333,9 @@ def test_what_is_told_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
             told.append(line)
 
     monkeypatch.setattr(voxelize_command, "LINE_EVERY_SECONDS", 0.0)
-    tell = voxelize_command.Teller(Told())  # type: ignore[arg-type]
-    tell.of("triangles")(0.25)
-    tell("normals", 1.0)
+    stages = voxelize_command.StageProgress(Told())  # type: ignore[arg-type]
+    stages.of("triangles")(0.25)
+    stages.say("normals", 1.0)
     assert told == ["triangles:  25%"]
 
 

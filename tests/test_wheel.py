@@ -68,6 +68,14 @@ def test_a_fresh_environment_renders_from_the_wheel(wheel: Path, tmp_path: Path)
     run(environment / "bin" / "clfractal", "render", "scene.yaml", "-o", "a.exr", "-o", "a.png", folder=work)
     assert (work / "a.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
     assert (work / "a.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"
+    told = subprocess.run(
+        [environment / "bin" / "clfractal", "mesh", "scene.yaml", "-o", "a.ply"],
+        cwd=work,
+        capture_output=True,
+        text=True,
+    )
+    assert told.returncode == 2
+    assert told.stderr == "clfractal mesh: needs scikit-image: pip install scikit-image\n"
     loaded = run(
         python,
         *("-c", "import sys, clfractal.api, clfractal.work.engine, clfractal.resources as r\n"),

@@ -216,10 +216,10 @@ def voxelize(
     verbose: Verbose = False,
 ) -> Work:
     """Fill a scene's grid of voxels and write it to a file."""
-    from clfractal.commands.voxelize import Order
+    from clfractal.commands.voxelize import GridOrder
     from clfractal.commands.voxelize import voxelize as work
 
-    order = Order(scene, output, resolution, device, precision, tuple(overrides or ()))
+    order = GridOrder(scene, output, resolution, device, precision, tuple(overrides or ()))
     shell = _shell(context, quiet=quiet, verbose=verbose)
     return lambda: work(order, shell, compress=compress)
 
@@ -247,9 +247,9 @@ def mesh(
 ) -> Work:
     """Write the surface in a scene's grid, or in a volume file, as triangles."""
     from clfractal.commands.mesh import make_mesh
-    from clfractal.commands.voxelize import Order
+    from clfractal.commands.voxelize import GridOrder
 
-    order = Order(source, output, resolution, device, precision, tuple(overrides or ()))
+    order = GridOrder(source, output, resolution, device, precision, tuple(overrides or ()))
     shell = _shell(context, quiet=quiet, verbose=verbose)
     return lambda: make_mesh(order, shell, level=level, close=not no_close)
 

@@ -33,8 +33,8 @@ def check_scene(
     lines, warning = [], ""
     if parallax:
         with speaking_of(source):
-            scene, told, warning = _parallax(scene, device, shell)
-        lines.append(told)
+            scene, summary, warning = _parallax(scene, device, shell)
+        lines.append(summary)
     if scene.stereo is not None and scene.stereo.fit is None:
         lines = [*_eyes(scene), *lines]
     shell.print("".join(f"# {line}\n" for line in lines) + dump_scene(scene))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,13 +14,12 @@ import numpy as np
 from clfractal.commands.shell import Shell
 from clfractal.commands.voxelize import (
     COLORING_KEY,
-    Order,
-    Teller,
+    GridOrder,
+    StageProgress,
     fill,
     given_volume,
     grid_volume,
-    painted,
-    volume_scene,
+    load_order,
 )
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
@@ -31,7 +30,7 @@ from clfractal.files.nrrd import MAGIC
 from clfractal.files.regular import read_bytes
 from clfractal.files.volume import SCENE_KEY, Volume, read_volume
 from clfractal.scene.coloring import Coloring
-from clfractal.scene.load import load_scene
+from clfractal.scene.load import load_coloring, load_scene, read_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 
@@ -61,7 +60,7 @@ class _Found:
     is_file: bool
 
 
-def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: bool = True) -> None:
+def make_mesh(order: GridOrder, shell: Shell, *, level: float | None = None, close: bool = True) -> None:
     """Extracts the surface of a scene's grid or of a volume file, and writes it.
 
     Raises:
@@ -80,7 +79,7 @@ def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: 
     _check_fine(order, found.volume)
     from clfractal.voxels.mesh import extract
 
-    tell = Teller(shell)
+    stages = StageProgress(shell)
     volume = found.volume
     mesh = extract(
         volume.values,
@@ -88,12 +87,12 @@ def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: 
         origin=volume.origin,
         directions=volume.directions,
         close=close,
-        progress=tell.of("triangles"),
+        progress=stages.of("triangles"),
     )
     if not len(mesh.triangles):
         raise _nothing(order, found, close)
     if found.made is not None:
-        mesh = _dressed(mesh, found.made, volume, tell, shell)
+        mesh = _dressed(mesh, found.made, volume, stages, shell)
     write_mesh(order.output, mesh, text=_text(found.made) if found.made is not None else "")
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
@@ -105,12 +104,12 @@ def make_mesh(order: Order, shell: Shell, *, level: float | None = None, close: 
 
 def _check_library() -> None:
     if importlib.util.find_spec("skimage") is None:
-        raise FileError("needs scikit-image: pip install 'clfractal[mesh]'", Where("clfractal mesh"))
+        raise FileError("needs scikit-image: pip install scikit-image", Where("clfractal mesh"))
 
 
-def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
+def _of_scene(order: GridOrder, level: float | None, shell: Shell) -> _Found:
     """The scene's grid, filled; a level is in the value's own numbers, and the scene's if not given."""
-    scene, coloring = volume_scene(order), painted(order)
+    scene, coloring = load_order(order)
     volume = given_volume(order, scene)
     if volume is not None:
         return _of_given(order, scene, volume, level, shell)
@@ -119,7 +118,7 @@ def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
     return _Found(volume, _stored(level, volume, job.scene), _Made(job, device, coloring), False)
 
 
-def _of_given(order: Order, scene: Scene, volume: Volume, level: float | None, shell: Shell) -> _Found:
+def _of_given(order: GridOrder, scene: Scene, volume: Volume, level: float | None, shell: Shell) -> _Found:
     """The grid of others that a scene shows; a level is in its numbers, and the scene's if not given."""
     assert isinstance(scene.renderer, VolumeRenderer)
     assert scene.given is not None
@@ -142,7 +141,7 @@ def _stored(level: float | None, volume: Volume, scene: Scene) -> float:
     return 255 * (wanted - low) / (high - low) if volume.values.dtype == np.uint8 else wanted
 
 
-def _of_file(order: Order, level: float | None, shell: Shell) -> _Found:
+def _of_file(order: GridOrder, level: float | None, shell: Shell) -> _Found:
     """A volume of a file; a level is in the file's numbers.
 
     If not given it is that of the scene that made the volume, or half way from the least to the largest.
@@ -172,7 +171,7 @@ def _has_level(scene: Scene) -> bool:
     return isinstance(scene.renderer, VolumeRenderer) and scene.renderer.level is not None
 
 
-def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
+def _made(order: GridOrder, volume: Volume, shell: Shell) -> _Made | None:
     """The scene that made a volume, if it says so: it knows normals and colours."""
     text = volume.texts.get(SCENE_KEY)
     if not text or not ("\n" in text or text.startswith("{")):  # else it would be the name of a file
@@ -180,14 +179,12 @@ def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
     from clfractal.device.select import choose
     from clfractal.work.prepare import prepare
 
-    folder = Path(order.source).parent
     try:
         overrides = [f"renderer.precision={order.precision}"] if order.precision else []
-        scene = load_scene(text, overrides=overrides, folder=folder)
-        painting = volume.texts.get(COLORING_KEY, "{}")
-        coloring = load_scene(
-            text, overrides=["renderer={type: surface}", f"coloring={painting}"], folder=folder
-        ).coloring
+        read = replace(read_scene(text), folder=Path(order.source).parent)
+        scene = load_scene(read, overrides=overrides)
+        own = volume.texts.get(COLORING_KEY, "{}")
+        coloring = load_coloring(read, overrides=["renderer={type: surface}", f"coloring={own}"])
     except ClfractalError as error:
         shell.say(f"{order.source}: its scene is of no use, normals are those of the values: {error}")
         return None
@@ -211,7 +208,7 @@ def _is_along_axes(volume: Volume) -> bool:
     return bool(np.array_equal(volume.directions, np.diag(np.diag(volume.directions))))
 
 
-def _check_fine(order: Order, volume: Volume) -> None:
+def _check_fine(order: GridOrder, volume: Volume) -> None:
     """Before the work, not after it."""
     shape = np.array(volume.values.shape[::-1])
     reach = float(np.abs([volume.origin, volume.origin + (shape - 1) @ volume.directions]).max())
@@ -219,7 +216,7 @@ def _check_fine(order: Order, volume: Volume) -> None:
         raise FileError(f"cannot be written: {TOO_FINE}", Where(str(order.output)))
 
 
-def _nothing(order: Order, found: _Found, close: bool) -> ClfractalError:
+def _nothing(order: GridOrder, found: _Found, close: bool) -> ClfractalError:
     """Why there is no triangle."""
     z, y, x = found.volume.values.shape
     if not close and bool((np.asarray(found.volume.values[0, 0, 0]) >= found.level).all()):
@@ -241,7 +238,7 @@ def _nothing(order: Order, found: _Found, close: bool) -> ClfractalError:
     )
 
 
-def _dressed(mesh: Mesh, made: _Made, volume: Volume, tell: Teller, shell: Shell) -> Mesh:
+def _dressed(mesh: Mesh, made: _Made, volume: Volume, stages: StageProgress, shell: Shell) -> Mesh:
     """With the formula's normals and the scene's colours."""
     from clfractal.renderers.vertices import COLORED_BY, dress, on_faces
 
@@ -260,5 +257,5 @@ def _dressed(mesh: Mesh, made: _Made, volume: Volume, tell: Teller, shell: Shell
         precision=plan.precision,
         voxel=float(volume.spacing.min()),
         flat=on_faces(mesh.vertices, volume.origin - spacing / 2, spacing, (x, y, z)),
-        progress=tell.of("normals"),
+        progress=stages.of("normals"),
     )

@@ -19,9 +19,8 @@ from clfractal.files import memory
 from clfractal.files.atomic import check_output
 from clfractal.files.volume import BESIDE, EXTENSIONS, SCENE_KEY, Volume, write_volume
 from clfractal.scene.coloring import Coloring
-from clfractal.scene.load import load_scene
+from clfractal.scene.load import load_coloring, load_scene, read_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ COLORING_KEY = "coloring"
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class GridOrder:
     """The options of `clfractal voxelize` and `clfractal mesh`, as they were given."""
 
     source: str
@@ -50,25 +49,26 @@ class Order:
     overrides: tuple[str, ...] = ()
 
 
-class Teller:
-    """Says now and then how far a stage is."""
+class StageProgress:
+    """Prints a line now and then: how much of a stage is done."""
 
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
         self._next = time.monotonic() + LINE_EVERY_SECONDS
 
-    def __call__(self, stage: str, part: float) -> None:
+    def say(self, stage: str, part: float) -> None:
+        """Print the part of the stage that is done, 0 to 1, unless a line was printed a moment ago."""
         now = time.monotonic()
         if now >= self._next and part < 1:
             self._next = now + LINE_EVERY_SECONDS
             self._shell.say(f"{stage}: {part:4.0%}")
 
     def of(self, stage: str) -> Callable[[float], None]:
-        """For work that tells of its part only."""
-        return lambda part: self(stage, part)
+        """The same for one stage, as a function of the part that is done."""
+        return lambda part: self.say(stage, part)
 
 
-def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
+def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
     """Fills the grid of a scene and writes it; one that shows a grid of others is converted.
 
     Raises:
@@ -81,8 +81,7 @@ def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
         if compress:
             raise FileError("is not compressed: NPY has no way for it; .nrrd has", Where(str(order.output)))
         check_output(f"{order.output}{BESIDE}", (BESIDE,))
-    scene = volume_scene(order)
-    coloring = painted(order)
+    scene, coloring = load_order(order)
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
     volume = given_volume(order, scene)
     if volume is None:
@@ -95,8 +94,11 @@ def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
     shell.say(f"{order.output}: {sides} voxels, {size}, {time.perf_counter() - start:.2f} s")
 
 
-def volume_scene(order: Order) -> Scene:
-    """The scene with the options folded in; its renderer is the volume renderer, with defaults if it was another.
+def load_order(order: GridOrder) -> tuple[Scene, Coloring]:
+    """The scene with the options folded in, and the coloring that a mesh of it gets. The file is read once.
+
+    The scene's renderer is the volume renderer, with defaults if it was another. That one cannot show every coloring, so
+    the scene has a plain one, and its own is checked apart, as that of a surface.
 
     Raises:
         ClfractalError: errors name the option that was given.
@@ -106,11 +108,17 @@ def volume_scene(order: Order) -> Scene:
         given["renderer.resolution"] = ("--resolution", _resolution(order.resolution))
     if order.precision is not None:
         given["renderer.precision"] = ("--precision", json.dumps(order.precision))
-    before = [_PLAIN] if _is_volume(order) else [_AS_VOLUME, _PLAIN]
+    text = read_scene(Path(order.source))
+    kind = text.value("renderer", "type") or "surface"
+    coloring = load_coloring(
+        text,
+        overrides=[*([] if kind == "surface" else [_AS_SURFACE]), *filter(_is_of_coloring, order.overrides)],
+    )
+    before = [_PLAIN] if kind == "volume" else [_AS_VOLUME, _PLAIN]
     wanted = [each for each in order.overrides if not _is_of_coloring(each)]
     overrides = [*before, *wanted, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
-        scene = load_scene(Path(order.source), overrides=overrides)
+        scene = load_scene(text, overrides=overrides)
     except ClfractalError as error:
         key = (error.where.file or "").removeprefix("--set ")
         if key not in given:
@@ -119,19 +127,7 @@ def volume_scene(order: Order) -> Scene:
     if not isinstance(scene.renderer, VolumeRenderer):
         where = Where(order.source, path="renderer.type")
         raise SceneError(f"must be volume here, got {scene.renderer.type}", where)
-    return scene
-
-
-def painted(order: Order) -> Coloring:
-    """The scene's own coloring, with the options folded in, whatever its renderer can do with it."""
-    before = [] if isinstance(load_scene(Path(order.source)).renderer, SurfaceRenderer) else [_AS_SURFACE]
-    return load_scene(
-        Path(order.source), overrides=[*before, *filter(_is_of_coloring, order.overrides)]
-    ).coloring
-
-
-def _is_volume(order: Order) -> bool:
-    return isinstance(load_scene(Path(order.source)).renderer, VolumeRenderer)
+    return scene, coloring
 
 
 def _is_of_coloring(override: str) -> bool:
@@ -145,7 +141,7 @@ def _resolution(text: str) -> str:
     return f"[{text}]" if "," in text else text
 
 
-def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
+def fill(order: GridOrder, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
     """The scene's grid, its job and the device that it is on; the need of memory is told first.
 
     Raises:
@@ -164,20 +160,20 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
     x, y, z = lattice.shape
     need = x * y * z * (1 if settings.store == "byte" else 4)
     have = memory.available()
-    told = f"{x} x {y} x {z} voxels need {memory.shown(need)} of memory"
+    needs = f"{x} x {y} x {z} voxels need {memory.shown(need)} of memory"
     if need > have:
         where = Where("--resolution") if order.resolution else Where(order.source, path="renderer.resolution")
-        raise SceneError(f"{told}, {memory.shown(have)} are left", where)
-    shell.say(f"{order.source}: {told}, {memory.shown(have)} are left")
+        raise SceneError(f"{needs}, {memory.shown(have)} are left", where)
+    shell.say(f"{order.source}: {needs}, {memory.shown(have)} are left")
     device = choose(order.device)
     job = prepare(scene, device, on_start=shell.say)
     plan = job.views[0].plan
     if job.remark:
         shell.say(f"{order.source}: {job.remark}")
-    tell = Teller(shell)
+    stages = StageProgress(shell)
 
     def progress(state: FillProgress) -> None:
-        tell(f"voxels, {state.stage}", state.done / max(state.total, 1))
+        stages.say(f"voxels, {state.stage}", state.done / max(state.total, 1))
 
     grid = fill_grid(
         scene,
@@ -191,7 +187,7 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
     return grid, job, device
 
 
-def given_volume(order: Order, scene: Scene) -> Volume | None:
+def given_volume(order: GridOrder, scene: Scene) -> Volume | None:
     """The grid of others that a scene shows, where and as large as it shows it; None if it shows its formula.
 
     It has no texts: the formula, which the scene has to have, knows nothing of it.

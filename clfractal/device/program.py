@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import tempfile
 import threading
 import time
@@ -9,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import pyopencl as cl
 
@@ -23,10 +23,7 @@ from clfractal.device.structs import Precision
 BUILD_TIMEOUT_S = 600.0
 
 _REMARK_SECONDS = 1.5  # longer than a refusal takes: an error stays alone on its line
-_MOST_LOADED = 32
-# By key, the one used last at the end.
-_loaded: WeakKeyDictionary[Device, dict[str, Any]] = WeakKeyDictionary()
-_FORMAT = 2  # of what is kept under a key
+_FORMAT = 3  # of what is kept under a key
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +67,7 @@ def build(
     warm: Warm | None = None,
     isolated: bool = True,
     on_compile: Callable[[str], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
 ) -> Program:
     """The program of one flat text, from the cache or the driver's compiler.
 
@@ -82,44 +80,40 @@ def build(
         isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
             an interrupt is answered at once.
         on_compile: told a line, from another thread, if compiling takes more than a moment.
+        stopped: asked at least every 20 ms while a child process compiles; it ends the child by answering True.
 
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
         DeviceError: the driver failed or aborted.
+        Stopped: `stopped` answered True.
     """
     start = time.perf_counter()
     if cannot_run_optimised_code(device.info):
         text, flags = "#define INTERPRETED\n" + text, [*flags, "-cl-opt-disable"]
     key = _key(device, text, flags, warm)
+    program = device.loaded.get(key)
+    if program is not None:
+        return Program(device, program, _milliseconds(start), cached=True)
     binary = cache.load_blob(key)
     if binary is not None:
-        program = _loaded.get(device, {}).get(key) or compiler.load_kept(device, binary, text, flags)
+        program = compiler.load_kept(device, binary, text, flags)
         if program is not None:
-            _remember(device, key, program)
+            device.loaded.keep(key, program)
             return Program(device, program, _milliseconds(start), cached=True)
         cache.drop_blob(key)
     remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"compiling for {device.info.name}, once"))
     remark.daemon = True
     remark.start()
     try:
-        program, binary = _compile(device, text, flags, warm, isolated=isolated)
+        program, binary = _compile(device, text, flags, warm, isolated=isolated, stopped=stopped)
     except BuildFailureError as failure:
         raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
     finally:
         remark.cancel()
     if binary:
         cache.store_blob(key, binary)
-        _remember(device, key, program)
+    device.loaded.keep(key, program)
     return Program(device, program, _milliseconds(start), cached=False)
-
-
-def _remember(device: Device, key: str, program: Any) -> None:
-    """Keeps a program in memory: loading one takes PoCL some 50 ms, every time a picture of the same kind is begun."""
-    programs = _loaded.setdefault(device, {})
-    programs.pop(key, None)
-    programs[key] = program
-    if len(programs) > _MOST_LOADED:
-        del programs[next(iter(programs))]
 
 
 def _tell(listener: Callable[[str], None] | None, line: str) -> None:
@@ -128,11 +122,17 @@ def _tell(listener: Callable[[str], None] | None, line: str) -> None:
 
 
 def _compile(
-    device: Device, text: str, flags: Sequence[str], warm: Warm | None, *, isolated: bool
+    device: Device,
+    text: str,
+    flags: Sequence[str],
+    warm: Warm | None,
+    *,
+    isolated: bool,
+    stopped: Callable[[], bool] | None,
 ) -> tuple[Any, bytes]:
     """The program and its binary, which may be empty."""
     if isolated:
-        binary = _compile_in_child(device, text, flags, warm)
+        binary = _compile_in_child(device, text, flags, warm, stopped)
         program = compiler.load_kept(device, binary, text, flags) if binary else None
         if program is not None:
             return program, binary
@@ -143,7 +143,13 @@ def _compile(
     return program, compiler.binary_of(device, program)
 
 
-def _compile_in_child(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> bytes:
+def _compile_in_child(
+    device: Device,
+    text: str,
+    flags: Sequence[str],
+    warm: Warm | None,
+    stopped: Callable[[], bool] | None,
+) -> bytes:
     request = {"text": text, "flags": list(flags), "warm": None if warm is None else warm.as_data()}
 
     def attempt(folder: str) -> str | None:
@@ -154,6 +160,7 @@ def _compile_in_child(device: Device, text: str, flags: Sequence[str], warm: War
             doing="building a program",
             timeout_s=BUILD_TIMEOUT_S,
             folder=Path(folder),
+            stopped=stopped,
         )
         return failure
 
@@ -172,7 +179,8 @@ def _key(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> 
     # Of the first launch only what the driver generates code for: its arguments' values change from scene to
     # scene.
     launch = (warm.kernel, warm.local_size) if warm is not None else None
-    return cache.key_of(_FORMAT, device.info.key, list(flags), launch, text)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    return cache.key_of(_FORMAT, device.info.key, list(flags), launch, digest)
 
 
 def _milliseconds(start: float) -> float:

@@ -18,6 +18,7 @@ from typing import Any, Literal
 import pyopencl as cl
 
 from clfractal.device import cache
+from clfractal.device.loaded import LoadedPrograms
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, unknown_name
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
@@ -60,6 +61,8 @@ class DeviceInfo:
 class Device:
     """An OpenCL device with a context of its own, made when it is first needed, as its two queues are.
 
+    `loaded` keeps programs of this context, and goes with it.
+
     Args:
         info: what is known of it.
         cl_device: pyopencl's device.
@@ -73,6 +76,7 @@ class Device:
         self.info = info
         self.cl_device = cl_device
         self.properties = tuple(properties)
+        self.loaded = LoadedPrograms()
 
     def __repr__(self) -> str:
         return f"Device({self.info.index} {self.info.name!r})"

@@ -16,7 +16,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import Imath  # type: ignore[import-untyped]  # comes with OpenEXR
+import Imath  # comes with OpenEXR
 import numpy as np
 import numpy.typing as npt
 import OpenEXR

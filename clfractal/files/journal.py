@@ -259,13 +259,13 @@ def _check_identity(path: Path, descriptor: int, wanted: bytes) -> int:
 def _differences(found: bytes, wanted: bytes) -> str:
     """`the version was "0.1.0" and is "0.2.0", the scene is another one`."""
     before, now = json.loads(found), json.loads(wanted)
-    told = []
+    changes = []
     for key in sorted(set(before) | set(now)):
         old, new = (json.dumps(side.get(key), ensure_ascii=False) for side in (before, now))
         if old != new:
             short = max(len(old), len(new)) <= 60
-            told.append(f"the {key} was {old} and is {new}" if short else f"the {key} has changed")
-    return ", ".join(told)
+            changes.append(f"the {key} was {old} and is {new}" if short else f"the {key} has changed")
+    return ", ".join(changes)
 
 
 def _write_all(descriptor: int, parts: Sequence[bytes], offset: int) -> None:

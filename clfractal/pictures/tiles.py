@@ -136,14 +136,3 @@ class TileGrid:
         across = 2 * boxes[:, 0] + boxes[:, 2] - (2 * self.region.x + self.region.width)
         down = 2 * boxes[:, 1] + boxes[:, 3] - (2 * self.region.y + self.region.height)
         return np.argsort(across * across + down * down, kind="stable").astype(np.int32)
-
-
-def order_from_center(region: Region) -> npt.NDArray[np.int32]:
-    """Indices of the region's tiles, nearest to its centre first."""
-    return TileGrid(region).order_from_center()
-
-
-def tiles(region: Region) -> list[Tile]:
-    """The region's tiles, nearest to its centre first."""
-    grid = TileGrid(region)
-    return [grid.tile(index) for index in grid.order_from_center().tolist()]

@@ -214,7 +214,7 @@ def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[A
         "scale": np.array(grid.shape) / size,
         "sides": grid.shape,
         "bricks": grid.bricks,
-        "pool_bricks": grid.layout.part_slots,
+        "pool_bricks": grid.parts.part_slots,
     }
     return GRID.value(precision, values)
 

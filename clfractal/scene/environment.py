@@ -16,7 +16,6 @@ from clfractal.errors import FileError, SceneError, Where, unknown_name
 
 if TYPE_CHECKING:
     from clfractal.scene.lighting import Environment
-    from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float32]
 
@@ -37,17 +36,6 @@ class EnvironmentMap:
 def names() -> tuple[str, ...]:
     """The maps that travel with the program, sorted."""
     return tuple(sorted(path.stem for path in resources.folder("environments").glob("*.exr")))
-
-
-def environment_map(scene: Scene) -> Floats:
-    """The pixels of the scene's environment; see `EnvironmentMap` and, for errors, `read_map`.
-
-    Raises:
-        ValueError: it has none.
-    """
-    if scene.surroundings is None:
-        raise ValueError("the scene has no environment")
-    return scene.surroundings.pixels
 
 
 def check_name(environment: Environment) -> None:

@@ -1,18 +1,25 @@
-"""Reads a scene from a file, a text, a picture or plain data, with every error at its line and column."""
+"""Reads a scene from a file, a text, a picture or plain data, with every error at its line and column.
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+The data go one way: read, override, inline formula files, validate by the schema, check what the schema cannot see. The
+document keeps the places of all values until the end, so that an error of any step can be located.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from clfractal.errors import ClfractalError, FileError, FormulaError, SceneError, Where
+from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.marks import Document, Node, node_from_plain, option
 from clfractal.files.regular import read_bytes, read_text_file
 from clfractal.scene.checks import check_parts
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.inline import inlined
 from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
 
@@ -20,31 +27,54 @@ _EXR = b"\x76\x2f\x31\x01"
 _PNG = b"\x89PNG\r\n\x1a\n"
 
 
+@dataclass(frozen=True, slots=True)
+class SceneText:
+    """A scene as it was read, before it is checked: its values with their places, and the folder it stands in."""
+
+    document: Document
+    folder: Path
+
+    def value(self, *path: str) -> Any:
+        """The plain value at a path; None if there is none."""
+        node: Node | None = self.document.root
+        for part in path:
+            node = node.child(part) if node is not None else None
+        return node.plain() if node is not None else None
+
+
 def load_scene(
-    source: str | Path | Mapping[str, Any], *, overrides: Sequence[str] = (), folder: Path | None = None
+    source: str | Path | Mapping[str, Any] | SceneText,
+    *,
+    overrides: Sequence[str] = (),
+    folder: Path | None = None,
 ) -> Scene:
     """Reads and checks a scene and its formula.
 
     Args:
         source: a path (of a scene file, or of a picture that holds one); YAML text (a str with a line break,
-            or that begins with a brace); or plain data.
+            or that begins with a brace); plain data; or what `read_scene` gave.
         overrides: `camera.fov=30`: a dotted key and a YAML value that replaces the file's.
         folder: where the files that it names are looked for, formulas and an environment's map; the scene
             file's folder, or the current one, if not given.
 
     Raises:
-        SceneError, FormulaError: the first thing in the text that is wrong.
+        SceneError, FormulaError: something in the text is wrong.
         FileError: a file cannot be read, is no regular file, too large, or out of the scene's folder.
     """
-    document, beside = _document(source)
-    for override in overrides:
-        document = _overridden(document, override)
-    return _checked(document, folder or beside)
+    text = source if isinstance(source, SceneText) else read_scene(source)
+    document, scene = _validated(text, overrides, folder or text.folder)
+    with _located(document):
+        _check(scene)
+    return scene
 
 
-def with_overrides(scene: Scene, overrides: Sequence[str]) -> Scene:
-    """The scene with values replaced (`camera.fov=30`); errors as for load_scene."""
-    return load_scene(scene.resolved(), overrides=overrides, folder=scene.folder) if overrides else scene
+def load_coloring(text: SceneText, *, overrides: Sequence[str] = ()) -> Coloring:
+    """The coloring of a scene, checked without reading the maps and grids that the scene names; errors as above."""
+    document, scene = _validated(text, overrides, text.folder)
+    with _located(document):
+        check_parts(scene)
+        _check_palettes(scene)
+    return scene.coloring
 
 
 def dump_scene(scene: Scene) -> str:
@@ -62,16 +92,16 @@ def schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **found, "title": "clfractal scene"}
 
 
-def _document(source: str | Path | Mapping[str, Any]) -> tuple[Document, Path]:
-    """The source's values with their places, and the folder it stands in."""
+def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
+    """Reads a scene without checking more than that it is YAML; the source is as for `load_scene`."""
     if isinstance(source, Mapping):
-        return Document(node_from_plain(source, None)), Path()
+        return SceneText(Document(node_from_plain(source, None)), Path())
     if isinstance(source, str) and ("\n" in source or source.lstrip().startswith("{")):
-        return read_document(source, "scene"), Path()
+        return SceneText(read_document(source, "scene"), Path())
     path = Path(source)
     if str(source) == "":
         raise FileError("a scene needs a file name")
-    return read_document(_text(path), str(source)), path.parent
+    return SceneText(read_document(_text(path), str(source)), path.parent)
 
 
 def _text(path: Path) -> str:
@@ -90,6 +120,30 @@ def _text(path: Path) -> str:
     if found is None:
         raise FileError("holds no scene: it was not written by clfractal", Where(str(path)))
     return found
+
+
+def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple[Document, Scene]:
+    """The text after overriding and inlining, and the scene that the schema makes of it."""
+    document = text.document
+    for override in overrides:
+        document = _overridden(document, override)
+    document = inlined(document, folder)
+    plain = document.plain()
+    if not isinstance(plain, dict):
+        raise SceneError("must be a mapping with version, formula and camera", document.where(()))
+    try:
+        return document, Scene.model_validate(plain).placed(folder)
+    except ValidationError as error:
+        raise first_error(error, document) from error
+
+
+@contextmanager
+def _located(document: Document) -> Iterator[None]:
+    """Errors that name a path only get their place in the text."""
+    try:
+        yield
+    except ClfractalError as error:
+        raise document.locate(error) from error
 
 
 def _overridden(document: Document, override: str) -> Document:
@@ -124,25 +178,13 @@ def _defaults() -> dict[str, Any]:
     return Scene.model_validate(least).model_dump(mode="json")
 
 
-def _checked(document: Document, folder: Path) -> Scene:
-    scene = _validated(document)
-    if _has_file(scene):
-        document = document.replaced(("formula",), _inlined(document, folder))
-        scene = _validated(document)
-    try:
-        # Kept in the scene, so that the formula is resolved once.
-        _ = scene.chain
-    except ClfractalError as error:
-        raise document.locate(error) from error
-    try:
-        check_parts(scene)
-        scene = scene.placed(folder)
-        _check_names(scene)
-        if scene.layout is not None:
-            _check_views(scene)
-    except (SceneError, FileError) as error:
-        raise document.locate(error) from error
-    return scene
+def _check(scene: Scene) -> None:
+    """Raises ClfractalError, at a dotted path, for what the schema cannot see; what is read stays in the scene."""
+    _ = scene.chain
+    check_parts(scene)
+    _check_names(scene)
+    if scene.layout is not None:
+        _check_views(scene)
 
 
 def _check_names(scene: Scene) -> None:
@@ -184,60 +226,3 @@ def _check_palettes(scene: Scene) -> None:
 
         for path, palette in used:
             check_palette(palette, path)
-
-
-def _validated(document: Document) -> Scene:
-    plain = document.plain()
-    if not isinstance(plain, dict):
-        raise SceneError("must be a mapping with version, formula and camera", document.where(()))
-    try:
-        return Scene.model_validate(plain)
-    except ValidationError as error:
-        raise first_error(error, document) from error
-
-
-def _has_file(scene: Scene) -> bool:
-    spec = scene.formula
-    return spec.file is not None or any(link.file is not None for link in spec.chain or ())
-
-
-def _inlined(document: Document, folder: Path) -> Node:
-    """The scene's formula with the files it names put in their place, so that one text tells all of it."""
-    return _Inliner(folder).spec(document.root.value["formula"], ("formula",))
-
-
-class _Inliner:
-    """Replaces `file` by `inline`, in a formula and in the links of its chain."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def spec(self, node: Node, path: tuple[str, ...]) -> Node:
-        """A mapping that may have `file` or `chain`."""
-        if not isinstance(node.value, dict):
-            return node
-        inner, keys = dict(node.value), dict(node.keys)
-        file, links = inner.get("file"), inner.get("chain")
-        if isinstance(file, Node) and isinstance(file.value, str):
-            del inner["file"]
-            inner["inline"] = self.read(file, path)
-            if "file" in keys:
-                keys["inline"] = keys.pop("file")
-        elif isinstance(links, Node) and isinstance(links.value, list):
-            entries = [self.spec(link, (*path, "chain", str(i))) for i, link in enumerate(links.value)]
-            inner["chain"] = replace(links, value=entries)
-        return replace(node, value=inner, keys=keys)
-
-    def read(self, file: Node, path: tuple[str, ...]) -> Node:
-        from clfractal.formulas.catalog import safe_path
-
-        where = Where(file.file, file.line, file.column, ".".join((*path, "file")))
-        found = safe_path(file.value, self.folder, where)
-        shown = str(self.folder / file.value)
-        try:
-            text = read_text_file(found, name=shown)
-        except FileError as error:
-            raise FileError(f"{error.where.file} {error.message}", where) from error
-        root = read_document(text, shown, error=FormulaError).root
-        # A file may hold a chain whose links are files again; deeper ones the formulas' own rules refuse.
-        return self.spec(root, (*path, "inline")) if len(path) < 3 else root

@@ -32,8 +32,8 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
     """
     device = grid.device
     built = build_all(device, [blocks_recipe(grid.kind)], on_compile)[0]
-    blocks = device.buffer(BLOCK_BYTES * grid.layout.slots, "what is seen of bricks")
-    for values, (first, after) in zip(grid.values, grid.layout.ranges(), strict=True):
+    blocks = device.buffer(BLOCK_BYTES * grid.parts.slots, "what is seen of bricks")
+    for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
         with device.failures("looking at bricks"):
             built.kernel.set_args(
                 blocks, values, np.int32(0), np.int32(after - first), np.int32(first), np.float32(unseen)

@@ -77,13 +77,13 @@ def grid_from_dense(
     sizes = (SAMPLE_BYTES[kind], 4)
     layer = nx * ny * sizes[0]
     others = 4 * entries.size + min(values.nbytes, max(SLAB_BYTES, 24 * layer))
-    layout = plan_pools(device, stored, sizes, others, f"a grid of {nx} x {ny} x {nz} voxels")
+    parts = plan_pools(device, stored, sizes, others, f"a grid of {nx} x {ny} x {nz} voxels")
     built = programs.build_all(device, [build], on_compile)[0]
-    pools = [allocate(device, layout, size, "the grid") for size in sizes]
+    pools = [allocate(device, parts, size, "the grid") for size in sizes]
     slabs = _Slabs(device, lattice, values, built, opaque if opaque is not None else least, normal_radius)
     milliseconds = 0.0
     z, y, x = np.nonzero(visible)
-    for (first, after), value_part, normal_part in zip(layout.ranges(), *pools, strict=True):
+    for (first, after), value_part, normal_part in zip(parts.ranges(), *pools, strict=True):
         milliseconds += slabs.store(value_part, normal_part, x[first:after], y[first:after], z[first:after])
         if progress is not None:
             progress(after, stored)
@@ -104,7 +104,7 @@ def grid_from_dense(
         kind,
         (0.0, 255.0) if kind == "byte" else (0.0, 1.0),
         device,
-        layout,
+        parts,
         entries,
         table,
         pools[0],

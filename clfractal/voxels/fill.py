@@ -33,8 +33,6 @@ SLOW_APPLICATIONS = 1e7
 NODE_SAFETY = 0.75
 # Voxels a side of an octant of a brick.
 OCTANT = 4
-# In place of the number of a brick, as in `kernels/voxels_bricks.h`; -1: outside.
-ALL_INSIDE = -2
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,9 +265,9 @@ class _Filler:
         )  # the last packet of octants may go past the end
         known = self._octants(classify_nodes, places, bricks)
         x, y, z = self.lattice.evaluated_bricks
-        numbers = np.full(x * y * z, -1, np.int32)
+        numbers = np.full(x * y * z, programs.ALL_OUTSIDE, np.int32)
         at, full = unpack_places(places), unpack_places(descent.full)
-        numbers[full[:, 0] + x * (full[:, 1] + y * full[:, 2])] = ALL_INSIDE
+        numbers[full[:, 0] + x * (full[:, 1] + y * full[:, 2])] = programs.ALL_INSIDE
         numbers[at[:, 0] + x * (at[:, 1] + y * at[:, 2])] = np.arange(len(places), dtype=np.int32)
         scale = 1.0
         if sample == "byte":

@@ -12,7 +12,7 @@ import pyopencl as cl
 
 from clfractal.device.select import Device
 from clfractal.voxels.lattice import BRICK, BRICK_SIDE, BRICK_STRIDE, Lattice, Shape
-from clfractal.voxels.pool import Layout
+from clfractal.voxels.pool import Parts
 
 Kind = Literal["byte", "float"]
 SAMPLE_BYTES: dict[Kind, int] = {"byte": 1, "float": 4}
@@ -64,11 +64,11 @@ class Grid:
         range: the least and the largest value that a voxel can have. Of `byte` the samples 0 and 255 stand for them;
             of `float` the samples are the values (of a given array of floats the range is 0 to 1, whatever it holds).
         device: where the buffers are.
-        layout: slots of the pools and their parts.
+        parts: slots of the pools and their parts.
         table_entries: of each brick its slot, or -(1 + sides) if it cannot be seen; int32 of shape (bz, by, bx). `sides`
             tells how far around it there is nothing, see `octree.empty_cubes`.
         table: the same on the device, x fastest.
-        values: samples, uint8 or float32, in up to four buffers (`layout.ranges()`).
+        values: samples, uint8 or float32, in up to four buffers (`parts.ranges()`).
         normals: four bytes a sample: round(127.5 (n + 1)) of the outward normal's x, y and z (128 where there is
             none), and 255 inside, 0 outside. `least_squares` and `exact` ones are those of samples of a brick's cells
             that the surface goes through: of a sample that bricks share, a copy may still be by differences.
@@ -83,7 +83,7 @@ class Grid:
     kind: Kind
     range: tuple[float, float]
     device: Device
-    layout: Layout
+    parts: Parts
     table_entries: npt.NDArray[np.int32]
     table: cl.Buffer
     values: tuple[cl.Buffer, ...]
@@ -139,7 +139,7 @@ class Grid:
         order = np.argsort(flat, kind="stable")
         slots = flat[order]
         by, bx = self.table_entries.shape[1:]
-        for buffer, (first, after) in zip(pool, self.layout.ranges(), strict=True):
+        for buffer, (first, after) in zip(pool, self.parts.ranges(), strict=True):
             samples = np.empty((after - first, BRICK_STRIDE, *more), dtype)
             with self.device.failures("reading the grid"):
                 cl.enqueue_copy(self.device.queue, samples, buffer)

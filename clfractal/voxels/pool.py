@@ -14,7 +14,7 @@ MOST_PARTS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class Parts:
     """How slots are spread over the parts of a pool.
 
     Attributes:
@@ -26,19 +26,19 @@ class Layout:
     part_slots: int
 
     @property
-    def parts(self) -> int:
+    def count(self) -> int:
         """Buffers of a pool."""
         return -(-self.slots // self.part_slots)
 
     def ranges(self) -> Iterator[tuple[int, int]]:
         """First slot of each part, and the one after its last."""
-        for part in range(self.parts):
+        for part in range(self.count):
             first = part * self.part_slots
             yield first, min(first + self.part_slots, self.slots)
 
 
-def plan_pools(device: Device, slots: int, sample_bytes: tuple[int, ...], others: int, what: str) -> Layout:
-    """The layout of pools of `slots` bricks whose samples take `sample_bytes` each, beside `others` bytes.
+def plan_pools(device: Device, slots: int, sample_bytes: tuple[int, ...], others: int, what: str) -> Parts:
+    """The parts of pools of `slots` bricks whose samples take `sample_bytes` each, beside `others` bytes.
 
     Raises:
         DeviceError: status 2, with the memory needed and had, when they do not fit.
@@ -48,13 +48,13 @@ def plan_pools(device: Device, slots: int, sample_bytes: tuple[int, ...], others
     device.check_memory(slots * BRICK_STRIDE * sum(sample_bytes) + others, what)
     in_one = device.info.max_alloc // largest
     if slots <= in_one:
-        return Layout(slots, slots)
+        return Parts(slots, slots)
     device.check_memory(0, what, largest=-(-slots // MOST_PARTS) * largest)
-    return Layout(slots, in_one)
+    return Parts(slots, in_one)
 
 
-def allocate(device: Device, layout: Layout, sample_bytes: int, what: str) -> tuple[cl.Buffer, ...]:
+def allocate(device: Device, parts: Parts, sample_bytes: int, what: str) -> tuple[cl.Buffer, ...]:
     """The buffers of a pool."""
     return tuple(
-        device.buffer((after - first) * BRICK_STRIDE * sample_bytes, what) for first, after in layout.ranges()
+        device.buffer((after - first) * BRICK_STRIDE * sample_bytes, what) for first, after in parts.ranges()
     )

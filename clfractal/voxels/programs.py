@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
-from weakref import WeakKeyDictionary
 
 import pyopencl as cl
 
@@ -24,6 +24,8 @@ from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
 
 Source = Literal["bits", "bricks", "slab"]
 
+# Instead of a brick's number: all its voxels are outside, or inside as a whole.
+ALL_OUTSIDE, ALL_INSIDE = -1, -2
 FILL_KINDS = ("inside", "coverage", "iterations")
 NORMALS = ("gradient", "least_squares", "exact")
 SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
@@ -35,10 +37,6 @@ NODE_POINTS = 64
 CHUNK = 4
 # Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
 PACKETS = 2
-
-# Programs of a device that are kept loaded: a box that is moved is filled again and again.
-MOST_LOADED = 64
-_loaded: WeakKeyDictionary[Device, dict[tuple[str, str], program.Program]] = WeakKeyDictionary()
 
 _BUFFER = Argument("buffer", 8192)
 _INT = Argument("scalar", dtype="int32")
@@ -70,20 +68,27 @@ class Built:
 
 
 def build_all(
-    device: Device, recipes: Sequence[Recipe], on_compile: Callable[[str], None] | None = None
+    device: Device,
+    recipes: Sequence[Recipe],
+    on_compile: Callable[[str], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
 ) -> list[Built]:
     """Builds programs, beside each other where they have to be compiled.
 
     Raises:
         KernelBuildError: a program does not compile.
         DeviceError: the driver failed.
+        Stopped: `stopped`, which is asked from other threads, answered True.
     """
-    told: list[str] = []
-    loaded = _loaded.setdefault(device, {})
+    announced = threading.Event()
+    failed = threading.Event()
 
-    def tell(line: str) -> None:
-        if not told and on_compile is not None:
-            told.append(line)
+    def nobody_waits() -> bool:
+        return failed.is_set() or (stopped is not None and stopped())
+
+    def announce(line: str) -> None:
+        if not announced.is_set() and on_compile is not None:
+            announced.set()
             on_compile(line)
 
     def build(recipe: Recipe) -> Built:
@@ -92,21 +97,25 @@ def build_all(
         if recipe.formula is not None:
             generated["formula.h"] = recipe.formula
         text = flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
-        key = (recipe.kernel, text.text)
-        if key in loaded:
-            return Built(loaded[key].kernel(recipe.kernel), recipe.items, recipe.group, 0.0)
         warm = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
         flags = program.math_flags(recipe.precision)
         built = program.build(
-            device, text.text, flags=flags, sources=text.sources, warm=warm, on_compile=tell
+            device,
+            text.text,
+            flags=flags,
+            sources=text.sources,
+            warm=warm,
+            on_compile=announce,
+            stopped=nobody_waits,
         )
-        if len(loaded) >= MOST_LOADED:
-            loaded.clear()
-        loaded[key] = built
         return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
 
     with ThreadPoolExecutor(max(len(recipes), 1)) as pool:
-        return list(pool.map(build, recipes))
+        try:
+            return list(pool.map(build, recipes))
+        except BaseException:  # an interrupt too: the other programs are not waited for
+            failed.set()
+            raise
 
 
 def nodes_recipe(chain: Chain, formula: FormulaText, lanes: int, precision: Precision) -> Recipe:
@@ -217,5 +226,7 @@ def _source_defines(source: Source, sample: Kind) -> dict[str, object]:
     return {
         **{f"SOURCE_{name.upper()}": number for number, name in enumerate(SOURCES)},
         "SOURCE": SOURCES.index(source),
+        "ALL_OUTSIDE": f"({ALL_OUTSIDE})",
+        "ALL_INSIDE": f"({ALL_INSIDE})",
         **_sample_defines(sample),
     }

@@ -31,7 +31,7 @@ class Evaluated:
         full: where bricks are, shape (m, 3), that are inside as a whole and were not evaluated.
         samples: their voxels, on the device.
         bricks: `places` on the device.
-        numbers: of each place its number among them, -1 (outside) or -2 (in `full`), on the device, x fastest.
+        numbers: of each place its number among them, `ALL_OUTSIDE`, or `ALL_INSIDE` (in `full`), on the device, x fastest.
         scale: factor from a value to what is stored.
         whole: the value of a voxel that is inside as a whole.
         opaque: the least value that counts as inside.
@@ -126,9 +126,9 @@ def store(
     slots = first_slot + count
     sizes = (SAMPLE_BYTES[kept], 4)
     others = evaluated.samples.size + 4 * entries.size
-    layout = plan_pools(device, slots, sizes, others, f"a grid with {slots} stored bricks")
-    values = allocate(device, layout, sizes[0], "the grid's values")
-    normals = allocate(device, layout, sizes[1], "the grid's normals")
+    parts = plan_pools(device, slots, sizes, others, f"a grid with {slots} stored bricks")
+    values = allocate(device, parts, sizes[0], "the grid's values")
+    normals = allocate(device, parts, sizes[1], "the grid's normals")
     table = device.buffer(entries.nbytes, "the grid's table", read_only=True)
     with device.failures("storing the grid"):
         cl.enqueue_copy(device.queue, table, entries.reshape(-1))
@@ -136,7 +136,7 @@ def store(
         _store_whole(device, values[0], normals[0], kept, solid_slot, inside=True)
     if outside_slot is not None:
         _store_whole(device, values[0], normals[0], kept, outside_slot, inside=False)
-    for (first, after), value_part, normal_part in zip(layout.ranges(), values, normals, strict=True):
+    for (first, after), value_part, normal_part in zip(parts.ranges(), values, normals, strict=True):
         low, high = max(first - first_slot, 0), after - first_slot
         if high <= low:
             continue
@@ -195,7 +195,7 @@ def store(
         kept,
         range,
         device,
-        layout,
+        parts,
         entries,
         table,
         values,

@@ -17,8 +17,9 @@ def device() -> Device:
 
 
 @pytest.fixture
-def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache folder that holds nothing yet."""
+def empty_cache(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache folder that holds nothing yet, and a device that has no program in memory."""
+    device.loaded.clear()
     folder = tmp_path / "cache"
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(folder))
     return folder

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
+import statistics
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from clfractal.device import child, isolate
+from clfractal.device import child, children, isolate
+from clfractal.device.children import Children
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError, FormulaError
+from clfractal.errors import DeviceError, FormulaError, Stopped
 
 _HERE = "tests.device.test_isolate"
 
@@ -30,6 +35,11 @@ def echo_job(request: dict[str, Any]) -> list[Any]:
 def sleep_job(request: dict[str, Any]) -> None:
     (Path(request["mark"])).write_text(str(os.getpid()))
     time.sleep(600)
+
+
+def slow_echo_job(request: dict[str, Any]) -> list[Any]:
+    time.sleep(0.1)
+    return echo_job(request)
 
 
 def raise_job(request: dict[str, Any]) -> None:
@@ -46,6 +56,24 @@ def kill_job(request: dict[str, Any]) -> None:
 
 def _run(device: Device, job: str, timeout_s: float = 60.0, **arguments: Any) -> Any:
     return isolate.run(f"{_HERE}:{job}", device, arguments, doing="testing", timeout_s=timeout_s)
+
+
+def _run_stoppable(device: Device, job: str, stopped: Callable[[], bool], **arguments: Any) -> Any:
+    return isolate.run(f"{_HERE}:{job}", device, arguments, doing="testing", timeout_s=60, stopped=stopped)
+
+
+@pytest.fixture
+def pool(monkeypatch: pytest.MonkeyPatch) -> Iterator[Children]:
+    """A pool of two children of this test's own."""
+    isolate.end_children()  # so that none of the usual pool ends meanwhile
+    found = Children(2)
+    monkeypatch.setattr(children, "pool", found)
+    yield found
+    found.close()
+
+
+def _descriptors() -> int:
+    return len(os.listdir("/proc/self/fd"))
 
 
 def _is_running(process: int) -> bool:
@@ -90,6 +118,13 @@ def test_a_child_that_ended_meanwhile_is_replaced(device: Device) -> None:
     assert _run(device, "echo_job", number=2)[0] == 3
 
 
+def test_children_can_be_ended(device: Device) -> None:
+    process = _run(device, "echo_job", number=1)[1]
+    isolate.end_children()
+    assert not _is_running(process)
+    assert _run(device, "echo_job", number=2)[1] != process
+
+
 def test_a_child_ends_by_itself_after_many_jobs(device: Device) -> None:
     first = _run(device, "echo_job", number=1)[1]
     processes = [_run(device, "echo_job", number=number)[1] for number in range(child.MOST_JOBS)]
@@ -97,14 +132,124 @@ def test_a_child_ends_by_itself_after_many_jobs(device: Device) -> None:
     assert len(set(processes)) == 2
 
 
-def test_threads_have_children_of_their_own(device: Device) -> None:
-    own = _run(device, "echo_job", number=1)[1]
+def test_a_child_stays_when_the_thread_that_started_it_has_ended(device: Device, pool: Children) -> None:
     with ThreadPoolExecutor(1) as other:
-        theirs = other.submit(_run, device, "echo_job", number=1).result()[1]
-    assert theirs != own
-    # It ends with its thread.
-    assert _wait(lambda: not _is_running(theirs))
-    assert _run(device, "echo_job", number=2) == [3, own]
+        process = other.submit(_run, device, "echo_job", number=1).result()[1]
+    time.sleep(0.3)
+    assert _is_running(process)
+    assert _run(device, "echo_job", number=2) == [3, process]
+    with ThreadPoolExecutor(1) as other:
+        assert other.submit(_run, device, "echo_job", number=3).result() == [4, process]
+
+
+def test_many_threads_share_few_children(device: Device, pool: Children) -> None:
+    with ThreadPoolExecutor(8) as threads:
+        jobs = [threads.submit(_run, device, "slow_echo_job", number=number) for number in range(12)]
+        answers = [job.result() for job in jobs]
+    assert [number for number, _ in answers] == list(range(1, 13))
+    assert len({process for _, process in answers}) == 2
+
+
+def test_no_descriptors_are_left(device: Device, pool: Children, tmp_path: Path) -> None:
+    before = _descriptors()
+    for number in range(3):
+        process = _run(device, "echo_job", number=number)[1]
+        os.kill(process, signal.SIGKILL)
+        with pytest.raises(DeviceError):
+            _run(device, "kill_job")
+        with pytest.raises(DeviceError):
+            _run(device, "fail_job")
+        with pytest.raises(DeviceError):
+            _run(device, "sleep_job", timeout_s=1, mark=str(tmp_path / "mark"))
+    pool.close()
+    assert _descriptors() == before
+
+
+def test_a_child_that_ended_by_itself_is_cleared_away(device: Device, pool: Children) -> None:
+    before = _descriptors()
+    process = _run(device, "echo_job", number=1)[1]
+    assert _descriptors() == before + 2
+    os.kill(process, signal.SIGKILL)
+    assert _wait(lambda: _descriptors() == before)
+
+
+def test_no_process_can_be_started(device: Device, pool: Children, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+    for _ in range(3):
+        with pytest.raises(DeviceError, match=r"a process that compiles cannot be started: .*No such file"):
+            _run(device, "echo_job", number=1)
+    monkeypatch.undo()
+
+
+def test_an_interrupt_ends_the_child_and_frees_its_place(
+    device: Device, pool: Children, tmp_path: Path
+) -> None:
+    for number in range(3):
+        mark = tmp_path / f"mark{number}"
+
+        def interrupt(mark: Path = mark) -> None:
+            _wait(lambda: mark.exists() and mark.read_text())
+            os.kill(os.getpid(), signal.SIGINT)
+
+        with ThreadPoolExecutor(1) as other:
+            other.submit(interrupt)
+            with pytest.raises(KeyboardInterrupt):
+                _run(device, "sleep_job", mark=str(mark))
+        assert not _is_running(int(mark.read_text()))
+    with ThreadPoolExecutor(2) as threads:
+        jobs = [threads.submit(_run, device, "echo_job", number=number) for number in range(4)]
+        assert [job.result()[0] for job in jobs] == [1, 2, 3, 4]
+
+
+def test_work_that_is_stopped(device: Device, pool: Children, tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    asked: list[float] = []
+
+    def stopped() -> bool:
+        asked.append(time.monotonic())
+        return mark.exists() and len(asked) > 20
+
+    with pytest.raises(Stopped):
+        isolate.run(
+            f"{_HERE}:sleep_job",
+            device,
+            {"mark": str(mark)},
+            doing="testing",
+            timeout_s=60,
+            stopped=stopped,
+        )
+    assert statistics.median(b - a for a, b in itertools.pairwise(asked)) < 0.02
+    assert not _is_running(int(mark.read_text()))
+    assert _run(device, "echo_job", number=1)[0] == 2
+
+
+def test_who_waits_for_a_child_can_be_stopped(device: Device, pool: Children, tmp_path: Path) -> None:
+    marks = [tmp_path / "a", tmp_path / "b"]
+    enough = threading.Event()
+
+    def sleep(mark: Path) -> None:
+        with pytest.raises(Stopped):
+            _run_stoppable(device, "sleep_job", enough.is_set, mark=str(mark))
+
+    with ThreadPoolExecutor(2) as threads:
+        busy = [threads.submit(sleep, mark) for mark in marks]
+        assert _wait(lambda: all(mark.exists() and mark.read_text() for mark in marks))
+        start = time.monotonic()
+        with pytest.raises(Stopped):
+            _run_stoppable(device, "echo_job", lambda: time.monotonic() > start + 0.2, number=1)
+        assert time.monotonic() - start < 5
+        enough.set()
+        for each in busy:
+            each.result()
+
+
+def test_a_build_that_is_stopped(device: Device, empty_cache: Path) -> None:
+    text = "__kernel void k(__global int *a) { a[0] = 2; }"
+    with pytest.raises(Stopped):
+        build(device, text, flags=math_flags("float32"), stopped=lambda: True)
+    assert not list(empty_cache.rglob("*.bin"))
+    assert not build(device, text, flags=math_flags("float32"), stopped=lambda: False).cached
+    assert build(device, text, flags=math_flags("float32"), stopped=lambda: True).cached
 
 
 def test_our_errors_pass_through(device: Device) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,8 +11,9 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clfractal.device import compiler
+from clfractal.device import cache, compiler
 from clfractal.device.compiler import Argument, Warm
+from clfractal.device.loaded import LoadedPrograms
 from clfractal.device.program import Program, build, math_flags
 from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
@@ -43,10 +45,50 @@ def test_built_then_found(device: Device, empty_cache: Path, isolated: bool, war
     first = build(device, _TRIPLE, flags=_FLAGS, warm=warm, isolated=isolated)
     assert not first.cached
     assert _triples(first)
-    second = build(device, _TRIPLE, flags=_FLAGS, warm=warm, isolated=isolated)
-    assert second.cached
-    assert _triples(second)
-    assert second.build_ms >= 0
+    for found in ("in memory", "on the disk"):
+        if found == "on the disk":
+            device.loaded.clear()
+        second = build(device, _TRIPLE, flags=_FLAGS, warm=warm, isolated=isolated)
+        assert second.cached
+        assert _triples(second)
+        assert second.build_ms >= 0
+
+
+def test_a_program_in_memory_needs_no_disk(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = _TRIPLE + "// as long as the program of a scene\n" * 6000
+    first = build(device, text, flags=_FLAGS, warm=_WARM, isolated=False)
+
+    def fail(*_: object) -> None:
+        raise AssertionError("the disk or the compiler was asked")
+
+    for name in ("load_blob", "store_blob"):
+        monkeypatch.setattr(cache, name, fail)
+    for name in ("compile_source", "load_kept"):
+        monkeypatch.setattr(compiler, name, fail)
+    again = [build(device, text, flags=_FLAGS, warm=_WARM) for _ in range(20)]
+    assert all(each.cached and each.cl_program is first.cl_program for each in again)
+    assert statistics.median(each.build_ms for each in again) < 1
+
+
+def test_programs_in_memory_are_the_devices_own(device: Device, empty_cache: Path) -> None:
+    first = build(device, _TRIPLE, flags=_FLAGS, isolated=False)
+    other = Device(device.info, device.cl_device)
+    assert build(other, _TRIPLE, flags=_FLAGS, isolated=False).cl_program is not first.cl_program
+    assert build(device, _TRIPLE, flags=_FLAGS, isolated=False).cl_program is first.cl_program
+
+
+def test_the_program_used_longest_ago_is_forgotten() -> None:
+    loaded = LoadedPrograms()
+    for number in range(64):
+        loaded.keep(str(number), number)
+    assert loaded.get("0") == 0
+    loaded.keep("64", 64)
+    assert loaded.get("1") is None
+    assert [loaded.get(key) for key in ("0", "2", "64")] == [0, 2, 64]
+    loaded.clear()
+    assert loaded.get("0") is None
 
 
 def test_a_first_launch_makes_machine_code_once(
@@ -74,6 +116,7 @@ def test_a_driver_without_a_cache_gives_binaries(
     binary = compiler.binary_of(device, first.cl_program)
     assert len(binary) > 1000
     assert compiler.load_kept(device, binary, "not OpenCL", _FLAGS) is not None
+    device.loaded.clear()
     assert _triples(build(device, _TRIPLE, flags=_FLAGS, warm=_WARM, isolated=False))
 
 
@@ -98,9 +141,11 @@ def test_a_binary_that_the_driver_refuses_is_built_again(
     build(device, _TRIPLE, flags=_FLAGS, isolated=False)
     (entry,) = empty_cache.rglob("*.bin")
     entry.write_bytes(damage)
+    device.loaded.clear()
     again = build(device, _TRIPLE, flags=_FLAGS, isolated=False)
     assert not again.cached
     assert _triples(again)
+    device.loaded.clear()
     monkeypatch.setattr(compiler, "load_kept", lambda *_: None)
     assert _triples(build(device, _TRIPLE, flags=_FLAGS, isolated=False))
 

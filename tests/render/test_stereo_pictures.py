@@ -235,7 +235,7 @@ class TestCost:
             texts.append(text)
             return build(device, text, **named)
 
-        monkeypatch.setattr(program, "_loaded", {})
+        device.loaded.clear()
         monkeypatch.setattr(program, "_compile", counted("compiled", program._compile))
         monkeypatch.setattr(compiler, "load_kept", counted("loaded", compiler.load_kept))
         monkeypatch.setattr(program, "build", watched)

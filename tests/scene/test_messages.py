@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from clfractal.errors import ClfractalError, FileError, FormulaError, SceneError
-from clfractal.scene.load import load_scene, with_overrides
+from clfractal.scene.load import load_scene
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\n"
 
@@ -349,7 +349,8 @@ def test_overrides_replace_values() -> None:
     assert scene.background == "transparent"
     assert scene.surface.bounds is not None
     assert scene.surface.bounds.radius == 3
-    assert with_overrides(scene, ["camera.fov=45"]).camera == scene.camera.model_copy(update={"fov": 45})
+    again = load_scene(scene.resolved(), overrides=["camera.fov=45"])
+    assert again.camera == scene.camera.model_copy(update={"fov": 45})
 
 
 def test_an_override_does_not_reach_through_an_alias() -> None:

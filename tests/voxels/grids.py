@@ -54,6 +54,12 @@ def filled(
     return fill_grid(scene, scene.renderer, device(), lanes=used, precision=precision, **options)
 
 
+def differing_voxels(first: Grid, second: Grid) -> int:
+    """How many voxels of two grids have different values, as of a fill by octree and a brute one."""
+    assert first.shape == second.shape
+    return int(np.count_nonzero(first.dense() != second.dense()))
+
+
 def voxel_points(lattice: Lattice, offset: tuple[float, float, float] = (0.5, 0.5, 0.5)) -> Floats:
     """Points of voxels, shape (nz, ny, nx, 3), written down from the definition."""
     nx, ny, nz = lattice.shape

@@ -42,7 +42,7 @@ def test_blocks_against_their_definition(
     monkeypatch.setattr(device(), "info", replace(device().info, max_alloc=736 * 4 * -(-slots // parts)))
     grid = grid_from_dense(values, device(), corner=(0, 0, 0), spacing=(1, 1, 1))
     assert len(grid.values) == parts
-    found = np.empty(BLOCK_BYTES * grid.layout.slots, np.uint8)
+    found = np.empty(BLOCK_BYTES * grid.parts.slots, np.uint8)
     cl.enqueue_copy(device().queue, found, seen_blocks(grid, 60.0))
     padded = np.pad(values, (0, 8), mode="edge")
     for (z, y, x), slot in np.ndenumerate(grid.table_entries):

@@ -53,7 +53,7 @@ def test_an_array_in_slabs_and_pools_in_parts(monkeypatch: pytest.MonkeyPatch) -
     values = noise((70, 21, 30)).astype(np.uint8)
     whole = grid_from_dense(values, device(), corner=CORNER, spacing=SPACING, threshold=10, normal_radius=3)
     monkeypatch.setattr(dense, "SLAB_BYTES", 24 * values[0].nbytes)
-    slots = whole.layout.slots
+    slots = whole.parts.slots
     monkeypatch.setattr(device(), "info", replace(device().info, max_alloc=736 * 4 * -(-slots // 3)))
     parts = grid_from_dense(values, device(), corner=CORNER, spacing=SPACING, threshold=10, normal_radius=3)
     assert len(parts.values) == 3

@@ -12,9 +12,8 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
-from clfractal.voxels.compare import differing_voxels
 from clfractal.voxels.fill import FillProgress
-from tests.voxels.grids import device, filled, inside, volume_scene, voxel_points
+from tests.voxels.grids import device, differing_voxels, filled, inside, volume_scene, voxel_points
 
 # Voxels of a million that rounding in float32 may decide another way than float64: those at the surface whose orbits are
 # long.
@@ -143,7 +142,7 @@ def test_bricks_that_are_uniform_are_not_stored() -> None:
         assert (entry < 0) == (brick == 0).all()
         assert (entry == 0) == (brick == 255).all()
     stored = grid.table_entries[grid.table_entries > 0]
-    np.testing.assert_array_equal(np.sort(stored), np.arange(1, grid.layout.slots))
+    np.testing.assert_array_equal(np.sort(stored), np.arange(1, grid.parts.slots))
     assert grid.stats.solid_bricks == (grid.table_entries == 0).sum()
     assert grid.stats.stored_bricks == len(stored)
 
@@ -162,11 +161,11 @@ def test_pools_in_several_buffers(monkeypatch: pytest.MonkeyPatch) -> None:
 
     scene = volume_scene("hast", 20, resolution=64)
     whole = filled(scene)
-    slots = whole.layout.slots
+    slots = whole.parts.slots
     info = replace(device().info, max_alloc=736 * 4 * (slots // 3))
     monkeypatch.setattr(device(), "info", info)
     parts = filled(scene)
-    assert parts.layout.parts == len(parts.values) == len(parts.normals) == 4
+    assert parts.parts.count == len(parts.values) == len(parts.normals) == 4
     np.testing.assert_array_equal(parts.dense(), whole.dense())
     np.testing.assert_array_equal(parts.dense_normals(), whole.dense_normals())
 

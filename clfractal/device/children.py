@@ -1,0 +1,260 @@
+"""The processes that `isolate` sends jobs to: one pool of them for the whole process.
+
+A child takes one job after another, from any thread, and ends by itself when it has had none for some seconds. There are
+as many at a time as there are processors; who finds none free waits. All of them end with this process.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import queue
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from clfractal.device.child import DONE
+from clfractal.errors import DeviceError, Stopped
+
+POLL_S = 0.01
+"""How often somebody who waits asks whether to stop."""
+_SWEEP_S = 1.0  # how often children that have ended by themselves are looked for
+
+
+class EndedError(Exception):
+    """A child had ended before it could take the job, by itself or by somebody's hand: another one can do it."""
+
+
+class Child:
+    """A process that waits for jobs, with a pipe to send them and one that tells when they are done."""
+
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        self.environment = dict(environment)
+        self.jobs = 0
+        reading, writing = os.pipe()
+        try:
+            self.process = subprocess.Popen(
+                # -P: the folder the user happens to be in is no place to import from.
+                [sys.executable, "-P", "-m", "clfractal.device.child", str(writing), str(os.getpid())],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env=self.environment,
+                pass_fds=[writing],
+                # A Ctrl-C at the terminal goes to this process alone, which then decides.
+                start_new_session=True,
+                bufsize=0,
+            )
+        except BaseException:
+            os.close(reading)
+            raise
+        finally:
+            os.close(writing)
+        self.answers = reading
+
+    def ask(self, folder: Path, timeout_s: float, stopped: Callable[[], bool] | None) -> int | None:
+        """Send the job in `folder` and wait until it is done.
+
+        Returns:
+            0 once it is; else the child's exit status, negative for a signal; None if it takes too long.
+
+        Raises:
+            EndedError: the child had ended before.
+            Stopped: `stopped` answered that nobody wants the result any more.
+        """
+        self.jobs += 1
+        sent = self._send(os.fsencode(folder) + b"\n")
+        end = time.monotonic() + timeout_s
+        while True:
+            left = end - time.monotonic()
+            if left <= 0:
+                return None
+            if stopped is not None and stopped():
+                raise Stopped
+            if select.select([self.answers], [], [], left if stopped is None else min(left, POLL_S))[0]:
+                break
+        if os.read(self.answers, len(DONE)):
+            return 0
+        status = self.process.wait()
+        # It had just waited long enough (0), or somebody ended it (SIGKILL): no driver does either. A new child that
+        # ends before its first job is a fault, and the next one would do the same.
+        if self.jobs > 1 and (not sent or status in (0, -signal.SIGKILL)):
+            raise EndedError
+        return status
+
+    def _send(self, line: bytes) -> bool:
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(line)
+        except BrokenPipeError:
+            return False
+        return True
+
+    def has_ended(self) -> bool:
+        """Whether it takes no more jobs."""
+        return self.process.poll() is not None
+
+    def kill(self) -> None:
+        """End it, whatever it does; who waits for its answer is told so."""
+        if not self.has_ended():
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.process.pid, signal.SIGKILL)
+            self.process.wait()
+
+    def end(self) -> None:
+        """End it and close its pipes; only for who holds it alone."""
+        self.kill()
+        self.close()
+
+    def close(self) -> None:
+        """Close the pipes. A second call does nothing."""
+        answers, self.answers = self.answers, -1
+        if answers >= 0:
+            os.close(answers)
+        if self.process.stdin is not None:
+            self.process.stdin.close()
+
+
+class Lease:
+    """What somebody holds who asks for a child. It is filled by the pool, so that an interrupt loses no child."""
+
+    def __init__(self) -> None:
+        self.child: Child | None = None
+        self.failure: Exception | None = None
+
+
+class Children:
+    """The pool. Every method may be called from any thread."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._changed = threading.Condition()
+        self._idle: list[Child] = []
+        self._leases: set[Lease] = set()  # with a child, or waiting until one has started for them
+        self._orders: queue.SimpleQueue[tuple[Lease, Mapping[str, str]]] = queue.SimpleQueue()
+        self._keeper: threading.Thread | None = None
+
+    def take(self, lease: Lease, environment: Mapping[str, str], stopped: Callable[[], bool] | None) -> Child:
+        """Put a child into `lease` that was started with `environment`; wait for one if none is free.
+
+        `give_back` must be called afterwards, whatever happens here.
+
+        Raises:
+            DeviceError: status 3, no process can be started.
+            Stopped: `stopped` answered True.
+        """
+        with self._changed:
+            while lease.child is None:
+                if stopped is not None and stopped():
+                    raise Stopped
+                if lease.failure is not None:
+                    raise DeviceError(f"a process that compiles cannot be started: {lease.failure}")
+                self._drop_useless(environment)
+                if lease not in self._leases and len(self._leases) < self._most:
+                    self._leases.add(lease)
+                    if self._idle:
+                        lease.child = self._idle[-1]
+                        self._idle.remove(lease.child)
+                        break
+                    self._order(lease, environment)
+                self._changed.wait(None if stopped is None else POLL_S)
+            return lease.child
+
+    def give_back(self, lease: Lease, *, usable: bool) -> None:
+        """Let others have the lease's child, or end it."""
+        with self._changed:
+            self._leases.discard(lease)
+            child, lease.child = lease.child, None
+            if child is not None and child in self._idle:
+                self._idle.remove(child)
+            if child is not None and usable:
+                self._idle.append(child)
+                child = None
+            self._changed.notify_all()
+        if child is not None:
+            child.end()
+
+    def close(self) -> None:
+        """End all children, whatever they do. The pool can be used again."""
+        with self._changed:
+            idle, self._idle = self._idle, []
+            busy = [lease.child for lease in self._leases if lease.child is not None]
+        for child in idle:
+            child.end()
+        for child in busy:
+            child.kill()
+
+    def forget(self) -> None:
+        """Close the pipes in a process that was forked off: the children are its parent's."""
+        for child in [*self._idle, *(lease.child for lease in self._leases if lease.child is not None)]:
+            child.close()
+
+    def _drop_useless(self, environment: Mapping[str, str]) -> None:
+        """Without those that have ended, or whose drivers were told something else when they started."""
+        useless = [each for each in self._idle if each.has_ended() or each.environment != dict(environment)]
+        for child in useless:
+            self._idle.remove(child)
+            child.end()
+
+    def _order(self, lease: Lease, environment: Mapping[str, str]) -> None:
+        """Children are started by one thread that stays: the system ends them with the thread that started them."""
+        if self._keeper is None or not self._keeper.is_alive():
+            self._keeper = threading.Thread(target=self._keep, name="clfractal-children", daemon=True)
+            self._keeper.start()
+        self._orders.put((lease, environment))
+
+    def _keep(self) -> None:
+        """Start children that are ordered, and clear away those that have ended by themselves."""
+        while True:
+            try:
+                with self._changed:
+                    some = self._idle or self._leases
+                lease, environment = self._orders.get(timeout=_SWEEP_S if some else None)
+            except queue.Empty:
+                with self._changed:
+                    for ended in [each for each in self._idle if each.has_ended()]:
+                        self._idle.remove(ended)
+                        ended.close()
+                continue
+            child: Child | None = None
+            try:
+                child = Child(environment)
+            except Exception as error:
+                lease.failure = error
+            with self._changed:
+                if child is not None and lease in self._leases:
+                    lease.child = child
+                elif child is not None:  # whoever ordered it waits no longer
+                    self._idle.append(child)
+                self._changed.notify_all()
+
+
+def _processors() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # elsewhere than on Linux
+        return os.cpu_count() or 1
+
+
+pool = Children(_processors())
+
+
+def _after_fork() -> None:
+    global pool
+    pool.forget()
+    pool = Children(_processors())
+
+
+@atexit.register
+def _close() -> None:
+    pool.close()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_after_fork)

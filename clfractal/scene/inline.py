@@ -1,0 +1,68 @@
+"""Puts the formula files that a scene names into the scene, so that one text tells all of it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from clfractal.errors import FileError, FormulaError, Where
+from clfractal.files.document import read_document
+from clfractal.files.marks import Document, Node
+from clfractal.files.regular import read_text_file
+from clfractal.scene.formula import MAX_LINKS
+
+_SOURCES = ("name", "file", "inline", "chain")
+# formula.chain.0.inline: a file may hold a chain whose links are files again. Deeper ones are left for the schema,
+# which refuses them.
+_DEEPEST = 3
+
+
+def inlined(document: Document, folder: Path) -> Document:
+    """The document with `inline` in the place of every `file` of its formula, and of the links of its chain.
+
+    A formula that the schema will refuse is left as it is.
+
+    Raises:
+        FileError: a file cannot be read, or lies outside the folder.
+        FormulaError: a file is not YAML.
+    """
+    formula = document.root.child("formula")
+    if formula is None:
+        return document
+    changed = _without_files(formula, ("formula",), folder)
+    return document if changed is formula else document.replaced(("formula",), changed)
+
+
+def _without_files(node: Node, path: tuple[str, ...], folder: Path) -> Node:
+    """A mapping that has one of `file` and `chain`, with texts in the place of files; any other node as it is."""
+    given = {word: node.child(word) for word in _SOURCES}
+    sources = [word for word, child in given.items() if child is not None and child.value is not None]
+    source = node.child(sources[0]) if len(sources) == 1 else None
+    if source is None:
+        return node
+    if sources == ["file"] and isinstance(source.value, str) and source.value:
+        inner = {"inline" if key == "file" else key: child for key, child in node.value.items()}
+        inner["inline"] = _read(source, path, folder)
+        keys = {"inline" if key == "file" else key: place for key, place in node.keys.items()}
+        return replace(node, value=inner, keys=keys)
+    if sources == ["chain"] and isinstance(source.value, list) and len(source.value) <= MAX_LINKS:
+        links = [
+            _without_files(link, (*path, "chain", str(i)), folder) for i, link in enumerate(source.value)
+        ]
+        if all(new is old for new, old in zip(links, source.value, strict=True)):
+            return node
+        return replace(node, value={**node.value, "chain": replace(source, value=links)})
+    return node
+
+
+def _read(file: Node, path: tuple[str, ...], folder: Path) -> Node:
+    """The text of a formula file as a node, files that it names read too."""
+    from clfractal.formulas.catalog import safe_path
+
+    where = Where(file.file, file.line, file.column, ".".join((*path, "file")))
+    found = safe_path(file.value, folder, where)
+    shown = str(folder / file.value)
+    try:
+        text = read_text_file(found, name=shown)
+    except FileError as error:
+        raise FileError(f"{error.where.file} {error.message}", where) from error
+    root = read_document(text, shown, error=FormulaError).root
+    return _without_files(root, (*path, "inline"), folder) if len(path) < _DEEPEST else root
