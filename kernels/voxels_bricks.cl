@@ -21,7 +21,8 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
         least &= more;
         most |= more;
     }
-    if (any(most != (uchar)0) && any(least != (uchar)255)) {
+    const ulong2 some_set = as_ulong2(most), all_set = as_ulong2(least);
+    if ((some_set.x | some_set.y) != 0 && (all_set.x & all_set.y) != ~0ul) {
         classes[brick] = 2;
         return;
     }
@@ -81,19 +82,19 @@ INLINE float16 reciprocal_root(float16 a) {
 }
 
 // A component of a normal as the 8 bits of a colour.
-INLINE uint16 color_of(float16 component) { return convert_uint16(component * 127.5f + 128.0f); }
+INLINE uint16 color_of(float16 component) { return as_uint16(convert_int16(component * 127.5f + 128.0f)); }
 
 // Eq. 6 of Englund 2010 after the filter: n = -G/|G| with G the central differences, (n + 1)/2 in red, green and blue, `alpha`
 // above. (The thesis prints f(x - 1) - f(x - 1).) Where G is 0 there is no normal, 128 in each.
 INLINE uint16 packed_normal(float16 gx, float16 gy, float16 gz, uint16 alpha) {
     const float16 largest = fmax(fmax(fabs(gx), fabs(gy)), fabs(gz));
     const int16 usable = (largest > 0.0f) & (largest <= 3.0e38f);
-    const float16 scale = select((float16)(0.0f), -1.0f / largest, usable);
-    gx = select((float16)(0.0f), gx * scale, usable);
-    gy = select((float16)(0.0f), gy * scale, usable);
-    gz = select((float16)(0.0f), gz * scale, usable);
+    const float16 none = (float16)(0.0f), scale = usable ? -1.0f / largest : none;
+    gx = usable ? gx * scale : none;
+    gy = usable ? gy * scale : none;
+    gz = usable ? gz * scale : none;
     const float16 square = gx * gx + gy * gy + gz * gz;  // 1 to 3, or 0
-    const float16 unit = reciprocal_root(fmax(square, 0.5f));
+    const float16 unit = reciprocal_root(fmax(square, (float16)(0.5f)));
     return color_of(gx * unit) | color_of(gy * unit) << 8 | color_of(gz * unit) << 16 | alpha << 24;
 }
 #endif
@@ -142,7 +143,7 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
             rows[line] = sum;
             rows_x[line] = difference;
             if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < BRICK_SIDE) {
-                alpha[z][y] = select((uint16)(0), (uint16)(255), middle >= extent->opaque);
+                alpha[z][y] = as_uint16(middle >= extent->opaque) & 255u;
                 store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y), middle * extent->scale);
             }
         }

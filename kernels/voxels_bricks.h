@@ -3,6 +3,7 @@
 //
 // From the build: SOURCE_BITS, SOURCE_BRICKS, SOURCE_SLAB and which of them SOURCE is; SAMPLE, what the source holds.
 // Voxels past the ends of the grid repeat the last one.
+#include "direct.h"
 
 #define BRICK 8
 #define BRICK_SIDE 9
