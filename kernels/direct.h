@@ -5,9 +5,9 @@
 // function of it can be inlined: each minimum becomes a call, which costs as much as ten minima and spills all registers. Worse,
 // a vector of 16 floats is passed in another way than such a function expects. The operations here are instructions everywhere.
 //
-// Only where the compiler generates code for the processor directly. Others (of GPUs, of Intel's runtime) do inline their own
-// built-ins, and Oclgrind (INTERPRETED) does not know the operations.
-#if defined(__clang__) && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__)) && !defined(INTERPRETED)
+// Only for packets, and where the compiler generates code for the processor directly. Others (of GPUs, of Intel's runtime)
+// inline their own built-ins, and Oclgrind (INTERPRETED) does not know the operations.
+#if LANES != 1 && defined(__clang__) && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__)) && !defined(INTERPRETED)
 #define DIRECT_BUILT_INS
 #endif
 
