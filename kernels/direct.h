@@ -153,7 +153,9 @@ DIRECT_ROOTS_OF_DOUBLES
 #define sqrt(a) direct_sqrt(a)
 #endif
 
-// The drivers' own names may be macros.
+// The drivers' own names may be macros; PoCL's even are where they are the beginning of a name that JOIN makes.
+#undef vload
+#undef vstore
 #undef vload4
 #undef vload8
 #undef vload16
