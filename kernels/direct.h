@@ -46,13 +46,17 @@
 #else
 #define DIRECT_FLOOR(type)
 #endif
+#define DIRECT_ROUNDED_APART _Pragma("clang fp contract(off)")  // as the libraries do it: pictures keep their bits
 #define DIRECT_REAL(type, bits, sign)                                                                                   \
     DIRECT_ORDER(type)                                                                                                  \
     DIRECT_FLOOR(type)                                                                                                  \
     DIRECT type direct_fmin(type a, type b) { return DIRECT_FMIN(a, b); }                                               \
     DIRECT type direct_fmax(type a, type b) { return DIRECT_FMAX(a, b); }                                               \
     DIRECT type direct_clamp(type a, type low, type high) { return direct_fmin(direct_fmax(a, low), high); }            \
-    DIRECT type direct_mix(type a, type b, type share) { return a + (b - a) * share; }                                  \
+    DIRECT type direct_mix(type a, type b, type share) {                                                                \
+        DIRECT_ROUNDED_APART                                                                                            \
+        return a + (b - a) * share;                                                                                     \
+    }                                                                                                                   \
     DIRECT type direct_fabs(type a) { return as_##type(as_##bits(a) & (bits)(~(sign))); }                               \
     DIRECT type direct_copysign(type a, type b) {                                                                       \
         return as_##type((as_##bits(a) & (bits)(~(sign))) | (as_##bits(b) & (bits)(sign)));                             \
