@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import Any, cast
 
 import clfractal
-from clfractal.device import tune
 from clfractal.device.select import Device, has_float64
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.document import write_document
 from clfractal.optics.view import scene_view
 from clfractal.pictures.outputs import save_outputs
 from clfractal.pictures.tiled import Picture
+from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PrecisionChoice, choose_precision, make_plan
 from clfractal.scene.model import Scene
-from clfractal.work.probe import probe_for
 
 MAX_SAMPLES = 65_536
 PRECISIONS = ("auto", "float32", "float64")
@@ -126,7 +125,7 @@ def prepare(
     plan = make_plan(
         scene,
         precision=used,
-        lanes=tune.best_lanes(device, used, probe=probe_for(device.info), on_start=on_start),
+        lanes=best_lanes(device, used, rule_of(scene.chain), on_start=on_start),
         samples=samples,
         region=region,
         channels=tuple(channels) if channels is not None else None,

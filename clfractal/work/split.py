@@ -6,16 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from clfractal.device import tune
 from clfractal.device.select import Device, has_float64
 from clfractal.files.channels import CHANNELS
 from clfractal.pictures.film import Film
 from clfractal.pictures.tiled import TiledStore
+from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, choose_precision, make_plan
 from clfractal.renderers.worker import Shared
 from clfractal.scene.model import Scene
 from clfractal.work.loop import Progress, ProgressCallback, render_one
-from clfractal.work.probe import probe_for
 
 
 def render_views(
@@ -96,7 +95,7 @@ def _rendered(
     shared: Shared,
 ) -> Film:
     precision, _ = choose_precision(view, view.renderer.precision, has_float64=has_float64(device.info))
-    lanes = tune.best_lanes(device, precision, probe=probe_for(device.info))
+    lanes = best_lanes(device, precision, rule_of(view.chain))
     own = make_plan(
         view,
         precision=precision,

@@ -16,11 +16,12 @@ from pathlib import Path
 
 import pytest
 
-from clfractal.device import isolate, tune
+from clfractal.device import isolate
 from clfractal.device.compiler import Warm
 from clfractal.device.program import math_flags
 from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
+from clfractal.renderers.lanes import best_lanes
 from clfractal.resources import folder as resources
 from clfractal.voxels import programs
 from clfractal.voxels.lattice import EXTENT
@@ -93,7 +94,7 @@ def rendered(device: Device, tmp_path_factory: pytest.TempPathFactory) -> Path:
     where = tmp_path_factory.mktemp("rendered")
     settings = {
         "CLFRACTAL_CACHE": str(where / "cache"),
-        "CLFRACTAL_LANES": str(tune.best_lanes(device, "float32")),
+        "CLFRACTAL_LANES": str(best_lanes(device, "float32")),
         "CLFRACTAL_DEVICE": device.info.index,
         "POCL_CACHE_DIR": str(where / "pocl"),
     }
