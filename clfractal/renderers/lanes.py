@@ -225,7 +225,7 @@ def march(
     flags = program.math_flags(precision)
     built = program.build(device, flat.text, flags=flags, sources=flat.sources, isolated=False)
     met = np.empty((side, side, 2), np.float32)
-    arguments = [
+    arguments: list[Any] = [
         device.buffer(met.nbytes, "the measured picture"),
         *(
             _upload(device, array)
