@@ -1,6 +1,6 @@
 """Which lane count is the fastest on a device: measured once for each device and driver, by the march as it is rendered.
 
-A small picture is marched with each lane count that works (`device/tune.py`): the Mandelbulb by its scalar rule, and hast
+Small pictures are marched with each lane count that works (`device/tune.py`): the Mandelbulb by its scalar rule, and hast
 by its Jacobian, since what fits one into the processor's registers need not fit the other.
 """
 
@@ -34,9 +34,11 @@ RULES: tuple[Rule, ...] = ("scalar", "jacobian")
 _VERSION = 1  # of this measurement: older ones no longer count
 _SECTION = "marches"
 _TIMEOUT_S = 60.0
-# The picture's side: enough work-items for a GPU, and some ten milliseconds on a slow processor.
-_SIDE, _SIDE_GPU = 256, 1024
-_LAUNCHES, _SECONDS = 12, 0.4
+# The pictures' sides: enough work-items for a GPU; on a processor launches of a millisecond, many of which no other program
+# interrupts.
+_SIDES: dict[Rule, int] = {"scalar": 128, "jacobian": 64}
+_SIDE_GPU = 1024
+_LAUNCHES, _SECONDS = 200, 0.5
 _GROUP, _GROUP_GPU = (8, 1), (8, 8)
 
 
@@ -61,17 +63,16 @@ _EXAMPLES: dict[Rule, _Example] = {
 
 @dataclass(frozen=True, slots=True)
 class MarchReport:
-    """How fast one lane count marches, by each rule; `fault` is empty if it may be used."""
+    """How long one lane count takes for a pixel by each rule, nanoseconds; `fault` is empty if it may be used."""
 
     lanes: int
-    scalar_ms: float
-    jacobian_ms: float
-    pixels: int
+    scalar: float
+    jacobian: float
     fault: str
 
-    def milliseconds(self, rule: Rule) -> float:
-        """Of the picture marched by that rule."""
-        return self.scalar_ms if rule == "scalar" else self.jacobian_ms
+    def nanoseconds(self, rule: Rule) -> float:
+        """Of a pixel marched by that rule."""
+        return self.scalar if rule == "scalar" else self.jacobian
 
 
 def rule_of(chain: Chain) -> Rule:
@@ -107,7 +108,7 @@ def best_lanes(
             )
         return int(override)
     reports = march_reports(device, precision, on_start=on_start)
-    return min(reports, key=lambda report: report.milliseconds(rule)).lanes
+    return min(reports, key=lambda report: report.nanoseconds(rule)).lanes
 
 
 def march_reports(
@@ -139,9 +140,9 @@ def march_reports(
 
 
 def pixels_per_second(reports: Sequence[MarchReport]) -> float:
-    """Over both pictures, each with its best lanes."""
-    milliseconds = sum(min(report.milliseconds(rule) for report in reports) for rule in RULES)
-    return 2e3 * reports[0].pixels / milliseconds
+    """Of both rules, half the pixels by each, with its best lanes."""
+    nanoseconds = sum(min(report.nanoseconds(rule) for report in reports) for rule in RULES)
+    return 2e9 / nanoseconds
 
 
 def _once(listener: Callable[[str], None] | None) -> Callable[[str], None]:
@@ -170,7 +171,7 @@ def _measured(
         answer = isolate.run(JOB, device, request, doing=f"marching with {lanes} lanes", timeout_s=_TIMEOUT_S)
         report = MarchReport(lanes=lanes, fault="", **answer)
     except ClfractalError as error:
-        report = MarchReport(lanes, 0.0, 0.0, 0, error.message)
+        report = MarchReport(lanes, 0.0, 0.0, error.message)
     cache.remember(_SECTION, key, asdict(report))
     return report
 
@@ -178,18 +179,16 @@ def _measured(
 def march_job(request: Mapping[str, Any]) -> dict[str, Any]:
     """In a child process: marches the pictures with `request["lanes"]` in `request["precision"]`.
 
-    Returns `pixels`, `scalar_ms` and `jacobian_ms`: the shortest of some launches.
+    Returns `scalar` and `jacobian`: nanoseconds a pixel, in the shortest of some launches.
     """
     device = select.by_key(*request["device"])
     lanes, precision = int(request["lanes"]), request["precision"]
     if select.is_simulator(device.info):
         # It would take minutes, and only tells that wide packets are fewer instructions.
-        return {"pixels": 1, "scalar_ms": 1e6 / lanes, "jacobian_ms": 1e6 / lanes}
-    side = _SIDE_GPU if device.info.kind == "gpu" else _SIDE
+        return dict.fromkeys(RULES, 1000000000.0 / lanes)
+    sides = dict.fromkeys(RULES, _SIDE_GPU) if device.info.kind == "gpu" else _SIDES
     return {
-        "pixels": side * side,
-        "scalar_ms": march(device, precision, lanes, "scalar", side)[0],
-        "jacobian_ms": march(device, precision, lanes, "jacobian", side)[0],
+        rule: 1e6 * march(device, precision, lanes, rule, sides[rule])[0] / sides[rule] ** 2 for rule in RULES
     }
 
 
