@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import clfractal
-from clfractal.device import compiler
+from clfractal.device import isolate
 
 _HAST = {"name": "hast", "iterations": 20}
 _SUN = [{"direction": [0.5, 0.6, -0.62], "shadow": True}]
@@ -42,13 +43,16 @@ SCENES: tuple[dict[str, Any], ...] = (
 
 def main() -> None:
     folder = Path(sys.argv[1])
-    compile_source = compiler.compile_source
+    run = isolate.run
 
-    def recording(device: Any, text: str, flags: Any) -> Any:
-        (folder / f"{len(list(folder.glob('*.cl')))}.cl").write_text(text, encoding="utf-8")
-        return compile_source(device, text, flags)
+    def recording(job: str, device: Any, arguments: Mapping[str, Any], **options: Any) -> Any:
+        if "text" in arguments:
+            number = len(list(folder.glob("*.cl")))
+            (folder / f"{number}.cl").write_text(arguments["text"], encoding="utf-8")
+        return run(job, device, arguments, **options)
 
-    compiler.compile_source = recording
+    # Programs are compiled in child processes, since nothing is in the cache.
+    isolate.run = recording
     for scene in SCENES:
         clfractal.render(clfractal.load_scene(scene))
 
