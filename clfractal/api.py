@@ -114,10 +114,9 @@ def escape(
         DeviceError, KernelBuildError: as for `render`.
     """
     from clfractal.device.select import choose
-    from clfractal.device.tune import best_lanes
     from clfractal.formulas.catalog import load_chain
     from clfractal.renderers import points as launch
-    from clfractal.work.probe import probe_for
+    from clfractal.renderers.lanes import best_lanes, rule_of
 
     chain = load_chain(formula, parameters)
     if precision not in ("float32", "float64"):
@@ -128,7 +127,7 @@ def escape(
     if places.ndim != 2 or places.shape[1] != 3:
         raise FormulaError(f"points must have shape (n, 3), got {places.shape}")
     number, chosen = cast("Precision", precision), choose(device)
-    lanes = best_lanes(chosen, number, probe=probe_for(chosen.info))
+    lanes = best_lanes(chosen, number, rule_of(chain))
     return launch.escape(
         chain, places, int(iterations), device=chosen, lanes=lanes, precision=number, bailout=bailout
     )

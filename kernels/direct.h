@@ -5,9 +5,9 @@
 // function of it can be inlined: each minimum becomes a call, which costs as much as ten minima and spills all registers. Worse,
 // a vector of 16 floats is passed in another way than such a function expects. The operations here are instructions everywhere.
 //
-// Only where the compiler generates code for the processor directly. Others (of GPUs, of Intel's runtime) do inline their own
-// built-ins, and Oclgrind (INTERPRETED) does not know the operations.
-#if defined(__clang__) && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__)) && !defined(INTERPRETED)
+// Only for packets, and where the compiler generates code for the processor directly. Others (of GPUs, of Intel's runtime)
+// inline their own built-ins, and Oclgrind (INTERPRETED) does not know the operations.
+#if LANES != 1 && defined(__clang__) && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__)) && !defined(INTERPRETED)
 #define DIRECT_BUILT_INS
 #endif
 
@@ -46,13 +46,17 @@
 #else
 #define DIRECT_FLOOR(type)
 #endif
+#define DIRECT_ROUNDED_APART _Pragma("clang fp contract(off)")  // as the libraries do it: pictures keep their bits
 #define DIRECT_REAL(type, bits, sign)                                                                                   \
     DIRECT_ORDER(type)                                                                                                  \
     DIRECT_FLOOR(type)                                                                                                  \
     DIRECT type direct_fmin(type a, type b) { return DIRECT_FMIN(a, b); }                                               \
     DIRECT type direct_fmax(type a, type b) { return DIRECT_FMAX(a, b); }                                               \
     DIRECT type direct_clamp(type a, type low, type high) { return direct_fmin(direct_fmax(a, low), high); }            \
-    DIRECT type direct_mix(type a, type b, type share) { return a + (b - a) * share; }                                  \
+    DIRECT type direct_mix(type a, type b, type share) {                                                                \
+        DIRECT_ROUNDED_APART                                                                                            \
+        return a + (b - a) * share;                                                                                     \
+    }                                                                                                                   \
     DIRECT type direct_fabs(type a) { return as_##type(as_##bits(a) & (bits)(~(sign))); }                               \
     DIRECT type direct_copysign(type a, type b) {                                                                       \
         return as_##type((as_##bits(a) & (bits)(~(sign))) | (as_##bits(b) & (bits)(sign)));                             \
@@ -153,7 +157,9 @@ DIRECT_ROOTS_OF_DOUBLES
 #define sqrt(a) direct_sqrt(a)
 #endif
 
-// The drivers' own names may be macros.
+// The drivers' own names may be macros; PoCL's even are where they are the beginning of a name that JOIN makes.
+#undef vload
+#undef vstore
 #undef vload4
 #undef vload8
 #undef vload16

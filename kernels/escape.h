@@ -93,7 +93,7 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
     result.applications = count;
     result.inside = inside;
     if (smooth) {
-        const sphere last = {R(0.0), count, inside};
+        const orbit_end last = {count, inside};
         surface_point surface;
         surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
         surface.square = square;

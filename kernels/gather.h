@@ -26,7 +26,7 @@ typedef mask ints;
 #define equal_ints(a, b) (-((a) == (b)))
 #else
 #define equal_ints(a, b) ((a) == (b))
-#define pick_ints(m, yes, no) select((ints)(no), (ints)(yes), m)
+#define pick_ints(m, yes, no) ((m) ? (ints)(yes) : (ints)(no))
 #endif
 
 #if !REAL_IS_DOUBLE && defined(__has_builtin) && !defined(INTERPRETED)

@@ -21,6 +21,8 @@ typedef float scalar;
 #define REAL_EPSILON 1.1920929e-7f
 #endif
 
+#include "direct.h"
+
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 
@@ -62,7 +64,7 @@ typedef JOIN(int, LANES) mask;
 #define less_equal(a, b) ((real)(a) <= (real)(b))
 #define equal(a, b) ((real)(a) == (real)(b))
 #define is_nan(a) ((a) != (a))
-#define pick(m, yes, no) select((real)(no), (real)(yes), m)
+#define pick(m, yes, no) ((m) ? (real)(yes) : (real)(no))
 #define lanes_store(value, array) JOIN(vstore, LANES)(value, 0, array)
 #define lanes_load(array) JOIN(vload, LANES)(0, array)
 #endif

@@ -68,18 +68,18 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
                        __constant const scalar *k) {
     const vec on_ray = vec_along(m->r.origin, m->t, m->r.direction);
 #if HAS_DERIVATIVE
-    const sphere here = orbit_scalar_distance(on_ray, m->active, orbit, k);
+    const clearance here = orbit_scalar_distance(on_ray, m->active, orbit, k);
 #else
     surface_point surface;
     const vec point = vec_pick(m->proving, m->probe, on_ray);
-    const sphere here = orbit_dual_distance(point, m->active, orbit, k, &surface);
+    const clearance here = orbit_dual_distance(point, m->active, orbit, k, &surface);
 #endif
     // A distance grows no faster than one moves: where the estimate says otherwise it has met a point at which the
     // derivative vanishes, and means nothing.
     real radius = here.step * (real)(settings->step_scale);
     const real cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
-    m->found.count += pick(m->active, here.count, R(0.0));
+    m->found.count += pick(m->active, here.end.count, R(0.0));
 
 #if HAS_DERIVATIVE
     radius = fmin(radius, m->radius_before + m->step_before);
@@ -92,12 +92,12 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
         const vec offset = vec_sub(point, on_ray);
         real arrival = PROOF_ARRIVED * cone;
 #if LOGARITHMIC
-        const mask close = less(potential(here, surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
+        const mask close = less(potential(here.end, surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
         arrival = pick(close, arrival, PROOF_LANDED * cone);
 #endif
         const real along = vec_dot(offset, m->r.direction);
         const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
-        const mask arrived = m->proving & (here.inside | less(radius, arrival)) & ~astray;
+        const mask arrived = m->proving & (here.end.inside | less(radius, arrival)) & ~astray;
         failed = m->proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), m->probes));
         m->found.hit |= arrived;
         m->found.t = pick(arrived, m->t, m->found.t);
@@ -121,7 +121,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     // Over-relaxation (Keinert et al. 2014, sec. 3.1): if this sphere does not touch the one before, something may lie
     // between them, so go back to the end of the one before.
     const mask overshot = marching & less(R(1.0), m->relaxation) & less(radius + m->radius_before, m->step_before);
-    mask inside = marching & ~overshot & here.inside;
+    mask inside = marching & ~overshot & here.end.inside;
 #if POINTS > 1
     // A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time.
     const mask early = inside & less_equal((real)(REAL_LARGEST), m->radius_before) & less(m->r.known, RAY_NOTHING_KNOWN) &
@@ -129,7 +129,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     inside &= ~early;
     m->low = pick(early, fmax(m->t - (real)(settings->known_reach) * cone * m->found.steps, R(0.0)), m->low);
 #endif
-    const mask outside = marching & ~overshot & ~here.inside;
+    const mask outside = marching & ~overshot & ~here.end.inside;
     // (Not where it has only just begun.)
     const mask surprised = inside & ~less(m->high, (real)(REAL_LARGEST)) & less(R(1.5), m->found.steps);
     m->found.bad += pick(surprised, R(1.0), R(0.0));
@@ -139,7 +139,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     m->found.end_surface.gradient = vec_pick(outside, surface.gradient, m->found.end_surface.gradient);
     m->found.end_surface.square = pick(outside, surface.square, m->found.end_surface.square);
     m->found.end_surface.square_before = pick(outside, surface.square_before, m->found.end_surface.square_before);
-    m->found.end_count = pick(outside, here.count, m->found.end_count);
+    m->found.end_count = pick(outside, here.end.count, m->found.end_count);
 #endif
 
     // The pixel's cone touches the solid, or the crossing is narrowed down.

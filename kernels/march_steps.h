@@ -42,7 +42,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     const real step = (real)(settings->step);
     const int narrows = goal == GOAL_SURFACE || goal == GOAL_POINT;
     const vec point = vec_along(m->r.origin, m->t, m->r.direction);
-    const sphere here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
+    const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, here.count, R(0.0));
     const mask inside = m->active & here.inside;

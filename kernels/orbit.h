@@ -7,11 +7,17 @@
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
 
+// How an orbit ended.
 typedef struct {
-    real step;   // distance that is safe to go, in scene units; 0 inside
-    real count;  // applications until |z| > distance bailout
-    mask inside;
-} sphere;
+    real count;   // applications until |z| left the radius that counts, or all
+    mask inside;  // it has not
+} orbit_end;
+
+// How far a point is from the solid.
+typedef struct {
+    real step;  // distance that is safe to go, in scene units; 0 inside
+    orbit_end end;
+} clearance;
 
 // log2 to some 3e-7 for normal positive numbers, enough for a distance estimate: the exponent's bits, and the series of
 // log2(m) = 2 artanh((m - 1) / (m + 1)) / log 2 for m in [1/sqrt 2, sqrt 2]. The built-in one, right to the last bit, would
@@ -59,7 +65,7 @@ INLINE mask settled(real square, __constant const struct Orbit *orbit) {
 }
 
 // Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
-INLINE sphere orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE orbit_end orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
@@ -73,13 +79,14 @@ INLINE sphere orbit_count(vec point, mask active, __constant const struct Orbit 
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->bailout_square));
     }
-    const sphere result = {R(0.0), count, alive};
+    const orbit_end result = {count, alive};
     return result;
 }
 
 // Which points belong to the solid of `limit` applications: the inside of the distances below, without the distance. The
 // solids of fewer applications hold those of more (but for an orbit that comes back from beyond the distance bailout).
-INLINE sphere orbit_solid(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE orbit_end orbit_solid(vec point, mask active, int limit, __constant const struct Orbit *orbit,
+                             __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
@@ -98,7 +105,7 @@ INLINE sphere orbit_solid(vec point, mask active, int limit, __constant const st
 #else
     alive &= settled(square, orbit);
 #endif
-    const sphere result = {R(0.0), count, alive};
+    const orbit_end result = {count, alive};
     return result;
 }
 
@@ -108,7 +115,8 @@ INLINE mask orbit_inside(vec point, mask active, int limit, __constant const str
 
 #if HAS_DERIVATIVE
 // Distance by the formula's own scalar derivative: |z| / g with g carried as one number.
-INLINE sphere orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
+                                       __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     real growth = R(1.0);
@@ -138,7 +146,7 @@ INLINE sphere orbit_scalar_distance(vec point, mask active, __constant const str
 #else
     const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
 #endif
-    const sphere result = {pick(inside, R(0.0), distance), count, inside};
+    const clearance result = {pick(inside, R(0.0), distance), {count, inside}};
     return result;
 }
 #endif
@@ -151,8 +159,8 @@ typedef struct {
 } surface_point;
 
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
-INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
-                                  surface_point *surface) {
+INLINE clearance orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
+                                     surface_point *surface) {
     dual_state c, z;
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
@@ -190,13 +198,13 @@ INLINE sphere orbit_dual_distance(vec point, mask active, __constant const struc
 #endif
     surface->square = square;
     surface->square_before = square_before;
-    const sphere result = {pick(inside, R(0.0), distance), count, inside};
+    const clearance result = {pick(inside, R(0.0), distance), {count, inside}};
     return result;
 }
 
 // Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
 // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
-INLINE real smooth_count(sphere end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
     const real log_radius = (real)(orbit->log_distance_bailout);
 #if LOGARITHMIC
     const real over = log2(R(0.5) * log(fmax(surface.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
@@ -209,13 +217,13 @@ INLINE real smooth_count(sphere end, surface_point surface, __constant const str
 
 #if LOGARITHMIC
 // The potential G = log|z_n| / degree^n, which falls towards the solid.
-INLINE real potential(sphere end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
     return R(0.34657359028) * quick_log2(surface.square) * exp2(-end.count * (real)(orbit->log2_degree));
 }
 #endif
 
 // The distance used for marching: the cheapest that the formula offers.
-INLINE sphere orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
 #if HAS_DERIVATIVE
     return orbit_scalar_distance(point, active, orbit, k);
 #else

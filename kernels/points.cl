@@ -29,7 +29,7 @@ __kernel void escape_counts(__global const scalar *points, __global scalar *resu
                             __constant const struct Orbit *orbit, __constant const scalar *k) {
     const int first = (int)get_global_id(0) * LANES;
     const vec point = load_point(points, stride, first);
-    const sphere end = orbit_count(point, equal(R(0.0), R(0.0)), orbit, k);
+    const orbit_end end = orbit_count(point, equal(R(0.0), R(0.0)), orbit, k);
     store_plane(result, first, end.count);
     store_plane(result, stride + first, pick(end.inside, R(1.0), R(0.0)));
 }
@@ -42,14 +42,14 @@ __kernel void distances(__global const scalar *points, __global scalar *result, 
     const vec point = load_point(points, stride, first);
     const mask all_lanes = equal(R(0.0), R(0.0));
     surface_point surface;
-    const sphere near = orbit_distance(point, all_lanes, orbit, k);
-    const sphere full = orbit_dual_distance(point, all_lanes, orbit, k, &surface);
+    const clearance near = orbit_distance(point, all_lanes, orbit, k);
+    const clearance full = orbit_dual_distance(point, all_lanes, orbit, k, &surface);
     const vec normal = vec_normalize(surface.gradient);
     store_plane(result, first, near.step);
     store_plane(result, stride + first, full.step);
     store_plane(result, 2 * stride + first, normal.x);
     store_plane(result, 3 * stride + first, normal.y);
     store_plane(result, 4 * stride + first, normal.z);
-    store_plane(result, 5 * stride + first, smooth_count(full, surface, orbit));
-    store_plane(result, 6 * stride + first, pick(full.inside, R(1.0), R(0.0)));
+    store_plane(result, 5 * stride + first, smooth_count(full.end, surface, orbit));
+    store_plane(result, 6 * stride + first, pick(full.end.inside, R(1.0), R(0.0)));
 }

@@ -44,16 +44,16 @@ INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
 INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, real *smooth, tally *cost) {
 #if MARCH_KEEPS_SURFACE
     const surface_point surface = met->end_surface;
-    const sphere there = {R(0.0), met->end_count, less(R(1.0), R(0.0))};
+    const clearance there = {R(0.0), {met->end_count, less(R(1.0), R(0.0))}};
 #elif POLISH
     surface_point surface;
-    sphere there;
+    clearance there;
     const real cone = (real)(w.settings->detail) * (r.footprint + r.spread * met->t);
     const real wanted = R(0.5) * cone;
     real t = met->t, before = met->t, height_before = R(0.0);
     for (int i = 0; i < POLISH; ++i) {
         there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, w.orbit, w.k, &surface);
-        cost->count += pick(active, there.count, R(0.0));
+        cost->count += pick(active, there.end.count, R(0.0));
         cost->steps += pick(active, R(1.0), R(0.0));
         if (i == POLISH - 1) break;
         const real height = there.step * (real)(w.settings->step_scale) - wanted;
@@ -67,18 +67,18 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
     met->t = pick(active, t, met->t);
 #else
     surface_point surface;
-    const sphere there = orbit_dual_distance(vec_along(r.origin, met->t, r.direction), active, w.orbit, w.k, &surface);
-    cost->count += pick(active, there.count, R(0.0));
+    const clearance there = orbit_dual_distance(vec_along(r.origin, met->t, r.direction), active, w.orbit, w.k, &surface);
+    cost->count += pick(active, there.end.count, R(0.0));
 #endif
     *normal = vec_normalize(surface.gradient);
     // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
-    const mask flat = less(vec_dot(*normal, *normal), R(0.5)) | there.inside;
+    const mask flat = less(vec_dot(*normal, *normal), R(0.5)) | there.end.inside;
     *normal = vec_pick(flat, vec_scale(r.direction, R(-1.0)), *normal);
     // What is seen does not face away, but for a pixel's width past a rim. A hit on the far side of a sheet thinner than a pixel
     // does: mirrored, it stands for the near side.
     const real away = vec_dot(*normal, r.direction);
     *normal = vec_pick(less(R(0.1), away), vec_along(*normal, R(-2.0) * away, r.direction), *normal);
-    *smooth = smooth_count(there, surface, w.orbit);
+    *smooth = smooth_count(there.end, surface, w.orbit);
 }
 
 // Whether any normal of the spot looks that way. (Were it the mean alone, a rough spot's other normals would go without shadow.)

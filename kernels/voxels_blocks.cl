@@ -1,6 +1,8 @@
 // Which parts of stored bricks may be seen: a bit for each block of 2 x 2 x 2 cells. One work-item takes one brick.
 //
 // From the build: VALUE, the type of a stored value.
+#include "direct.h"
+
 #define BRICK_SIDE 9
 #define BRICK_STRIDE 736
 

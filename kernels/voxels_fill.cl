@@ -36,7 +36,7 @@ INLINE real solid_count(vec point, __constant const struct Orbit *orbit, __const
 #if HAS_SHAPE
     inside = less_equal(solid_distance(z, k), R(0.0));
 #endif
-    const sphere found = {R(0.0), count, inside};
+    const orbit_end found = {count, inside};
     return clamp(smooth_count(found, end, orbit), R(0.0), (real)((scalar)orbit->iterations));
 }
 #endif

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clfractal.commands.shell import Shell
-from clfractal.device import select, tune
+from clfractal.device import select
 from clfractal.device.select import Device, DeviceInfo
 from clfractal.errors import ClfractalError, DeviceError
-from clfractal.work.probe import probe_for
+from clfractal.renderers import lanes
 
 _HEAD = ("", "index", "name", "platform", "memory", "float64", "GL", "lanes", "speed")
 
@@ -23,7 +23,7 @@ def list_devices(shell: Shell) -> None:
     default = select.choose(None)
     rows = [_HEAD]
     for info in select.devices():
-        lanes, speed = _measured(select.by_key(info.index, info.key), shell.say)
+        width, speed = _measured(select.by_key(info.index, info.key), shell.say)
         mark = "*" if info.index == default.info.index else ""
         rows.append(
             (
@@ -34,7 +34,7 @@ def list_devices(shell: Shell) -> None:
                 f"{info.memory / 2**30:.1f} GiB",
                 _yes(info.has_float64),
                 _yes(info.gl_sharing),
-                lanes,
+                width,
                 speed,
             )
         )
@@ -44,16 +44,15 @@ def list_devices(shell: Shell) -> None:
 
 
 def _measured(device: Device, on_start: Callable[[str], None]) -> tuple[str, str]:
-    """The best lane count and its speed, in Mandelbulb points per second."""
+    """The best lane counts, by a scalar rule and by the Jacobian where they differ, and the speed of the march."""
     if select.is_simulator(device.info):
         return "1", "a simulator"
     try:
-        probe = probe_for(device.info)
-        lanes = tune.best_lanes(device, "float32", probe=probe, on_start=on_start)
-        report = tune.lane_reports(device, "float32", (lanes,), probe=probe)[0]
+        best = [lanes.best_lanes(device, "float32", rule, on_start=on_start) for rule in lanes.RULES]
+        speed = lanes.pixels_per_second(lanes.march_reports(device, "float32", on_start=on_start))
     except ClfractalError as error:
         return "-", f"does not work: {error.message}" if isinstance(error, DeviceError) else error.message
-    return str(lanes), f"{report.points_per_second / 1e6:.1f} Mpoints/s" if report.accepted else report.fault
+    return ", ".join(dict.fromkeys(map(str, best))), f"{speed / 1e6:.2f} Mpixels/s"
 
 
 def _platform(info: DeviceInfo) -> str:

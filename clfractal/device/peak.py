@@ -65,7 +65,8 @@ def _text(precision: Precision, width: int, chains: int, steps: int) -> str:
         declarations=", ".join(
             f"{name} = a + ({real})({index} + get_global_id(0))" for index, name in enumerate(names)
         ),
-        body=" ".join(f"{name} = fma({name}, a, b);" for name in names),
+        # Compilers fuse this; `fma` would be a call of the library where a driver cannot inline it.
+        body=" ".join(f"{name} = {name} * a + b;" for name in names),
         total=" + ".join(names),
         sum=" + ".join(lanes),
     )

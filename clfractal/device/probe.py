@@ -1,4 +1,4 @@
-"""The job that finds out, in a child process, whether a lane count works on a device and how fast it is."""
+"""The job that finds out, in a child process, whether a lane count works on a device."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from clfractal.device.structs import Precision
 
 _WIDTH, _ROWS, _LIMIT = 512, 256, 40
 _WIDTH_SIMULATED, _ROWS_SIMULATED = 16, 1
-_LAUNCHES = 5
 _CHECKED = 4  # of the points every fourth in both directions
 
 # A driver is right if its built-in functions are within some units in the last place of ours and all but a
@@ -30,8 +29,7 @@ _HEADERS = '#include "lanes.h"\n#include "probe.cl"\n'
 def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     """Try `request["lanes"]` in `request["precision"]`.
 
-    Returns `milliseconds` (of the fastest of some launches), `points_per_second` and `fault`, a text that is
-    empty if the results are right.
+    Returns `fault`, a text that is empty if the results are right.
     """
     device = by_key(*request["device"])
     precision: Precision = request["precision"]
@@ -44,15 +42,11 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     program = build(device, flat.text, flags=math_flags(precision), sources=flat.sources, isolated=False)
     fault = _built_ins_fault(program, precision, lanes) or _mixed_lanes_fault(program, precision, lanes)
     width, rows = (_WIDTH_SIMULATED, _ROWS_SIMULATED) if is_simulator(device.info) else (_WIDTH, _ROWS)
-    counts, milliseconds = _escape_counts(program, precision, lanes, width, rows)
+    counts = _escape_counts(program, precision, lanes, width, rows)
     differing = np.mean(counts[::_CHECKED, ::_CHECKED] != _expected_counts(width, rows))
     if differing > _COUNTS_MAY_DIFFER:
         fault = fault or f"{differing:.0%} of the escape counts are wrong"
-    return {
-        "milliseconds": milliseconds,
-        "points_per_second": 1e3 * width * rows / milliseconds,
-        "fault": fault,
-    }
+    return {"fault": fault}
 
 
 def _built_ins_fault(program: Program, precision: Precision, lanes: int) -> str:
@@ -97,20 +91,16 @@ def _mixed_lanes_fault(program: Program, precision: Precision, lanes: int) -> st
 
 def _escape_counts(
     program: Program, precision: Precision, lanes: int, width: int, rows: int
-) -> tuple[npt.NDArray[Any], float]:
+) -> npt.NDArray[Any]:
     device = program.device
     counts = np.empty((rows, width), precision)
     buffer = _buffer(device, counts)
     kernel = program.kernel("escape_counts")
     kernel.set_args(buffer, np.int32(width), np.int32(_LIMIT))
-    times = []
     with device.failures("counting escapes"):
-        for _ in range(1 if is_simulator(device.info) else _LAUNCHES):
-            event = cl.enqueue_nd_range_kernel(device.queue, kernel, (counts.size // lanes,), None)
-            event.wait()
-            times.append(1e-6 * (event.profile.end - event.profile.start))
+        cl.enqueue_nd_range_kernel(device.queue, kernel, (counts.size // lanes,), None)
         cl.enqueue_copy(device.queue, counts, buffer)
-    return counts, max(min(times), 1e-3)
+    return counts
 
 
 def _buffer(device: Device, values: npt.NDArray[Any]) -> cl.Buffer:

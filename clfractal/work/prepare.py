@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
-from clfractal.device import tune
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.errors import SceneError, Where, unknown_name
@@ -13,12 +12,12 @@ from clfractal.files.channels import check_channels
 from clfractal.optics.view import seen_by, shown_views
 from clfractal.pictures.compose import Side, composed_channels, eye_regions, picture_size
 from clfractal.pictures.tiles import Region
+from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.work.job import Composition, Identity, Job, Paste, StereoPair
-from clfractal.work.probe import probe_for
 
 MAX_SAMPLES = 65_536
 PRECISIONS = ("auto", "float32", "float64")
@@ -104,7 +103,7 @@ class _Chooser:
             view, cast(PrecisionChoice, wanted), has_float64=has_float64(info), eye=eye
         )
         self.remark = self.remark or remark
-        lanes = tune.best_lanes(self.device, used, probe=probe_for(info), on_start=self.on_start)
+        lanes = best_lanes(self.device, used, rule_of(view.chain), on_start=self.on_start)
         return used, lanes
 
 

@@ -1,7 +1,16 @@
-"""Kernels call nothing of the driver's library of built-in functions, which a compiler may be unable to inline."""
+"""Kernels call nothing of the driver's library of built-in functions, which a compiler may be unable to inline.
+
+What is called is seen in the machine code that PoCL makes. Where that tells nothing (another driver, no `objdump`, a
+library that is inlined on this processor), the test says so; the texts of the programs are looked through everywhere.
+"""
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
+import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,8 +21,33 @@ from clfractal.device.compiler import Warm
 from clfractal.device.program import math_flags
 from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
+from clfractal.renderers.lanes import best_lanes
+from clfractal.resources import folder as resources
 from clfractal.voxels import programs
 from clfractal.voxels.lattice import EXTENT
+from tests.shell import environment
+
+KERNELS = ("surface", "volume", "cut_plane", "fill_bricks", "store_bricks", "classify_bricks", "seen_blocks")
+
+# Functions that are too large to be written out, and what they call in turn (PoCL's `__pocl_...`).
+_TRANSCENDENTAL = "exp|exp2|log|log2|pow|sin|cos|tan|asin|acos|atan|atan2|sincos"
+_ALLOWED = re.compile(rf"_Z\d+(_cl_)?({_TRANSCENDENTAL})[DPfd]|_Z\d+__pocl_|_Z\d+get_|mem(cpy|set)")
+
+# Built-in functions that are no more than some instructions.
+_SMALL = re.compile(
+    r"\b(?:JOIN\()?(fabs|fmin|fmax|fma|mad|floor|ceil|trunc|rint|round|sqrt|rsqrt|native_\w+|half_\w+|copysign|fmod|fdim|ldexp|clamp|mix"
+    r"|step|smoothstep|sign|min|max|dot|cross|length|normalize|distance|select|bitselect|any|all|isnan|isinf|isfinite|signbit"
+    r"|abs|abs_diff|clz|mad24|mul24|mul_hi|rotate|popcount|v(?:load|store)\d*|convert_\w+)"
+    r"(?:\(|, LANES\)\()"
+)
+# Those that stand in parts of a text that packets on a processor do not take.
+_ELSEWHERE = {
+    "any": "where the compiler has no reduction",
+    "convert_float": "of single lanes",
+    "convert_double": "of single lanes",
+    "convert_int": "completed by JOIN",
+    "convert_long": "completed by JOIN",
+}
 
 Build = Callable[[str, programs.Recipe], None]
 
@@ -29,7 +63,7 @@ def build_in_child(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         folder.mkdir(exist_ok=True)
         launch = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
         request = {"text": text, "flags": list(math_flags(recipe.precision)), "warm": launch.as_data()}
-        isolate.end_children()
+        isolate.end_child()
         failure = isolate.run(
             "clfractal.device.compiler:compile_job",
             device,
@@ -52,3 +86,66 @@ def test_programs_that_store_bricks_can_be_loaded_again(build_in_child: Build, r
     text = flatten(recipe.entry, generated=structs, defines=recipe.defines).text
     build_in_child(text, recipe)
     build_in_child(text, recipe)
+
+
+@pytest.fixture(scope="module")
+def rendered(device: Device, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the texts of the programs of small pictures, and what PoCL made of them."""
+    where = tmp_path_factory.mktemp("rendered")
+    settings = {
+        "CLFRACTAL_CACHE": str(where / "cache"),
+        "CLFRACTAL_LANES": str(best_lanes(device, "float32")),
+        "CLFRACTAL_DEVICE": device.info.index,
+        "POCL_CACHE_DIR": str(where / "pocl"),
+    }
+    command = [sys.executable, "-P", str(Path(__file__).with_name("render_and_record.py")), str(where)]
+    ended = subprocess.run(command, env=environment(settings), capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+    return where
+
+
+def calls(folder: Path, kernel: str) -> Counter[str]:
+    """How often the machine code of a kernel calls which function."""
+    found = [path for path in folder.rglob("*.so") if path.name == f"{kernel}.so"]
+    assert found, f"PoCL has left no machine code of {kernel}"
+    names: Counter[str] = Counter()
+    for path in found:
+        listing = subprocess.run(
+            ["objdump", "-d", "--no-show-raw-insn", str(path)], capture_output=True, text=True, check=True
+        ).stdout
+        names.update(re.findall(r"\s(?:call|callq|bl)\s+[0-9a-f]+ <([^>+@]+)", listing))
+    return names
+
+
+def test_the_machine_code_calls_nothing_small(
+    device: Device, rendered: Path, build_in_child: Build, tmp_path: Path
+) -> None:
+    if not is_pocl(device.info):
+        pytest.skip("the machine code of this driver cannot be read; the texts are looked through")
+    if shutil.which("objdump") is None:
+        pytest.skip("there is no objdump (Debian: binutils); the texts are looked through")
+    text = "__kernel void known(__global float8 *a) { a[0] = fmax(a[0], a[1]); }"
+    build_in_child(text, programs.Recipe("", "known", {}, "float32", None, 1, (1, 1), (programs._BUFFER,)))
+    if not calls(tmp_path / "pocl", "known"):
+        pytest.skip(
+            "the library is inlined on this processor, whatever is called; the texts are looked through"
+        )
+    found = {
+        kernel: {name: count for name, count in calls(rendered, kernel).items() if not _ALLOWED.match(name)}
+        for kernel in KERNELS
+    }
+    assert found == {kernel: {} for kernel in KERNELS}
+
+
+def test_the_texts_name_nothing_small_that_is_no_operation(rendered: Path) -> None:
+    direct = (resources("kernels") / "direct.h").read_text(encoding="utf-8")
+    defined = set(re.findall(r"#define (\w+)\(", direct))
+    texts = [path.read_text(encoding="utf-8") for path in rendered.glob("*.cl")]
+    assert len(texts) >= len(KERNELS)
+    for text in texts:
+        assert "direct_fmax" in text
+        code = re.sub(r"//[^\n]*", "", text.replace(direct, ""))
+        named = set(_SMALL.findall(code)) - set(_ELSEWHERE)
+        # `JOIN(vload, LANES)` makes vload8, `JOIN(convert_float, LANES)` convert_float8.
+        named = {f"{name}8" if name in ("vload", "vstore") else name for name in named}
+        assert named <= defined

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device import tune
 from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
+from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.plan import make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -83,7 +83,7 @@ def picture(
     device: Device, name: str, precision: Precision, size: tuple[int, int], lanes: int | None = None
 ) -> npt.NDArray[np.float32]:
     """All channels of a picture, shape (channels, height, width); with the best lane count if none is given."""
-    lanes = lanes or tune.best_lanes(device, precision)
+    lanes = lanes or best_lanes(device, precision)
     # The formula's bounds say where the camera has to be for the picture to be filled.
     far = (0.0, -99.0, 0.0)
     bounds = load_scene(_scene_text(name, far, (0.0, 0.0, 0.0), far, size)).chain

@@ -12,10 +12,11 @@ import pytest
 
 from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
-from clfractal.device.tune import accepted_lanes, best_lanes
+from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import reference
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
+from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.surface import TRAPS, coloring_defines
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of

@@ -11,10 +11,10 @@ import pytest
 from scipy import ndimage
 
 from clfractal.device.select import Device, has_float64
-from clfractal.device.tune import best_lanes
 from clfractal.formulas import reference
 from clfractal.formulas.language import Chain
 from clfractal.pictures.film import Film
+from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.points import escape
 from tests.render.shots import Floats, points_of, scene_of, shoot
 

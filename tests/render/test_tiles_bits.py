@@ -10,10 +10,11 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device, has_float64
-from clfractal.device.tune import accepted_lanes, best_lanes
+from clfractal.device.tune import accepted_lanes
 from clfractal.pictures.film import Film
 from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiles import TileGrid
+from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
 from clfractal.work import engine, loop
 from clfractal.work.engine import Progress

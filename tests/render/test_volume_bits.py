@@ -11,9 +11,10 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device, has_float64
-from clfractal.device.tune import accepted_lanes, best_lanes
+from clfractal.device.tune import accepted_lanes
 from clfractal.files.volume import Volume, write_volume
 from clfractal.pictures.tiles import TileGrid
+from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
-from clfractal.device.tune import best_lanes
 from clfractal.formulas import reference
 from clfractal.formulas.chain import Chain
+from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer

@@ -1,0 +1,137 @@
+"""The fastest lane count: measured by the march in children that may crash, remembered, overridden."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device import cache, child, select, tune
+from clfractal.device.select import Device, choose
+from clfractal.device.tune import accepted_lanes
+from clfractal.errors import DeviceError
+from clfractal.formulas.catalog import load_chain
+from clfractal.renderers import lanes
+from clfractal.renderers.lanes import best_lanes, march, march_reports, rule_of
+
+pytestmark = pytest.mark.conformance
+
+_HERE = "tests.render.test_lanes_measured"
+
+
+def working_job(request: dict[str, Any]) -> dict[str, Any]:
+    return {"fault": ""}
+
+
+def failing_job(request: dict[str, Any]) -> dict[str, Any]:
+    return {"fault": "nonsense"}
+
+
+def rigged_job(request: dict[str, Any]) -> dict[str, Any]:
+    """16 lanes are the fastest by a scalar rule, and 8 by the Jacobian."""
+    scalar, jacobian = {1: (9, 9), 4: (1, 1), 8: (4, 6), 16: (2, 8)}[request["lanes"]]
+    return {"scalar": scalar, "jacobian": jacobian}
+
+
+@pytest.fixture
+def device() -> Device:
+    return choose()
+
+
+@pytest.fixture(autouse=True)
+def _of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(lanes.LANES_VARIABLE, raising=False)
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).resolve().parents[2]))
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
+
+
+@pytest.fixture
+def rigged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tune, "PROBE", f"{_HERE}:working_job")
+    monkeypatch.setattr(lanes, "JOB", f"{_HERE}:rigged_job")
+    monkeypatch.setattr(tune, "vectorises_across_work_items", lambda info: False)
+
+
+@pytest.mark.usefixtures("rigged")
+def test_the_fastest_by_each_rule(device: Device) -> None:
+    told: list[str] = []
+    assert best_lanes(device, "float32", on_start=told.append) == 16
+    assert best_lanes(device, "float32", "jacobian", on_start=told.append) == 8
+    assert told == [f"measuring {device.info.name}, once"]
+    # A pixel by each rule, in 2 ns and in 6 ns.
+    assert cache.recall(select.SPEEDS) == {device.info.key: pytest.approx(2 / 8e-9)}
+
+
+@pytest.mark.usefixtures("rigged")
+def test_a_measurement_is_remembered(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = march_reports(device, "float32")
+    monkeypatch.setenv(child.TEST_ABORT, "lanes")
+    lanes._reports.clear()  # in memory: now they come from the file
+    assert march_reports(device, "float32") == first
+    assert [report.lanes for report in first] == [16, 8]
+
+
+@pytest.mark.usefixtures("rigged")
+def test_a_lane_count_on_which_the_driver_aborts_is_left_out(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(child.TEST_ABORT, "marching with 16 lanes")
+    assert best_lanes(device, "float32") == 8
+
+
+@pytest.mark.usefixtures("rigged")
+def test_narrow_packets_are_tried_where_wide_ones_fail(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tune, "promising", lambda device: ((8,), (4, 1)))
+    monkeypatch.setenv(child.TEST_ABORT, "trying 8 lanes")
+    assert best_lanes(device, "float32", "jacobian") == 4
+
+
+def test_no_lane_count_works(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tune, "PROBE", f"{_HERE}:failing_job")
+    with pytest.raises(DeviceError, match=r"no kernel works on this device: \d+ lanes: nonsense$") as caught:
+        best_lanes(device, "float32")
+    assert caught.value.status == 3
+    assert len(caught.value.details.splitlines()) == 4
+
+
+def test_the_environment_variable(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tune, "PROBE", "never:called")
+    for count in tune.LANE_COUNTS:
+        monkeypatch.setenv(lanes.LANES_VARIABLE, str(count))
+        assert best_lanes(device, "float32") == count
+    for wrong in ("2", "-1", "eight", "08"):
+        monkeypatch.setenv(lanes.LANES_VARIABLE, wrong)
+        message = f"CLFRACTAL_LANES must be one of 1, 4, 8, 16, got '{wrong}'"
+        with pytest.raises(DeviceError, match=message) as caught:
+            best_lanes(device, "float32")
+        assert caught.value.status == 2
+
+
+def test_a_device_without_float64_says_so(device: Device) -> None:
+    lesser = Device(dataclasses.replace(device.info, has_float64=False), device.cl_device)
+    with pytest.raises(DeviceError, match=r"has no float64$"):
+        best_lanes(lesser, "float64")
+
+
+def test_formulas_march_by_their_scalar_rule_if_all_have_one() -> None:
+    assert rule_of(load_chain("mandelbulb")) == "scalar"
+    assert rule_of(load_chain("hast")) == "jacobian"
+
+
+@pytest.mark.parametrize("rule", lanes.RULES)
+def test_what_is_marched_is_the_object(device: Device, rule: lanes.Rule) -> None:
+    """With every lane count the same: rays that meet the set, and places that the light does not reach."""
+    met = {count: march(device, "float32", count, rule, 64)[1] for count in accepted_lanes(device, "float32")}
+    wanted = next(iter(met.values()))
+    hit = wanted[..., 0] > 0
+    assert 0.15 < hit.mean() < 0.6
+    assert 0.01 < wanted[hit, 1].mean() < 0.6
+    assert np.isfinite(wanted).all()
+    for found in met.values():
+        assert ((found[..., 0] > 0) == hit).mean() > 0.99
+        assert np.median(np.abs(found[..., 0] - wanted[..., 0])[hit]) < 1e-4
