@@ -22,6 +22,10 @@ class CancelToken:
         """Whether somebody asked."""
         return self._set.is_set()
 
+    def __call__(self) -> bool:
+        """The same, as a function that what waits for something else may ask."""
+        return self._set.is_set()
+
     def check(self) -> None:
         """Raises Stopped if somebody asked."""
         if self._set.is_set():

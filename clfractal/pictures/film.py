@@ -47,8 +47,9 @@ class Film:
         self._told: dict[str, Any] = {}
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
-        shape = (self.region.height, self.region.width)
-        self._planes = {name: np.full(shape, CHANNELS[name].fill, np.float32) for name in self.channels}
+        self._data = np.empty((len(self.channels), self.region.height, self.region.width), np.float32)
+        self._data[:] = np.array([CHANNELS[name].fill for name in self.channels])[:, None, None]
+        self._planes = dict(zip(self.channels, self._data, strict=True))
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
 
     @property
@@ -106,9 +107,18 @@ class Film:
         tile = self.grid.tile(tile_index)
         check_tile(array, tile, self.channels)
         top, left = tile.y - self.region.y, tile.x - self.region.x
-        for plane, name in zip(array, self.channels, strict=True):
-            self._planes[name][top : top + tile.height, left : left + tile.width] = plane
+        self._data[:, top : top + tile.height, left : left + tile.width] = array
         self._done[tile_index] = True
+
+    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
+        """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""
+        region, data = self.region, self._data
+        boxes = self.grid.boxes(indices).tolist()
+        for (x, y, width, height), array in zip(boxes, film, strict=True):
+            top, left = y % TILE, x % TILE
+            part = array[:, top : top + height, left : left + width]
+            data[:, y - region.y : y - region.y + height, x - region.x : x - region.x + width] = part
+        self._done[indices] = True
 
     def fill(self, planes: Mapping[str, Floats]) -> None:
         """Stores the whole region: of each channel float32 of shape (height, width)."""

@@ -13,7 +13,7 @@ from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Bands, Floats, check_tile
-from clfractal.pictures.tiles import Region, TileGrid
+from clfractal.pictures.tiles import TILE, Region, TileGrid
 
 
 class JournalFilm:
@@ -72,6 +72,17 @@ class JournalFilm:
         """
         check_tile(array, self.grid.tile(tile_index), self.channels)
         self.journal.append(tile_index, array)
+
+    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
+        """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
+
+        Raises:
+            FileError: the journal cannot be written (a full disk).
+        """
+        for index, array in zip(indices.tolist(), film, strict=True):
+            tile = self.grid.tile(index)
+            top, left = tile.y % TILE, tile.x % TILE
+            self.put(index, array[:, top : top + tile.height, left : left + tile.width])
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows).

@@ -52,6 +52,9 @@ class TiledStore(Picture, Protocol):
     def done(self) -> npt.NDArray[np.bool_]:
         """For each tile whether it is there; not to be written to."""
 
+    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
+        """Stores whole tiles: float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""
+
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""
 

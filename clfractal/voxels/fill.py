@@ -154,7 +154,7 @@ class _Filler:
             recipes.append(programs.classify_recipe(source, sample))
         if renderer.normals != "gradient":
             recipes.append(programs.normals_recipe(chain, self.formula, renderer, self.lanes, self.precision))
-        built = programs.build_all(self.device, recipes, on_compile)
+        built = programs.build_all(self.device, recipes, on_compile, self.token)
         kernels = {recipe.kernel: each for recipe, each in zip(recipes, built, strict=True)}
         start = time.perf_counter()
         self._upload()

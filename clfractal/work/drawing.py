@@ -129,6 +129,7 @@ class Drawing:
             sources=text.sources,
             warm=self._warm(kernel.name, len(plan.channels), sizes),
             on_compile=resources.on_compile,
+            stopped=resources.token,
         )
         self.build_ms = built.build_ms
         if self._program is None or built.cl_program is not self._program.cl_program:

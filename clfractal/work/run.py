@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
 from clfractal.pictures.tiled import TiledStore
-from clfractal.pictures.tiles import TILE, Tile
 from clfractal.work.job import Job
 
 Floats = npt.NDArray[np.float32]
@@ -154,9 +153,8 @@ def run(
         DeviceError, KernelBuildError, Stopped: see `Executor.execute`.
         FileError: a store cannot be written.
     """
-    grids = [store.grid for store in stores]
     before = sum(int(np.count_nonzero(store.done)) for store in stores) if samples is None else 0
-    state = Progress(sum(grid.count for grid in grids), before, tiles_before=before)
+    state = Progress(sum(store.grid.count for store in stores), before, tiles_before=before)
     items = []
     for number, (view, store) in enumerate(zip(job.views, stores, strict=True)):
         order = store.grid.order_from_center()
@@ -167,9 +165,8 @@ def run(
     results = executor.execute(job, items, token)
     last, seconds = state.seconds, [0.0] * len(stores)
     for result in results:
-        for index, film in zip(result.tiles.tolist(), result.film, strict=True):
-            tile = grids[result.view].tile(index)
-            stores[result.view].put(index, cut(film, tile))
+        if len(result.tiles):
+            stores[result.view].put_tiles(result.tiles, result.film)
         state.tiles_done += len(result.tiles)
         state.add(result.tally)
         seconds[result.view] += state.seconds - last
@@ -178,9 +175,3 @@ def run(
         if progress is not None:
             progress(state)
     return state
-
-
-def cut(film: Floats, tile: Tile) -> Floats:
-    """The part of a whole tile that lies in the region."""
-    left, top = tile.x % TILE, tile.y % TILE
-    return film[:, top : top + tile.height, left : left + tile.width]
