@@ -15,18 +15,14 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from clfractal import bench
-from clfractal.device.select import Device, choose
-from clfractal.pictures.film import Film
-from clfractal.renderers.volume import VolumeWorker, settings_of
-from clfractal.renderers.workers import WORKERS
+from clfractal.commands import bench
+from clfractal.renderers.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import fill_grid
-from clfractal.voxels.grid import Grid
-from clfractal.work import engine
-from clfractal.work.job import prepare
+from clfractal.work.engine import Engine
+from clfractal.work.films import JobFilms
+from clfractal.work.run import run
 
 RESOLUTIONS = (128, 256, 512, 1024)
 SHOWN = (256, 512, 1024)
@@ -67,46 +63,30 @@ def least(work: Callable[[], float], repetitions: int) -> tuple[float, float]:
     return min(device_times), min(processor_times)
 
 
-def fill(scene: Scene, device: Device) -> Grid:
-    """Fills the scene's grid."""
-    job = prepare(scene, device, precision="float32")
-    return fill_grid(job.scene, settings_of(job.scene), device, lanes=job.plan.lanes, precision="float32")
-
-
-def fill_ms(scene: Scene, device: Device) -> float:
+def fill_ms(scene: Scene, engine: Engine) -> float:
     """Fills the scene's grid; milliseconds on the device."""
-    stats = fill(scene, device).stats
+    job = engine.prepare(scene, precision="float32")
+    grid = fill_grid(job.scene, settings_of(job.scene), engine.device, lanes=job.lanes, precision="float32")
+    stats = grid.stats
     return stats.octree_ms + stats.fill_ms + stats.store_ms + stats.normals_ms
 
 
-def frame_ms(scene: Scene, device: Device) -> float:
-    """Draws the scene into memory; milliseconds on the device."""
-    job = prepare(scene, device, precision="float32")
-    film = Film(job.plan.channels, (job.scene.image.width, job.scene.image.height), job.plan.region)
-    return engine.render(job.scene, job.plan, device, film).kernel_ms
+def frame_ms(scene: Scene, engine: Engine) -> float:
+    """Draws the scene into memory; milliseconds on the device. The engine keeps its grid."""
+    job = engine.prepare(scene, precision="float32")
+    return run(job, JobFilms(job).films, engine.executor).kernel_ms
 
 
-def show(grid: Grid) -> None:
-    """From now on the volume renderer has this grid, and fills none."""
-
-    class Shown(VolumeWorker):
-        def _fill(self, settings: VolumeRenderer) -> Grid:
-            return grid
-
-    WORKERS["volume"] = Shown
-
-
-def figures(device: Device, repetitions: int, largest: int, most: int) -> Iterator[Figure]:
+def figures(engine: Engine, repetitions: int, largest: int, most: int) -> Iterator[Figure]:
     """Every line of the table, up to grids of `largest` voxels a side and pictures of `most` megapixels."""
 
-    def figure(row: str, size: str, work: Callable[[Scene, Device], float], scene: Scene) -> Figure:
-        return Figure(row, size, *least(lambda: work(scene, device), repetitions))
+    def figure(row: str, size: str, work: Callable[[Scene, Engine], float], scene: Scene) -> Figure:
+        return Figure(row, size, *least(lambda: work(scene, engine), repetitions))
 
     sizes = [megapixels for megapixels in MEGAPIXELS if megapixels <= most]
     for resolution in (n for n in RESOLUTIONS if n <= largest):
         yield figure("grid", f"{resolution}^3", fill_ms, scene_of(bench.VOLUME, resolution=resolution))
     for resolution in (n for n in SHOWN if n <= largest):
-        show(fill(scene_of(bench.VOLUME, resolution=resolution), device))
         for surface in (False, True):
             row = "volume, a surface" if surface else "volume, composited"
             for megapixels in sizes:
@@ -129,7 +109,7 @@ def main() -> int:
     if arguments.repetitions < 1:
         parser.error("--repetitions: must be at least 1")
     print("| row | size | ms on the device | ms of processor time |\n|---|---|--:|--:|")
-    for one in figures(choose(arguments.device), arguments.repetitions, arguments.largest, arguments.most):
+    for one in figures(Engine(arguments.device), arguments.repetitions, arguments.largest, arguments.most):
         print(f"| {one.row} | {one.size} | {one.device_ms:.0f} | {one.processor_ms:.0f} |", flush=True)
     return 0
 

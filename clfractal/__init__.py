@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from clfractal.api import load_scene as load_scene
     from clfractal.api import render as render
     from clfractal.api import render_pair as render_pair
+    from clfractal.device.cancel import CancelToken as CancelToken
     from clfractal.device.select import devices as devices
     from clfractal.errors import ClfractalError as ClfractalError
     from clfractal.errors import DeviceError as DeviceError
@@ -25,9 +26,12 @@ if TYPE_CHECKING:
     from clfractal.errors import FormulaError as FormulaError
     from clfractal.errors import KernelBuildError as KernelBuildError
     from clfractal.errors import SceneError as SceneError
+    from clfractal.errors import Stopped as Stopped
     from clfractal.pictures.film import Film as Film
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
+    from clfractal.work.engine import Engine as Engine
+    from clfractal.work.run import Progress as Progress
 
 __version__ = "0.1.0"
 
@@ -36,6 +40,7 @@ _HOMES = {
     "load_scene": "clfractal.api",
     "render": "clfractal.api",
     "render_pair": "clfractal.api",
+    "CancelToken": "clfractal.device.cancel",
     "devices": "clfractal.device.select",
     "ClfractalError": "clfractal.errors",
     "DeviceError": "clfractal.errors",
@@ -43,9 +48,12 @@ _HOMES = {
     "FormulaError": "clfractal.errors",
     "KernelBuildError": "clfractal.errors",
     "SceneError": "clfractal.errors",
+    "Stopped": "clfractal.errors",
     "Film": "clfractal.pictures.film",
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
+    "Engine": "clfractal.work.engine",
+    "Progress": "clfractal.work.run",
 }
 
 

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FormulaError, SceneError, Where
+from clfractal.errors import FormulaError
 from clfractal.scene.load import load_scene as load_scene
 from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
     from clfractal.device.structs import Precision
-    from clfractal.pictures.compose import Side
     from clfractal.pictures.film import Film
-    from clfractal.work.engine import ProgressCallback
-    from clfractal.work.pair import Pair
+    from clfractal.work.run import ProgressCallback
 
 __all__ = ["escape", "load_scene", "render", "render_pair"]
 
@@ -38,7 +36,7 @@ def render(
     Args:
         scene: a Scene, or what `load_scene` takes: a path, YAML text, or plain data.
         device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; None: CLFRACTAL_DEVICE, else the best.
-        progress: called with a `render.engine.Progress` after each batch of tiles; an exception in it ends
+        progress: called with a `clfractal.Progress` after each batch of tiles; an exception in it ends
             the render.
         precision: `auto`, `float32` or `float64`; None: the scene's.
         samples: rays per pixel; None: the scene's.
@@ -54,35 +52,12 @@ def render(
         DeviceError: no device, an unknown one, too little memory on it, or it failed.
         KernelBuildError: the generated program does not compile.
     """
-    import time
+    from clfractal.work.engine import Engine
 
-    loaded = scene if isinstance(scene, Scene) else load_scene(scene)
-    if loaded.stereo is not None:
-        from clfractal.work.pair import composed
-
-        if loaded.stereo.mode in ("pair", "multi_view"):
-            raise SceneError(
-                f"{loaded.stereo.mode} keeps both eyes' pictures; use render_pair, or another mode",
-                Where(path="stereo.mode"),
-            )
-        pair, films = _rendered_pair(
-            loaded, device, progress, precision=precision, samples=samples, region=region, channels=channels
+    with Engine(device) as engine:
+        return engine.render(
+            scene, progress, precision=precision, samples=samples, region=region, channels=channels
         )
-        return composed(pair, films).to_film()
-    from clfractal.device.select import choose
-    from clfractal.pictures.film import Film
-    from clfractal.work import engine
-    from clfractal.work import job as jobs
-
-    job = jobs.prepare(
-        loaded, choose(device), precision=precision, samples=samples, region=region, channels=channels
-    )
-    size = (loaded.image.width, loaded.image.height)
-    film = Film(job.plan.channels, size, job.plan.region, job.header())
-    start = time.perf_counter()
-    engine.render(loaded, job.plan, job.device, film, progress)
-    film.header["seconds"] = time.perf_counter() - start
-    return film
 
 
 def render_pair(
@@ -101,46 +76,10 @@ def render_pair(
     Returns:
         The left eye's film and the right one's, of `image`'s size (of half of it in the squeezed modes).
     """
-    loaded = scene if isinstance(scene, Scene) else load_scene(scene)
-    if loaded.stereo is None:
-        raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
-    if loaded.stereo.mode not in (
-        "pair",
-        "split_half",
-        "over_under_half",
-    ):  # the others may need less of a pair
-        loaded = loaded.model_copy(update={"stereo": loaded.stereo.model_copy(update={"mode": "pair"})})
-    _, films = _rendered_pair(
-        loaded, device, progress, precision=precision, samples=samples, channels=channels
-    )
-    return films["left"], films["right"]
+    from clfractal.work.engine import Engine
 
-
-def _rendered_pair(
-    scene: Scene,
-    device: str | None,
-    progress: ProgressCallback | None,
-    *,
-    region: tuple[int, int, int, int] | None = None,
-    **settings: Any,
-) -> tuple[Pair, dict[Side, Film]]:
-    """How a stereo scene was rendered, and the films of the eyes that its mode needs."""
-    from clfractal.device.select import choose
-    from clfractal.pictures.film import Film
-    from clfractal.work.pair import prepare_pair, render_eyes
-
-    pair = prepare_pair(scene, choose(device), region=region, **settings)
-    films: dict[Side, Film] = {
-        side: Film(
-            job.plan.channels,
-            (job.scene.image.width, job.scene.image.height),
-            job.plan.region,
-            pair.header(side),
-        )
-        for side, job in pair.eyes.items()
-    }
-    render_eyes(pair, films, progress)
-    return pair, films
+    with Engine(device) as engine:
+        return engine.render_pair(scene, progress, precision=precision, samples=samples, channels=channels)
 
 
 def escape(

@@ -28,6 +28,10 @@ class Where:
         return "".join(f"{part}: " for part in (place, self.path) if part)
 
 
+class Stopped(Exception):  # noqa: N818
+    """The work was cancelled, by its token or by whoever waited for it. No error: nothing is told to the user."""
+
+
 class ClfractalError(Exception):
     """Base of every error meant for the user.
 

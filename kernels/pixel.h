@@ -10,6 +10,11 @@ typedef struct {
     real smooth, steps;   // escape count; evaluations
 } shot;
 
+// What rays cost: distance evaluations (of a volume: places looked at), formula applications, and steps that ended inside.
+typedef struct {
+    real steps, count, bad;
+} tally;
+
 // Sums over the shots of a pixel, and what the one nearest to its middle found.
 typedef struct {
     color radiance;

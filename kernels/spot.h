@@ -2,11 +2,6 @@
 #define COLORING_PER_POINT \
     (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
 
-// What a packet has cost.
-typedef struct {
-    real steps, count, bad;
-} tally;
-
 // What a shot reads, in one place.
 typedef struct {
     __constant const struct View *view;

@@ -6,6 +6,7 @@ typedef struct {
     __constant const struct Light *lights;
     __global const float *transfer;   // TRANSFER_SIZE entries: opacity of a step, red, green, blue
     grid grid;
+    __constant const struct Sampling *sampling;
 #if PLANES > 0
     plane_set planes;
 #endif

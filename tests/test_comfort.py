@@ -119,8 +119,8 @@ class TestMeasured:
     def test_a_pictures_depth_tells_what_its_points_do(self, device: Device, convergence: str) -> None:
         """The range over all pixels, and over all of a part of them; of none there is no range."""
         scene = seen("solids", convergence=convergence)
-        view = scene_view(scene.seen_by("left"))
-        depth = shoot(scene.seen_by("left"), device, channels=("Z",))["Z"]
+        view = scene_view(*seen_by(scene, "left"))
+        depth = shoot(seen_by(scene, "left"), device, channels=("Z",))["Z"]
         for y, x, part in ((0, 0, depth), (30, 20, depth[30:60, 20:90])):
             found = comfort_of_depth(scene, view, part, SIZE, (x, y))
             assert found is not None
@@ -147,8 +147,8 @@ class TestFitted:
         assert look.nearest < 0 < look.farthest
         assert look.nearest_degrees == pytest.approx(-look.farthest_degrees, rel=0.06)
         for side in ("left", "right"):
-            film = shoot(found.seen_by(side), device, channels=("Z",))
-            points = points_of_depth(scene_view(found.seen_by(side)), film["Z"], (400, 330))
+            film = shoot(seen_by(found, side), device, channels=("Z",))
+            points = points_of_depth(scene_view(*seen_by(found, side)), film["Z"], (400, 330))
             assert comfort_of(found, points).worst_degrees <= budget
         # And it is used: either the eyes are as far apart as they may be, or the depth takes up nearly all of it.
         assert found.stereo.separation == 1 or look.worst_degrees > 0.9 * budget

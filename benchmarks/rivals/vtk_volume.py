@@ -45,13 +45,12 @@ class VtkVolume:
         from clfractal.renderers.volume import settings_of
         from clfractal.scene.load import load_scene
         from clfractal.voxels.fill import fill_grid
-        from clfractal.work.job import prepare
+        from clfractal.work.prepare import prepare
 
         version = vtk.vtkVersion()
-        job = prepare(load_scene(VOLUME), choose(), precision="float32")
-        grid = fill_grid(
-            job.scene, settings_of(job.scene), job.device, lanes=job.plan.lanes, precision="float32"
-        )
+        device = choose()
+        job = prepare(load_scene(VOLUME), device, precision="float32")
+        grid = fill_grid(job.scene, settings_of(job.scene), device, lanes=job.lanes, precision="float32")
         values = np.ascontiguousarray(grid.dense())
         image = vtk.vtkImageData()
         image.SetDimensions(*grid.shape)

@@ -20,13 +20,16 @@ from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, DeviceError, Where
 from clfractal.files.atomic import atomic_writer
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.pictures.film import Film
 from clfractal.renderers.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.fill import fill_grid
-from clfractal.work import engine
-from clfractal.work.job import Job, prepare
+from clfractal.work.engine import Engine
+from clfractal.work.films import JobFilms
+from clfractal.work.job import Job
+from clfractal.work.prepare import prepare
+from clfractal.work.run import Progress
+from clfractal.work.run import run as do
 
 REPETITIONS = 7
 STILL_REPETITIONS = 3
@@ -176,9 +179,10 @@ def _cell(value: float | None, width: int, digits: int, factor: float = 1.0, uni
 
 def _render_row(name: str, scene: Scene, device: Device, peak: float, repetitions: int) -> Row:
     """One scene, rendered into memory again and again; the first time builds the program and does not count."""
-    job = prepare(scene, device, precision="float32")
-    _once(job)
-    results = [_once(job) for _ in range(repetitions)]
+    engine = Engine(device)
+    job = engine.prepare(scene, precision="float32")
+    _once(job, engine)
+    results = [_once(job, engine) for _ in range(repetitions)]
     state = results[0][1]
     kernel_ms = statistics.median(state.kernel_ms for _, state in results)
     operations = state.iterations * operations_per_application(job.scene.chain)
@@ -190,30 +194,43 @@ def _render_row(name: str, scene: Scene, device: Device, peak: float, repetition
         iterations_per_s=1e3 * state.iterations / kernel_ms,
         steps_per_ray=state.steps_per_ray,
         fma_share=operations / (1e-3 * kernel_ms) / (1e9 * peak),
-        lanes=job.plan.lanes,
+        lanes=job.lanes,
     )
 
 
-def _once(job: Job) -> tuple[float, engine.Progress]:
-    size = (job.scene.image.width, job.scene.image.height)
-    film = Film(job.plan.channels, size, job.plan.region)
+def _once(job: Job, engine: Engine) -> tuple[float, Progress]:
+    films = JobFilms(job)
     start = time.perf_counter()
-    state = engine.render(job.scene, job.plan, job.device, film)
+    state = do(job, films.films, engine.executor)
     return time.perf_counter() - start, state
+
+
+def _frames_row(name: str, frames: Sequence[Scene], device: Device) -> Row:
+    """Frames of one engine, one after the other; times are of a frame, and what is before the first does not count."""
+    kernel_ms: list[float] = []
+    with Engine(device) as engine:
+        engine.render(frames[0])
+        times = []
+        for frame in frames:
+            start = time.perf_counter()
+            engine.render(frame, lambda state: kernel_ms.append(state.kernel_ms))
+            times.append((kernel_ms[-1], 1e3 * (time.perf_counter() - start)))
+    ms, wall_ms = (statistics.median(column) for column in zip(*times, strict=True))
+    return Row(name, ms=ms, wall_ms=wall_ms)
 
 
 def _grid_row(device: Device) -> Row:
     """Filling the grid of row 5: octree, values and normals."""
     job = prepare(load_scene(VOLUME), device, precision="float32")
-    settings = settings_of(job.scene)
+    settings, lanes = settings_of(job.scene), job.lanes
     times = []
     for _ in range(STILL_REPETITIONS + 1):
         start = time.perf_counter()
-        stats = fill_grid(job.scene, settings, device, lanes=job.plan.lanes, precision="float32").stats
+        stats = fill_grid(job.scene, settings, device, lanes=lanes, precision="float32").stats
         on_device = stats.octree_ms + stats.fill_ms + stats.store_ms + stats.normals_ms
         times.append((on_device, 1e3 * (time.perf_counter() - start) - stats.build_ms))
     ms, wall_ms = (statistics.median(column) for column in zip(*times[1:], strict=True))
-    return Row(GRID_ROW, ms=ms, wall_ms=wall_ms, lanes=job.plan.lanes)
+    return Row(GRID_ROW, ms=ms, wall_ms=wall_ms, lanes=lanes)
 
 
 def _shell_row(device: Device) -> Row:

@@ -44,13 +44,12 @@ def check_scene(
 
 def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, str, str]:
     """The scene as it is rendered, the range of its parallax, and a warning or nothing."""
-    from clfractal.device.select import choose
     from clfractal.work.comfort import fitted, measured
-    from clfractal.work.engine import Shared
+    from clfractal.work.engine import Engine
 
-    device, shared = choose(wanted), Shared()
-    found = fitted(scene, device, shared=shared, on_compile=shell.say)
-    comfort = measured(found, device, shared=shared, on_compile=shell.say)
+    look = Engine(wanted, tell=shell.say).look
+    found = fitted(scene, look)
+    comfort = measured(found, look)
     if comfort is None:
         return found, "parallax: nothing is seen", ""
     return found, comfort.sentence(), comfort.warning()
@@ -59,20 +58,17 @@ def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, st
 def _eyes(scene: Scene) -> list[str]:
     """Where the viewer's eyes are in the scene, which moves the camera, and what lies on the screen."""
     from clfractal.optics.stereo import eye_views, relation
+    from clfractal.optics.view import shown_views
     from clfractal.scene.cut_plane import CutPlaneRenderer
 
-    views = (
-        [(f"layout.views.{number}: ", view) for number, (view, _) in enumerate(scene.views)]
-        if scene.layout
-        else []
-    )
     lines = []
-    for name, view in views or [("", scene)]:
+    for number, (view, eye, _) in enumerate(shown_views(scene)):
+        name = f"layout.views.{number}: " if scene.layout else ""
         assert view.stereo is not None
         if isinstance(view.renderer, CutPlaneRenderer):
             lines.append(f"{name}stereo: a cut plane by itself is flat; both eyes see it on the screen")
             continue
-        seen = eye_views(view)
+        seen = eye_views(view, eye)
         middle, left, right = (seen[eye] for eye in ("middle", "left", "right"))
         moved = f", moved from {_point(view.camera.position)}" if view.stereo.plane is None else ""
         lines += [

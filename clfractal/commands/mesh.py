@@ -36,6 +36,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 
 if TYPE_CHECKING:
+    from clfractal.device.select import Device
     from clfractal.work.job import Job
 
 _NPY = b"\x93NUMPY"
@@ -46,6 +47,7 @@ class _Made:
     """What a grid comes from, and what its surface is to look like."""
 
     job: Job
+    device: Device
     coloring: Coloring
 
 
@@ -112,9 +114,9 @@ def _of_scene(order: Order, level: float | None, shell: Shell) -> _Found:
     volume = given_volume(order, scene)
     if volume is not None:
         return _of_given(order, scene, volume, level, shell)
-    grid, job = fill(order, scene, shell)
+    grid, job, device = fill(order, scene, shell)
     volume = grid_volume(grid, job, coloring)
-    return _Found(volume, _stored(level, volume, job.scene), _Made(job, coloring), False)
+    return _Found(volume, _stored(level, volume, job.scene), _Made(job, device, coloring), False)
 
 
 def _of_given(order: Order, scene: Scene, volume: Volume, level: float | None, shell: Shell) -> _Found:
@@ -176,7 +178,7 @@ def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
     if not text or not ("\n" in text or text.startswith("{")):  # else it would be the name of a file
         return None
     from clfractal.device.select import choose
-    from clfractal.work import job as jobs
+    from clfractal.work.prepare import prepare
 
     folder = Path(order.source).parent
     try:
@@ -193,7 +195,8 @@ def _made(order: Order, volume: Volume, shell: Shell) -> _Made | None:
         return None
     if not _is_along_axes(volume):
         return None
-    return _Made(jobs.prepare(scene, choose(order.device), on_start=shell.say), coloring)
+    device = choose(order.device)
+    return _Made(prepare(scene, device, on_start=shell.say), device, coloring)
 
 
 def _text(made: _Made) -> str:
@@ -243,6 +246,7 @@ def _dressed(mesh: Mesh, made: _Made, volume: Volume, tell: Teller, shell: Shell
     from clfractal.renderers.vertices import COLORED_BY, dress, on_faces
 
     job, by = made.job, made.coloring.by
+    plan = job.views[0].plan
     if by not in COLORED_BY:
         shell.say(f"coloring.by: {by} is not known of vertices; they get the material's colour")
     spacing = np.diag(volume.directions)
@@ -251,9 +255,9 @@ def _dressed(mesh: Mesh, made: _Made, volume: Volume, tell: Teller, shell: Shell
         mesh,
         job.scene,
         made.coloring,
-        job.device,
-        lanes=job.plan.lanes,
-        precision=job.plan.precision,
+        made.device,
+        lanes=plan.lanes,
+        precision=plan.precision,
         voxel=float(volume.spacing.min()),
         flat=on_faces(mesh.vertices, volume.origin - spacing / 2, spacing, (x, y, z)),
         progress=tell.of("normals"),

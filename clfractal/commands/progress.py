@@ -10,7 +10,7 @@ from clfractal.commands.shell import Shell
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-    from clfractal.work.engine import Progress
+    from clfractal.work.run import Progress
 
 BAR_AFTER_SECONDS = 0.5
 """Quick renders show no bar: the library that draws it takes longer to load than they take."""

@@ -7,19 +7,15 @@ import os
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
 from clfractal.commands.progress import Reporter
 from clfractal.commands.shell import Shell
-from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-
-if TYPE_CHECKING:
-    from clfractal.pictures.store import JournalFilm
 
 
 def render_scene(order: Order, shell: Shell) -> None:
@@ -27,61 +23,55 @@ def render_scene(order: Order, shell: Shell) -> None:
 
     Raises:
         ClfractalError: anything wrong with the input, the files or the device. Work that was done stays in
-            the first output's `.partial` file.
+            the first output's `.partial` file, and in those beside it where a picture has several views.
     """
     start = time.perf_counter()
     region = _region(order.region)
     shell.mute_drivers()
     scene = ordered_scene(order)
     outputs = _outputs(order, scene)
-    if scene.stereo is not None:
-        from clfractal.commands.stereo import render_stereo
-
-        render_stereo(order, scene, outputs, region, shell, start)
-        return
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
     from clfractal.commands import stats
-    from clfractal.device.select import choose
-    from clfractal.pictures.store import JournalFilm
-    from clfractal.work import engine
-    from clfractal.work import job as jobs
+    from clfractal.commands.unfinished import Unfinished
+    from clfractal.pictures.outputs import output_files
+    from clfractal.work.comfort import comfort_of_job
+    from clfractal.work.engine import Engine
+    from clfractal.work.run import run
+    from clfractal.work.save import save_job
 
-    job = jobs.prepare(scene, choose(order.device), region=region, on_start=shell.say)
+    engine = Engine(order.device, tell=shell.say)
+    with speaking_of(order.scene):
+        job = engine.prepare(scene, region=region, samples=order.samples, precision=order.precision)
     if job.remark:
         shell.say(f"{order.scene}: {job.remark}")
-    partial = outputs[0].with_name(outputs[0].name + PARTIAL)
-    if partial.exists() and not order.resume:
-        shell.say(f"{partial}: earlier work is dropped; --resume would continue it")
-    size = (scene.image.width, scene.image.height)
-    film = JournalFilm(
-        partial, job.identity(), job.plan.channels, size, job.plan.region, job.header(), resume=order.resume
-    )
-    reporter = Reporter(shell, film.grid.count)
-    shell.state = lambda: _interrupted(partial, film)
-    try:
-        state = engine.render(scene, job.plan, job.device, film, reporter, on_compile=shell.say)
-        reporter.close()
+    header = job.header()
+    with Unfinished(job, header, outputs[0], shell, resume=order.resume) as unfinished:
+        reporter = Reporter(shell, job.tiles)
+        shell.state = unfinished.interrupted
+        try:
+            state = run(job, unfinished.films, engine.executor, progress=reporter)
+        finally:
+            reporter.close()
         rendered = time.perf_counter()
-        film.header["seconds"] = rendered - state.started
-        job.save(film, outputs)
-    except BaseException:
-        reporter.close()
-        if film.done.any():
-            film.close()
-        else:
-            film.discard()
-        raise
-    film.discard()
-    written = time.perf_counter()
+        save_job(job, unfinished.films, outputs, header)
+        written = time.perf_counter()
+        comfort = comfort_of_job(job, unfinished.films, engine.look)
     shell.state = lambda: "clfractal: interrupted"
     values = stats.statistics(
         job, state, wall_ms=1e3 * (written - start), write_ms=1e3 * (written - rendered)
     )
+    if job.scene.stereo is not None:
+        values["stereo"] = stats.of_stereo(job, comfort)
     if order.stats is not None:
         stats.write_statistics(order.stats, values)
-    shell.say(f"{', '.join(map(str, outputs))}: {reporter.summary(state, written - start)}")
+    files = [file for path in outputs for file in output_files(job.scene.stereo, path)]
+    shell.say(f"{', '.join(map(str, files))}: {reporter.summary(state, written - start)}")
+    if comfort is not None and comfort.warning():
+        shell.say(f"{order.scene}: {comfort.warning()}")
     if shell.verbose:
         shell.say(stats.sentence(values))
+        if comfort is not None:
+            shell.say(comfort.sentence())
 
 
 def ordered_scene(order: Order) -> Scene:
@@ -131,24 +121,11 @@ def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
     if not order.outputs and os.path.realpath(outputs[0]) == os.path.realpath(source):
         raise FileError("would be replaced by its own picture; name an output with -o", Where(order.scene))
     from clfractal.pictures.outputs import check_output as check_picture
+    from clfractal.pictures.outputs import output_files
 
     for path in outputs:
-        for file in _files(scene, path):
+        for file in output_files(scene.stereo, path):
             check_picture(file, scene.output.channels)
     if order.stats is not None:
         check_output(order.stats, (order.stats.suffix.lower(),))
     return outputs
-
-
-def _files(scene: Scene, path: Path) -> list[Path]:
-    """What is written for an output."""
-    if scene.stereo is None:
-        return [path]
-    from clfractal.work.pair import output_files
-
-    return output_files(scene.stereo, path)
-
-
-def _interrupted(partial: Path, film: JournalFilm) -> str:
-    done = int(film.done.sum())
-    return f"{partial}: interrupted with {done} of {film.grid.count} tiles done; --resume continues"

@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from clfractal.commands.render import PARTIAL, Order, ordered_scene
+from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import FileError, SceneError, Where
 from clfractal.scene.cut_plane import CutPlaneRenderer
@@ -21,8 +20,7 @@ from clfractal.scene.plane import moved
 
 if TYPE_CHECKING:
     from clfractal.device.select import Device
-    from clfractal.pictures.film import Film
-    from clfractal.pictures.store import JournalFilm
+    from clfractal.work.engine import Engine
     from clfractal.work.job import Job
 
 MOST_SLICES = 100_000
@@ -64,17 +62,18 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     _check_files(order, scene, files)
     scenes = [slice_scene(scene, stack, number) for number in numbers]
     # Imported only now: a mistake in the input is told without waiting for OpenCL.
-    from clfractal.device.select import choose
+    from clfractal.work.engine import Engine
 
-    device = choose(order.device)
-    precision = _precision(scenes, device)
+    engine = Engine(order.device, tell=shell.say)
+    precision = order.precision or _precision(scenes, engine.device)
     told, rays, number = begun, 0, stack.start
     shell.state = lambda: (
         f"{files[number - stack.start][0]}: interrupted with {number - 1} of {stack.count} slices done;"
         f" --start {number} continues"
     )
     for number, each, paths in zip(numbers, scenes, files, strict=True):
-        rays += _render(each, device, precision, paths, shell)
+        job = engine.prepare(each, precision=precision, samples=order.samples)
+        rays += _rendered(job, engine, paths, shell)
         now = time.perf_counter()
         if now - told > _LINE_SECONDS and number < stack.count:
             told = now
@@ -145,30 +144,20 @@ def _precision(scenes: list[Scene], device: Device) -> str:
     return max(found)
 
 
-def _render(scene: Scene, device: Device, precision: str, paths: tuple[Path, ...], shell: Shell) -> int:
-    """One slice; gives the number of its samples."""
-    from clfractal.work import engine
-    from clfractal.work import job as jobs
+def _rendered(job: Job, engine: Engine, paths: tuple[Path, ...], shell: Shell) -> int:
+    """One slice, written to its files; gives the number of its samples."""
+    from clfractal.commands.unfinished import Unfinished
+    from clfractal.work.films import JobFilms
+    from clfractal.work.run import run
+    from clfractal.work.save import save_job
 
-    job = jobs.prepare(scene, device, precision=precision, on_start=shell.say)
-    film, discard = _film(job, paths[0].with_name(paths[0].name + PARTIAL))
-    try:
-        state = engine.render(scene, job.plan, device, film, on_compile=shell.say)
-        film.header["seconds"] = state.seconds
-        job.save(film, paths)
-    finally:
-        discard()
+    header = job.header()
+    if 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
+        films = JobFilms(job)
+        state = run(job, films.films, engine.executor)
+        save_job(job, films.films, paths, header)
+    else:
+        with Unfinished(job, header, paths[0], shell, resume=False) as unfinished:
+            state = run(job, unfinished.films, engine.executor)
+            save_job(job, unfinished.films, paths, header)
     return state.rays
-
-
-def _film(job: Job, partial: Path) -> tuple[Film | JournalFilm, Callable[[], None]]:
-    """Where a slice's tiles go, and how to be rid of it."""
-    from clfractal.pictures.film import Film
-    from clfractal.pictures.store import JournalFilm
-
-    plan, image = job.plan, job.scene.image
-    size = (image.width, image.height)
-    if 4 * plan.region.pixels * len(plan.channels) <= _IN_MEMORY:
-        return Film(plan.channels, size, plan.region, job.header()), lambda: None
-    film = JournalFilm(partial, job.identity(), plan.channels, size, plan.region, job.header())
-    return film, film.discard

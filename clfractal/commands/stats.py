@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any
 import clfractal
 from clfractal.files.atomic import atomic_writer
 from clfractal.optics.view import scene_view
-from clfractal.work.engine import Progress
 from clfractal.work.job import Job
+from clfractal.work.run import Progress
 
 if TYPE_CHECKING:
     from clfractal.work.comfort import Comfort
-    from clfractal.work.pair import Pair
 
 
 def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) -> dict[str, Any]:
@@ -27,17 +26,17 @@ def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) ->
     to its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray`
     counts shadow rays' steps too.
     """
-    info, plan = job.device.info, job.plan
+    info, region = job.device, job.region
     return {
         "device": info.name,
         "platform": info.platform,
         "driver": info.driver,
         "version": clfractal.__version__,
-        "precision": plan.precision,
-        "lanes": plan.lanes,
-        "samples": plan.samples,
-        "width": plan.region.width,
-        "height": plan.region.height,
+        "precision": job.precision,
+        "lanes": job.lanes,
+        "samples": job.samples,
+        "width": region.width,
+        "height": region.height,
         "tiles": state.tiles,
         "tiles_resumed": state.tiles_before,
         "build_ms": round(state.build_ms, 3),
@@ -54,12 +53,13 @@ def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) ->
     }
 
 
-def of_stereo(pair: Pair, comfort: Comfort | None) -> dict[str, Any]:
+def of_stereo(job: Job, comfort: Comfort | None) -> dict[str, Any]:
     """How a pair was looked at, as plain data; parallax is None where nothing is seen."""
-    middle = scene_view(pair.job.scene)
+    middle, stereo = scene_view(job.scene), job.scene.stereo
+    assert stereo is not None
     return {
-        "mode": pair.stereo.mode,
-        "separation": pair.stereo.separation,
+        "mode": stereo.mode,
+        "separation": stereo.separation,
         "eye": None if middle.eye is None else middle.eye.tolist(),
         "plane": {"center": middle.center.tolist(), "width": middle.width, "height": middle.height},
         "parallax": None if comfort is None else asdict(comfort),

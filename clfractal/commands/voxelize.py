@@ -25,6 +25,7 @@ from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 
 if TYPE_CHECKING:
+    from clfractal.device.select import Device
     from clfractal.voxels.grid import Grid
     from clfractal.work.job import Job
 
@@ -85,7 +86,7 @@ def voxelize(order: Order, shell: Shell, *, compress: bool = False) -> None:
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
     volume = given_volume(order, scene)
     if volume is None:
-        grid, job = fill(order, scene, shell)
+        grid, job, _ = fill(order, scene, shell)
         volume = grid_volume(grid, job, coloring)
     write_volume(order.output, volume, compress=compress)
     shell.state = lambda: "clfractal: interrupted"
@@ -144,8 +145,8 @@ def _resolution(text: str) -> str:
     return f"[{text}]" if "," in text else text
 
 
-def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
-    """The scene's grid on a device; the need of memory is told first.
+def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
+    """The scene's grid, its job and the device that it is on; the need of memory is told first.
 
     Raises:
         ClfractalError: it does not fit; the device failed.
@@ -156,7 +157,7 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
     from clfractal.scene.checks import used_boxes
     from clfractal.voxels.fill import FillProgress, fill_grid
     from clfractal.voxels.lattice import lattice_of
-    from clfractal.work import job as jobs
+    from clfractal.work.prepare import prepare
 
     settings = scene.renderer
     lattice = lattice_of(used_boxes(scene, settings)[1], settings.resolution)
@@ -168,7 +169,9 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
         where = Where("--resolution") if order.resolution else Where(order.source, path="renderer.resolution")
         raise SceneError(f"{told}, {memory.shown(have)} are left", where)
     shell.say(f"{order.source}: {told}, {memory.shown(have)} are left")
-    job = jobs.prepare(scene, choose(order.device), on_start=shell.say)
+    device = choose(order.device)
+    job = prepare(scene, device, on_start=shell.say)
+    plan = job.views[0].plan
     if job.remark:
         shell.say(f"{order.source}: {job.remark}")
     tell = Teller(shell)
@@ -179,13 +182,13 @@ def fill(order: Order, scene: Scene, shell: Shell) -> tuple[Grid, Job]:
     grid = fill_grid(
         scene,
         settings,
-        job.device,
-        lanes=job.plan.lanes,
-        precision=job.plan.precision,
+        device,
+        lanes=plan.lanes,
+        precision=plan.precision,
         on_compile=shell.say,
         progress=progress,
     )
-    return grid, job
+    return grid, job, device
 
 
 def given_volume(order: Order, scene: Scene) -> Volume | None:

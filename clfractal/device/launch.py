@@ -1,25 +1,72 @@
-"""Long launches in parts: each short enough for a display's watchdog and for an interrupt to be answered."""
+"""Long work in launches: each short enough for a display's watchdog, and for an interrupt to be answered."""
 
 from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 import pyopencl as cl
 
+from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError
+from clfractal.errors import ClfractalError, DeviceError
 
-# Time a launch should take.
-LAUNCH_SECONDS = 0.1
+# Time that the work under way on a device should take, unless a caller gives another.
+BUDGET_SECONDS = 0.1
+# Launches under way at a time: the device must not wait for the host between them.
+IN_FLIGHT = 2
 # A launch grows at most by this factor over the one before: what follows may be much heavier.
-GROWTH = 8.0
+GROWTH = 3.0
 # Longest sleep between looks at a launch; an interrupt is seen then.
 POLL_SECONDS = 0.0005
 # PoCL makes other code for more in one dimension.
 MOST_GROUPS = 32_768
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Part(Generic[T]):
+    """A launch on its way: the event that ends it, how much of the work it is, and what the caller wants to know of it."""
+
+    event: cl.Event
+    amount: float
+    about: T
+
+
+@dataclass(slots=True)
+class Pace:
+    """How much work a launch takes to last as long as it should; what is learned serves the next picture, too.
+
+    Attributes:
+        size: work of the next launch, in units of the caller's.
+        least, most: bounds of it.
+        seconds: how long a launch should take.
+        slowest: units a second of the heaviest launch so far; None before the first.
+    """
+
+    size: float
+    least: float = 1.0
+    most: float = float("inf")
+    seconds: float = BUDGET_SECONDS / IN_FLIGHT
+    slowest: float | None = None
+
+    def begin(self) -> None:
+        """Starts over with what is safe for the heaviest work so far: what came last may have been light."""
+        if self.slowest is not None:
+            self.size = float(np.clip(self.slowest * self.seconds, self.least, self.most))
+
+    def learn(self, amount: float, milliseconds: float) -> None:
+        """Sets the next size by what `amount` of work took."""
+        rate = amount / max(1e-3 * milliseconds, 1e-6)
+        self.slowest = rate if self.slowest is None else min(self.slowest, rate)
+        largest = min(max(amount, self.least) * GROWTH, self.most)
+        self.size = float(np.clip(rate * self.seconds, self.least, largest))
 
 
 def wait(event: cl.Event, device: Device, doing: str) -> float:
@@ -41,6 +88,52 @@ def wait(event: cl.Event, device: Device, doing: str) -> float:
         return float(event.profile.end - event.profile.start) * 1e-6
 
 
+def in_launches(
+    device: Device,
+    enqueue: Callable[[float], Part[T] | None],
+    pace: Pace,
+    *,
+    doing: str,
+    token: CancelToken | None = None,
+) -> Iterator[tuple[T, float]]:
+    """Runs work in launches, two of them under way at a time, and gives what `enqueue` told of each with its milliseconds.
+
+    However it is left (to the end, by an error, an interrupt, or because the caller stops asking), the device is idle then.
+
+    Args:
+        enqueue: starts the next part, of at most the given amount; None if there is nothing more to do.
+        pace: sizes the launches, and learns from them.
+
+    Raises:
+        DeviceError: a launch failed.
+        Stopped: the token was set.
+    """
+    flying: deque[Part[T]] = deque()
+    more = True
+    try:
+        while True:
+            while more and len(flying) < IN_FLIGHT:
+                if token is not None:
+                    token.check()
+                part = enqueue(pace.size)
+                if part is None:
+                    more = False
+                else:
+                    flying.append(part)
+            if not flying:
+                return
+            milliseconds = wait(flying[0].event, device, doing)
+            part = flying.popleft()
+            pace.learn(part.amount, milliseconds)
+            if token is not None:
+                token.check()
+            yield part.about, milliseconds
+    finally:
+        for part in flying:
+            with suppress(ClfractalError):
+                wait(part.event, device, doing)
+
+
 def run_in_parts(
     device: Device,
     kernel: cl.Kernel,
@@ -52,11 +145,12 @@ def run_in_parts(
     group: tuple[int, int] = (1, 1),
     first_part: int = 256,
     done: Callable[[int], None] | None = None,
+    token: CancelToken | None = None,
 ) -> float:
-    """Runs `kernel` over `count` things with `items` work-items each, in parts of about LAUNCH_SECONDS.
+    """Runs `kernel` over `count` things with `items` work-items each, in launches of about the usual budget.
 
     The global size is (items, things); the kernel's argument number `first_argument` (int) is the part's first thing.
-    The kernel must leave alone what is past `count`: parts are whole work-groups. Two parts are under way at a time.
+    The kernel must leave alone what is past `count`: parts are whole work-groups.
 
     Args:
         device: where the kernel runs.
@@ -68,31 +162,38 @@ def run_in_parts(
         group: work-group, along both dimensions.
         first_part: things of the first part.
         done: told how many things are finished after each part.
+        token: ends the work between two launches.
 
     Returns:
         Milliseconds on the device.
+
+    Raises:
+        DeviceError: a launch failed.
+        Stopped: the token was set.
     """
-    size, place, finished, total = float(first_part), 0, 0, 0.0
-    flying: deque[tuple[cl.Event, int]] = deque()
-    while place < count or flying:
-        while place < count and len(flying) < 2:
-            part = min(max(int(size), 1), MOST_GROUPS, count - place)
-            # A last part that is much shorter than the others would leave the device idle at both its ends.
-            if part < count - place < 1.5 * part:
-                part = (count - place + 1) // 2
-            part = min(-(-part // group[1]) * group[1], -(-(count - place) // group[1]) * group[1])
-            with device.failures(doing):
-                kernel.set_arg(first_argument, np.int32(place))
-                event = cl.enqueue_nd_range_kernel(device.queue, kernel, (items, part), group)
-                device.queue.flush()
-            flying.append((event, part))
-            place += part
-        event, part = flying.popleft()
-        milliseconds = wait(event, device, doing)
+    place = 0
+
+    def enqueue(size: float) -> Part[int] | None:
+        nonlocal place
+        if place >= count:
+            return None
+        part = min(max(int(size), 1), MOST_GROUPS, count - place)
+        # A last part that is much shorter than the others would leave the device idle at both its ends.
+        if part < count - place < 1.5 * part:
+            part = (count - place + 1) // 2
+        part = min(-(-part // group[1]) * group[1], -(-(count - place) // group[1]) * group[1])
+        with device.failures(doing):
+            kernel.set_arg(first_argument, np.int32(place))
+            event = cl.enqueue_nd_range_kernel(device.queue, kernel, (items, part), group)
+            device.queue.flush()
+        place += part
+        return Part(event, part, min(place, count))
+
+    total = 0.0
+    for finished, milliseconds in in_launches(
+        device, enqueue, Pace(float(first_part)), doing=doing, token=token
+    ):
         total += milliseconds
-        finished += part
-        wanted = part * LAUNCH_SECONDS / max(1e-3 * milliseconds, 1e-6)
-        size = float(np.clip(wanted, 1.0, GROWTH * size))
         if done is not None:
-            done(min(finished, count))
+            done(finished)
     return total

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache as cache_of_calls
@@ -58,11 +58,21 @@ class DeviceInfo:
 
 
 class Device:
-    """An OpenCL device; context and command queue (in order, profiling on) are made when first needed."""
+    """An OpenCL device with a context of its own, made when it is first needed, as its two queues are.
 
-    def __init__(self, info: DeviceInfo, cl_device: cl.Device) -> None:
+    Args:
+        info: what is known of it.
+        cl_device: pyopencl's device.
+        properties: of its context, added to the platform: pairs of `cl.context_properties` and values, such as those
+            that let it share textures with an OpenGL context.
+    """
+
+    def __init__(
+        self, info: DeviceInfo, cl_device: cl.Device, properties: Sequence[tuple[Any, Any]] = ()
+    ) -> None:
         self.info = info
         self.cl_device = cl_device
+        self.properties = tuple(properties)
 
     def __repr__(self) -> str:
         return f"Device({self.info.index} {self.info.name!r})"
@@ -70,12 +80,27 @@ class Device:
     @cached_property
     def context(self) -> cl.Context:
         with self.failures("opening the device"):
-            return cl.Context([self.cl_device])
+            if not self.properties:
+                return cl.Context([self.cl_device])
+            platform = (cl.context_properties.PLATFORM, self.cl_device.platform)
+            wanted: Any = [platform, *self.properties]
+            return cl.Context([self.cl_device], properties=wanted)
 
     @cached_property
     def queue(self) -> cl.CommandQueue:
+        """For kernels: in order, profiling on."""
         with self.failures("opening the device"):
             return cl.CommandQueue(self.context, properties=cl.command_queue_properties.PROFILING_ENABLE)
+
+    @cached_property
+    def transfers(self) -> cl.CommandQueue:
+        """For what is read while kernels run: in their queue it would wait for the launch before or after."""
+        with self.failures("opening the device"):
+            return cl.CommandQueue(self.context)
+
+    def reopened(self, properties: Sequence[tuple[Any, Any]] = ()) -> Device:
+        """The same device with another context, whose buffers and programs are its own."""
+        return Device(self.info, self.cl_device, properties)
 
     def buffer(self, nbytes: int, what: str, *, read_only: bool = False) -> cl.Buffer:
         """Allocate `nbytes` of device memory for `what` (used in the message).
@@ -130,11 +155,14 @@ def devices() -> list[DeviceInfo]:
     return [device.info for device in _find()]
 
 
-def choose(spec: str | None = None) -> Device:
+def choose(spec: str | None = None, *, properties: Sequence[tuple[Any, Any]] = ()) -> Device:
     """The device that `spec` names, else the environment variable CLFRACTAL_DEVICE, else the best one.
 
     `spec` is `cpu`, `gpu`, `accelerator`, indices `PLATFORM:DEVICE`, or part of a device's or platform's name
     (of its version, if no name fits), in any case of letters. Where several fit, the best is taken.
+
+    Without `properties` the context is one that the process shares: what was compiled for an earlier picture is still
+    loaded. With them (see `Device`) it is a new one.
 
     Raises:
         DeviceError: status 2 if nothing fits `spec`; status 3 if there is no device at all.
@@ -149,7 +177,8 @@ def choose(spec: str | None = None) -> Device:
     speeds = cache.recall(SPEEDS)
     if any(device.info.key not in speeds for device in fitting):
         speeds = {}  # a measured device beside one that was never measured says nothing
-    return max(fitting, key=lambda device: _score(device.info, speeds))
+    best = max(fitting, key=lambda device: _score(device.info, speeds))
+    return best.reopened(properties) if properties else best
 
 
 def by_key(index: str, key: str) -> Device:
@@ -233,7 +262,7 @@ def _status_name(number: int) -> str:
 
 @cache_of_calls
 def _find() -> list[Device]:
-    """Once for a process: a device keeps its context, and the programs that were loaded for it."""
+    """Once for a process: the devices whose contexts are shared by all who ask for no context of their own."""
     found: list[Device] = []
     seen: set[int] = set()
     try:

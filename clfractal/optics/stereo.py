@@ -15,7 +15,7 @@ import numpy.typing as npt
 from clfractal.errors import SceneError, Where
 from clfractal.optics.view import View, eye_view, middle_view
 from clfractal.scene.model import Scene
-from clfractal.scene.stereo import Eye, EyeName, Stereo
+from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo
 
 Floats = npt.NDArray[np.float64]
 
@@ -106,10 +106,14 @@ def eye_distance(view: View) -> float:
     return distance
 
 
-def eye_views(scene: Scene) -> dict[EyeName, View]:
-    """The views of a stereo scene: left, right, and the cyclopean eye's between them."""
+def eye_views(scene: Scene, eye: Eye = MIDDLE) -> dict[EyeName, View]:
+    """The views of a stereo scene: left, right, and the cyclopean eye's between them.
+
+    Args:
+        eye: the one that the scene's image belongs to (see `seen_by`): how it is squeezed, and its share of the screen.
+    """
     assert scene.stereo is not None
-    image, eye = scene.image, scene.eye
+    image = scene.image
     size = (image.width * eye.wide, image.height * eye.high)
     middle = middle_view(scene.stereo, scene.camera, *size, eye.share)
     names: tuple[EyeName, ...] = ("left", "right", "middle")

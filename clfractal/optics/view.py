@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Placed
-from clfractal.scene.stereo import Eye, Stereo
+from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo
 
 Vector = npt.NDArray[np.float64]
 
@@ -192,9 +193,12 @@ def eye_view(middle: View, stereo: Stereo, eye: Eye) -> View:
     )
 
 
-def scene_view(scene: Scene) -> View:
-    """What a scene's picture shows: the plane of the cut-plane renderer, else what its camera or an eye sees."""
-    eye = scene.eye
+def scene_view(scene: Scene, eye: Eye = MIDDLE) -> View:
+    """What a scene's picture shows: the plane of the cut-plane renderer, else what its camera or an eye sees.
+
+    Args:
+        eye: whose picture it is, of a stereo scene (see `seen_by`).
+    """
     width, height = scene.image.width * eye.wide, scene.image.height * eye.high
     if isinstance(scene.renderer, CutPlaneRenderer):
         # A flat picture: it lies on the screen for both eyes.
@@ -202,3 +206,29 @@ def scene_view(scene: Scene) -> View:
     if scene.stereo is None:
         return camera_view(scene.camera, width, height)
     return eye_view(middle_view(scene.stereo, scene.camera, width, height, eye.share), scene.stereo, eye)
+
+
+def seen_by(scene: Scene, name: EyeName) -> tuple[Scene, Eye]:
+    """A stereo scene as one eye sees it, and that eye: the scene's image is the eye's own (half as large if squeezed)."""
+    assert scene.stereo is not None
+    wide, high = scene.stereo.squeeze
+    eye = Eye(name, wide, high)
+    if (wide, high) == (1, 1):
+        return scene, eye
+    image = Image(width=scene.image.width // wide, height=scene.image.height // high)
+    return scene.model_copy(update={"image": image}), eye
+
+
+def shown_views(scene: Scene, eye: Eye = MIDDLE) -> list[tuple[Scene, Eye, Place]]:
+    """The views of a scene's picture as an eye sees them, and where each stands; without a layout there is one.
+
+    Raises:
+        SceneError: there is no room for a view.
+    """
+    if scene.layout is None:
+        return [(scene, eye, Place(0, 0, scene.image.width, scene.image.height))]
+    # Each takes up a part of the screen.
+    return [
+        (view, replace(eye, share=eye.share * place.width / scene.image.width), place)
+        for view, place in scene.views
+    ]

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from clfractal.pictures.anaglyph import matrices, mix
-from clfractal.pictures.film import Film
+from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Bands, Floats, Picture
 from clfractal.pictures.tiles import Region
+from clfractal.scene.stereo import APART as APART
 from clfractal.scene.stereo import Mode, Stereo
 
 Side = Literal["left", "right"]
@@ -25,8 +26,6 @@ BESIDE: tuple[Mode, ...] = ("split", "split_half")
 BELOW: tuple[Mode, ...] = ("over_under", "over_under_half")
 PICKED: tuple[Mode, ...] = ("rows", "columns", "checkerboard", "anaglyph_chessboard")
 """Modes in which each pixel is one of either eye's."""
-APART: tuple[Mode, ...] = ("pair", "multi_view")
-"""Modes that keep both pictures whole; nothing is composed."""
 
 # Of one eye's picture: a composed one has no camera of its own.
 _OF_AN_EYE = ("worldToCamera", "worldToNDC", "view")
@@ -192,14 +191,7 @@ class Composed:
 
     def to_film(self) -> Film:
         """All of it in memory."""
-        bands = [band for _, band in self.bands()]
-        film = Film(self.channels, self.display, self.region, self.header)
-        whole = np.array([np.concatenate([band[name] for band in bands]) for name in self.channels])
-        for index in range(film.grid.count):
-            tile = film.grid.tile(index)
-            top, left = tile.y - self.region.y, tile.x - self.region.x
-            film.put(index, whole[:, top : top + tile.height, left : left + tile.width])
-        return film
+        return in_memory(self)
 
 
 def agreed_header(headers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

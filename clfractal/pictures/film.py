@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
-from clfractal.pictures.tiled import Bands, Floats, check_tile
+from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
 
@@ -22,7 +22,7 @@ class Film:
     `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, `exposure` (stops) and
     `transparent` (what PNG files and notebooks show), and `worldToCamera` and
     `worldToNDC`, 4 x 4 matrices for row vectors (point_camera = [x, y, z, 1] @ matrix: the translation is the
-    last row), as OpenEXR's standard attributes want them.
+    last row), as OpenEXR's standard attributes want them. A function that makes it is called when it is first needed.
 
     Raises:
         SceneError: an unknown channel name.
@@ -34,7 +34,7 @@ class Film:
         channels: Sequence[str] = DEFAULT_CHANNELS,
         display: tuple[int, int] = (1, 1),
         region: Region | None = None,
-        header: Mapping[str, Any] | None = None,
+        header: Mapping[str, Any] | Callable[[], Mapping[str, Any]] | None = None,
     ) -> None:
         self.channels: tuple[str, ...] = check_channels(channels)
         self.display = display
@@ -42,10 +42,26 @@ class Film:
         if not self.region.inside(*display):
             raise ValueError(f"{self.region} is not inside a picture of {display[0]} x {display[1]}")
         self.grid = TileGrid(self.region)
-        self.header: dict[str, Any] = dict(header or {})
+        self._make_header = header if callable(header) else None
+        self._header: dict[str, Any] | None = None if callable(header) else dict(header or {})
+        self._told: dict[str, Any] = {}
+        self.stage = ""
+        """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
         shape = (self.region.height, self.region.width)
         self._planes = {name: np.full(shape, CHANNELS[name].fill, np.float32) for name in self.channels}
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What files tell about the picture; made when it is first asked for, if it was given as a function."""
+        if self._header is None:
+            assert self._make_header is not None
+            self._header = {**self._make_header(), **self._told}
+        return self._header
+
+    def tell(self, key: str, value: Any) -> None:
+        """Adds an entry to the header, which need not be made for that."""
+        (self._told if self._header is None else self._header)[key] = value
 
     @property
     def width(self) -> int:
@@ -82,7 +98,8 @@ class Film:
     def __repr__(self) -> str:
         part = "" if self.region == Region(0, 0, *self.display) else f", {self.region}"
         size = f"{self.display[0]}x{self.display[1]}"
-        return f"<Film {size}{part}, channels {' '.join(self.channels)}, {self._done.mean():.0%} done>"
+        stage = self.stage or f"{self._done.mean():.0%} done"
+        return f"<Film {size}{part}, channels {' '.join(self.channels)}, {stage}>"
 
     def put(self, tile_index: int, array: Floats) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns)."""
@@ -92,6 +109,18 @@ class Film:
         for plane, name in zip(array, self.channels, strict=True):
             self._planes[name][top : top + tile.height, left : left + tile.width] = plane
         self._done[tile_index] = True
+
+    def fill(self, planes: Mapping[str, Floats]) -> None:
+        """Stores the whole region: of each channel float32 of shape (height, width)."""
+        for name in self.channels:
+            self._planes[name][:] = planes[name]
+        self._done[:] = True
+
+    def take(self, other: Film) -> None:
+        """Stores what another film of the same region has."""
+        for name in self.channels:
+            self._planes[name][:] = other[name]
+        self._done[:] = other.done
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows)."""
@@ -132,3 +161,13 @@ class Film:
         from clfractal.pictures.outputs import png_bytes
 
         return png_bytes(self)
+
+
+def in_memory(picture: Picture) -> Film:
+    """A whole picture as a film; itself if it is one."""
+    if isinstance(picture, Film):
+        return picture
+    bands = [band for _, band in picture.bands()]
+    film = Film(picture.channels, picture.display, picture.region, picture.header)
+    film.fill({name: np.concatenate([band[name] for band in bands]) for name in picture.channels})
+    return film

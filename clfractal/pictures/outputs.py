@@ -14,6 +14,7 @@ from clfractal.files import atomic
 from clfractal.files.channels import CHANNELS, VIEWS, in_view
 from clfractal.files.png import Bits, stream_png, write_png
 from clfractal.pictures.tiled import Floats, Picture
+from clfractal.scene.stereo import APART, Stereo
 
 # Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
 _MATRICES = ("worldToCamera", "worldToNDC")
@@ -96,6 +97,14 @@ def save_outputs(
                 half=half,
                 header=_attributes(whole),
             )
+
+
+def output_files(stereo: Stereo | None, path: str | Path) -> list[Path]:
+    """The files that are written for an output: two of a pair, and of views in a format that holds but one."""
+    if stereo is None or stereo.mode not in APART:
+        return [Path(path)]
+    one_file = stereo.mode == "multi_view" and Path(path).suffix.lower() == ".exr"
+    return [Path(path)] if one_file else list(pair_paths(path))
 
 
 def pair_paths(path: str | Path) -> tuple[Path, Path]:

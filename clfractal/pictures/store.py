@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
-from clfractal.pictures.film import Film
+from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Bands, Floats, check_tile
 from clfractal.pictures.tiles import Region, TileGrid
 
@@ -55,6 +55,10 @@ class JournalFilm:
         begin = Journal.resume if resume else Journal.create
         self.journal = begin(path, whole, self.channels, self.grid.count)
 
+    def tell(self, key: str, value: Any) -> None:
+        """Adds an entry to the header."""
+        self.header[key] = value
+
     @property
     def done(self) -> npt.NDArray[np.bool_]:
         """For each tile whether it is there."""
@@ -90,12 +94,8 @@ class JournalFilm:
             yield first.y, dict(zip(self.channels, band, strict=True))
 
     def to_film(self) -> Film:
-        """All of it in memory."""
-        film = Film(self.channels, self.display, self.region, self.header)
-        for index in np.flatnonzero(self.done).tolist():
-            tile = self.grid.tile(index)
-            film.put(index, self.journal.tile(index)[:, : tile.height, : tile.width])
-        return film
+        """All of it in memory; missing tiles have their channels' fill values."""
+        return in_memory(self)
 
     def close(self) -> None:
         """Closes the journal and leaves it for a later run."""

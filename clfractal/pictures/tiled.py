@@ -52,6 +52,9 @@ class TiledStore(Picture, Protocol):
     def done(self) -> npt.NDArray[np.bool_]:
         """For each tile whether it is there; not to be written to."""
 
+    def tell(self, key: str, value: Any) -> None:
+        """Adds an entry to the header."""
+
     def put(self, tile_index: int, array: Floats) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns), cut to the region as `grid.tile` is."""
 

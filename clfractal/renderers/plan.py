@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,6 +15,7 @@ from clfractal.optics.view import View, scene_view
 from clfractal.pictures.tiles import Region
 from clfractal.scene.checks import used_bounds, used_boxes
 from clfractal.scene.model import Scene
+from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 
@@ -38,6 +39,8 @@ class Plan:
         samples: rays per pixel.
         region: the part of the picture to render, in pixels.
         channels: what the film holds, in order.
+        divider: of a coarse picture, how many of the picture's pixels in each direction one of its pixels stands for;
+            the region is counted in these.
     """
 
     precision: Precision
@@ -45,6 +48,42 @@ class Plan:
     samples: int
     region: Region
     channels: tuple[str, ...]
+    divider: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedView:
+    """One view of a picture and how it is rendered.
+
+    Attributes:
+        scene: what is seen; its `image` has the view's own size, and it has no layout.
+        plan: how it is rendered.
+        eye: whose view it is, of a stereo scene.
+        number: which of the layout's views it is.
+    """
+
+    scene: Scene
+    plan: Plan
+    eye: Eye = MIDDLE
+    number: int = 0
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the view's whole picture, in the plan's pixels."""
+        image, coarse = self.scene.image, self.plan.divider
+        return -(-image.width // coarse), -(-image.height // coarse)
+
+    @property
+    def camera(self) -> View:
+        """Its plane and eye in space."""
+        return scene_view(self.scene, self.eye)
+
+    def coarse(self, divider: int) -> PlannedView:
+        """The same view with fewer pixels, each with one sample: one for `divider` x `divider` of the picture's."""
+        region = self.plan.region
+        left, top = region.x // divider, region.y // divider
+        small = Region(left, top, -(-region.right // divider) - left, -(-region.bottom // divider) - top)
+        return replace(self, plan=replace(self.plan, samples=1, region=small, divider=divider))
 
 
 def finest_steps(scene: Scene, view: View) -> float:
@@ -94,7 +133,9 @@ def _finest_voxels(scene: Scene, renderer: VolumeRenderer, footprint: float) -> 
     return finest / (magnitude * float(np.finfo(np.float32).eps))
 
 
-def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool) -> tuple[Precision, str]:
+def choose_precision(
+    scene: Scene, wanted: PrecisionChoice, *, has_float64: bool, eye: Eye = MIDDLE
+) -> tuple[Precision, str]:
     """The number type for a scene, and a remark for the user (empty if there is nothing to remark).
 
     Raises:
@@ -104,7 +145,7 @@ def choose_precision(scene: Scene, wanted: PrecisionChoice, *, has_float64: bool
         raise SceneError("the device has no float64; use float32", Where("--precision"))
     if wanted != "auto":
         return wanted, ""
-    view = scene_view(scene)
+    view = scene_view(scene, eye)
     if finest_steps(scene, view) >= FLOAT32_STEPS_PER_PIXEL:
         return "float32", ""
     if has_float64:

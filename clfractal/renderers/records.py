@@ -12,8 +12,9 @@ from clfractal.device.orbit import ORBIT, Record
 from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.optics.view import View
-from clfractal.pictures.tiles import Region
 from clfractal.renderers.environment import PackedEnvironment, material_fields
+from clfractal.renderers.passes import SAMPLING
+from clfractal.renderers.plan import Plan
 from clfractal.scene.checks import used_bounds
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
@@ -58,12 +59,7 @@ MARCH = Struct(
         Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
         Field("point_share", "real", 0, "footprint of one of a pixel's points, in the pixel's"),
         Field("known_reach", "real", 0, "how far a proved hit proves its neighbours', in a point's cones"),
-        Field("samples", "int", 0, "shots per pixel, at most"),
-        Field("min_samples", "int", 0, "shots before the noise is judged"),
-        Field("noise", "real", 0, "standard error at which a pixel is done"),
-        Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
-        Field("filter_width", "real", 0, "its width, pixels"),
-        Field("seed", "uint", 0, "chooses the places of the samples"),
+        Field("seed", "uint", 0, "chooses the places of points and rays"),
         Field("bounces", "int", 0, "most mirror reflections"),
         Field("light_count", "int", 0, "number of lights"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
@@ -131,15 +127,13 @@ MATERIAL = Struct(
     ],
 )
 
-STRUCTS = (VIEW, ORBIT, MARCH, LIGHT, MATERIAL)
+STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL)
 
 LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
 TOUCH = 0.75
-FILTERS = ("box", "tent", "blackman_harris")
-FILTER_WIDTHS = {"box": 1.0, "tent": 2.0, "blackman_harris": 3.0}
 # Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
 EXTRA_TESTS = 64
 
@@ -149,23 +143,27 @@ def struct_text() -> str:
     return "".join(struct.c_text() for struct in STRUCTS)
 
 
-def view_record(view: View, width: int, height: int, region: Region, precision: Precision) -> Record:
-    """A View for a picture of `width` x `height` pixels of which `region` is rendered."""
+def view_record(view: View, width: int, height: int, plan: Plan, precision: Precision) -> Record:
+    """A View for a picture of `width` x `height` pixels, of which the plan's region is rendered.
+
+    With a divider each pixel stands for that many in both directions, and all that is counted in pixels is so in these.
+    """
+    coarse, region = plan.divider, plan.region
     values = {
         "center": view.center,
-        "right": view.side * (view.width / width),
-        "down": view.up * (-view.height / height),
+        "right": view.side * (view.width / width * coarse),
+        "down": view.up * (-view.height / height * coarse),
         "eye": view.origin,
         "axis": view.axis,
         "side": view.side,
         "up": view.up,
         "lens_radius": view.lens_radius,
         "focus_distance": view.focus_distance,
-        "center_x": width / 2,
-        "center_y": height / 2,
-        "pixel_size": view.pixel_size(height),
+        "center_x": width / 2 / coarse,
+        "center_y": height / 2 / coarse,
+        "pixel_size": view.pixel_size(height) * coarse,
         "perspective": int(view.eye is not None),
-        "height": height,
+        "height": -(-height // coarse),
         "region_left": region.x,
         "region_top": region.y,
         "region_right": region.right,
@@ -174,8 +172,8 @@ def view_record(view: View, width: int, height: int, region: Region, precision: 
     return VIEW.value(precision, values)
 
 
-def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
-    """The settings of the march, of a pixel's shots and of the rays that they send."""
+def march_record(scene: Scene, precision: Precision) -> Record:
+    """The settings of the march, and of the rays that a shot sends."""
     chain, renderer = scene.chain, scene.surface
     center, radius = used_bounds(scene)
     points = renderer.used_points.count
@@ -183,7 +181,6 @@ def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
     half = radius / 2
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
-    width = renderer.filter_width
     largest = float(np.finfo(np.float32).max) / 16
     limit = renderer.firefly_limit if renderer.firefly_limit is not None else largest
     values = {
@@ -199,11 +196,6 @@ def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
         "touch_share": max(TOUCH / renderer.detail, point_share),
         "point_share": point_share,
         "known_reach": 1 / (point_share * renderer.detail),
-        "samples": samples,
-        "min_samples": min(renderer.used_min_samples, samples),
-        "noise": renderer.noise or 0.0,
-        "filter": FILTERS.index(renderer.filter),
-        "filter_width": width if width is not None else FILTER_WIDTHS[renderer.filter],
         "seed": renderer.seed,
         "bounces": renderer.bounces if scene.material.reflection > 0 else 0,
         "light_count": len(scene.lights),
@@ -213,7 +205,7 @@ def march_record(scene: Scene, samples: int, precision: Precision) -> Record:
         "ambient_far": distance if not rays.lit else largest,
         "occlusion_distance": distance,
         "occlusion_share": 1 / rays.cosine if occlusion is not None else 0.0,
-        "firefly_limit": min(limit * 2.0**-scene.output.exposure, largest),
+        "firefly_limit": min(limit, largest),
     }
     return MARCH.value(precision, values)
 

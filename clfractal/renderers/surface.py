@@ -7,14 +7,14 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.source import FlatText, flatten
+from clfractal.device.source import FlatText
 from clfractal.formulas.opencl import write_formula
-from clfractal.optics.view import scene_view
 from clfractal.renderers import records
 from clfractal.renderers.environment import pack_environment
+from clfractal.renderers.kernel import KernelArgument, TileKernel, flat_text
+from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
-from clfractal.renderers.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -38,7 +38,7 @@ Floats = npt.NDArray[np.float32]
 def defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """What shapes the program's text besides the formula."""
     return {
-        **tile_defines(plan),
+        **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
         "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
         **feature_defines(scene),
@@ -90,49 +90,53 @@ def coloring_defines(coloring: Coloring) -> dict[str, object]:
     return result
 
 
-def program_text(scene: Scene, plan: Plan) -> FlatText:
-    """The whole text of the scene's program."""
-    formula = write_formula(scene.chain)
-    generated = {"formula.h": formula.text, "structs.h": records.struct_text() + CUT_PLANE.c_text()}
-    return flatten("surface.cl", generated=generated, defines=defines(scene, plan), user=["formula.h"])
+class SurfaceKernel(TileKernel):
+    """The surface of a formula's set, found by marching rays."""
 
-
-class SurfaceWorker(TileWorker):
-    """Renders tiles of one surface scene on one device."""
-
-    kernel_name = "surface"
+    name = "surface"
 
     def text(self) -> FlatText:
         return program_text(self.scene, self.plan)
 
-    def records(self) -> list[KernelArgument]:
-        """The constant arguments, in the kernel's order."""
-        scene, plan = self.scene, self.plan
-        width, height = scene.image.width, scene.image.height
+    def own_arguments(self) -> list[KernelArgument]:
+        scene, precision, kept = self.scene, self.precision, self.resources.kept
         formula = write_formula(scene.chain)
         surroundings = scene.surroundings
-        packed = pack_environment(surroundings.pixels) if surroundings is not None else None
+        packed = None
+        if surroundings is not None:
+            packed = kept.once(
+                f"environment {surroundings.digest}", lambda: pack_environment(surroundings.pixels)
+            )
         return [
-            records.view_record(scene_view(scene), width, height, plan.region, plan.precision),
-            records.march_record(scene, plan.samples, plan.precision),
+            records.march_record(scene, precision),
             np.stack(
                 [
-                    records.orbit_record(scene.chain, scene.formula.iterations, plan.precision),
-                    *plane_orbits(scene, plan.precision),
+                    records.orbit_record(scene.chain, scene.formula.iterations, precision),
+                    *plane_orbits(scene, precision),
                 ]
             ),
-            np.array(formula.constants, plan.precision),
-            records.material_record(scene, plan.precision, packed),
-            records.light_records(scene, plan.precision),
+            np.array(formula.constants, precision),
+            records.material_record(scene, precision, packed),
+            records.light_records(scene, precision),
             self._palette(),
             packed.data if packed is not None else np.zeros(4, np.float32),
-            *([plane_records(scene, plan.precision), plane_palettes(scene)] if scene.cut_planes else []),
-            channel_slots(plan),
+            *([plane_records(scene, precision), plane_palettes(scene)] if scene.cut_planes else []),
         ]
 
     def _palette(self) -> Floats:
-        if not self.scene.coloring.uses_palette:
+        coloring = self.scene.coloring
+        if not coloring.uses_palette:
             return np.zeros(3, np.float32)
         from clfractal.scene.palette import palette_table
 
-        return np.ascontiguousarray(palette_table(self.scene.coloring), np.float32)
+        key = f"palette {coloring.model_dump_json()}"
+        return self.resources.kept.once(
+            key, lambda: np.ascontiguousarray(palette_table(coloring), np.float32)
+        )
+
+
+def program_text(scene: Scene, plan: Plan) -> FlatText:
+    """The whole text of the scene's program."""
+    formula = write_formula(scene.chain)
+    generated = {"formula.h": formula.text, "structs.h": records.struct_text() + CUT_PLANE.c_text()}
+    return flat_text("surface.cl", generated=generated, defines=defines(scene, plan))

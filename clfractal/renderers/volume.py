@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -12,22 +13,23 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.orbit import ORBIT
-from clfractal.device.source import FlatText, flatten
+from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
-from clfractal.optics.view import scene_view
 from clfractal.renderers import records
+from clfractal.renderers.kernel import KernelArgument, TileKernel, flat_text
+from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
-from clfractal.renderers.worker import KernelArgument, TileWorker, channel_slots, tile_defines
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.blocks import seen_blocks
 from clfractal.voxels.dense import grid_from_dense
-from clfractal.voxels.fill import fill_grid
+from clfractal.voxels.fill import fill_grid, shows_outside
 from clfractal.voxels.grid import Grid
 
 TRANSFER_SIZE = 1024
@@ -57,17 +59,11 @@ VOLUME = Struct(
         Field("opacity_limit", "real", 0, "a ray ends once it is that opaque"),
         Field("shadow_lift", "real", 0, "where shadow rays start above the surface, scene units"),
         Field("max_steps", "int", 0, "most places of a ray"),
-        Field("samples", "int", 0, "shots per pixel, at most"),
-        Field("min_samples", "int", 0, "shots before the noise is judged"),
-        Field("noise", "real", 0, "standard error at which a pixel is done"),
-        Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
-        Field("filter_width", "real", 0, "its width, pixels"),
-        Field("seed", "uint", 0, "chooses the places of the samples"),
         Field("light_count", "int", 0, "number of lights"),
     ],
 )
 
-STRUCTS = (records.VIEW, records.LIGHT, records.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
+STRUCTS = (records.VIEW, SAMPLING, records.LIGHT, records.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
 Floats = npt.NDArray[np.float32]
 
 
@@ -78,10 +74,10 @@ def settings_of(scene: Scene) -> VolumeRenderer:
 
 
 def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
-    """The whole text of the program; the formula is no part of it."""
+    """The whole text of the program; the formula is no part of it unless planes show it."""
     settings = settings_of(scene)
     defines = {
-        **tile_defines(plan),
+        **pass_defines(plan),
         "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
         "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
@@ -102,10 +98,8 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "COLORING_NORMAL": 1,
     }
     structs = "".join(struct.c_text() for struct in STRUCTS)
-    # The formula is needed where planes show it.
     formula = write_formula(scene.chain).text if scene.cut_planes else ""
-    generated = {"structs.h": structs, "formula.h": formula}
-    return flatten("volume.cl", generated=generated, defines=defines, user=["formula.h"])
+    return flat_text("volume.cl", generated={"structs.h": structs, "formula.h": formula}, defines=defines)
 
 
 def ray_precision(scene: Scene, plan: Plan) -> Precision:
@@ -116,67 +110,81 @@ def ray_precision(scene: Scene, plan: Plan) -> Precision:
     return plan.precision if scene.cut_planes else "float32"
 
 
-class VolumeWorker(TileWorker):
-    """Fills a scene's grid, then renders tiles of its picture."""
+class VolumeKernel(TileKernel):
+    """Rays through a grid of voxels, which is filled when it is first asked for."""
 
-    kernel_name = "volume"
+    name = "volume"
+
+    @property
+    def precision(self) -> Precision:
+        return ray_precision(self.scene, self.plan)
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The grid; of an earlier picture if that had the same.
+
+        Raises:
+            DeviceError, KernelBuildError: it cannot be filled.
+            Stopped: its filling was cancelled.
+        """
+        return self.resources.kept.once(self._grid_key, self._fill)
 
     def text(self) -> FlatText:
         return program_text(self.scene, self.plan, self.grid)
 
-    def records(self) -> list[KernelArgument]:
-        """The constants and the grid's buffers, in the kernel's order."""
-        scene, plan = self.scene, self.plan
-        settings = settings_of(scene)
-        width, height = scene.image.width, scene.image.height
-        precision = ray_precision(scene, plan)
-        key = self._grid_key(settings)
-        self.grid = grid = self.shared.once(key, lambda: self._fill(settings))
-        unseen = unseen_sample(scene, plan, grid)
-        blocks = self.shared.once(f"{key} {unseen}", lambda: seen_blocks(grid, unseen, self.on_compile))
+    def own_arguments(self) -> list[KernelArgument]:
+        scene, grid, precision = self.scene, self.grid, self.precision
+        unseen = unseen_sample(scene, grid)
+        blocks = self.resources.kept.once(
+            f"{self._grid_key} {unseen}", lambda: seen_blocks(grid, unseen, self.resources.on_compile)
+        )
         four = (0, 1, 2, 3)
         return [
-            records.view_record(scene_view(scene), width, height, plan.region, precision),
-            volume_record(scene, plan, self.grid),
-            grid_record(scene, self.grid, precision),
+            volume_record(scene, grid, precision),
+            grid_record(scene, grid, precision),
             records.material_record(scene, precision),
             records.light_records(scene, precision),
-            transfer_table(scene, value_range(scene, self.grid)),
-            self.grid.table,
+            transfer_table(scene, value_range(scene, grid)),
+            grid.table,
             blocks,
-            *(_one_of(self.grid.values, pool) for pool in four),
-            *(_one_of(self.grid.normals, pool) for pool in four),
+            *(_one_of(grid.values, pool) for pool in four),
+            *(_one_of(grid.normals, pool) for pool in four),
             *(_plane_arguments(scene, precision) if scene.cut_planes else []),
-            channel_slots(plan),
         ]
 
-    def _grid_key(self, settings: VolumeRenderer) -> str:
-        """What the grid follows from: the solid, and how it is filled and seen."""
-        plain = settings.model_dump(
-            mode="json", exclude={"samples", "min_samples", "noise", "filter", "filter_width", "seed"}
+    @cached_property
+    def _grid_key(self) -> str:
+        """What the grid follows from: the solid, and how it is filled; of the transfer only what decides what is stored."""
+        settings, given = settings_of(self.scene), self.scene.given
+        shown = settings.model_dump(
+            mode="json",
+            exclude={*Sampled.model_fields, "transfer", "level", "step", "shadows", "opacity_limit"},
         )
-        solid = self.scene.formula.mapping() if self.scene.given is None else self.scene.given.digest()
-        return json.dumps([solid, plain, self.plan.precision])
+        solid = self.scene.formula.mapping() if given is None else given.digest
+        seen = shows_outside(settings) if given is None else least_visible(settings, given)
+        return json.dumps([solid, shown, seen, self.plan.precision, self.plan.lanes])
 
-    def _fill(self, settings: VolumeRenderer) -> Grid:
-        given = self.scene.given
+    def _fill(self) -> Grid:
+        given, device, on_compile = self.scene.given, self.resources.device, self.resources.on_compile
+        settings = settings_of(self.scene)
         if given is None:
             return fill_grid(
                 self.scene,
                 settings,
-                self.device,
+                device,
                 lanes=self.plan.lanes,
                 precision=self.plan.precision,
-                on_compile=self.on_compile,
+                on_compile=on_compile,
+                token=self.resources.token,
             )
         return grid_from_dense(
             given.values,
-            self.device,
+            device,
             corner=given.corner,
             spacing=given.spacing,
             threshold=least_visible(settings, given),
             normal_radius=settings.normal_radius,
-            on_compile=self.on_compile,
+            on_compile=on_compile,
         )
 
 
@@ -211,7 +219,7 @@ def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[A
     return GRID.value(precision, values)
 
 
-def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
+def volume_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
     """How rays go through the grid and how pixels are put together."""
     settings = settings_of(scene)
     voxel = float(min(grid.spacing)) * _zoom(scene)
@@ -220,7 +228,6 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
     per_sample = (grid.range[1] - grid.range[0]) / full_sample(grid)
     low, high = ((value - grid.range[0]) / per_sample for value in value_range(scene, grid))
     least, most = grid.range if scene.given is None else (scene.given.low, scene.given.high)
-    width = settings.filter_width
     values = {
         "step": step,
         "level": (settings.used_level(least, most) - grid.range[0]) / per_sample,
@@ -231,15 +238,9 @@ def volume_record(scene: Scene, plan: Plan, grid: Grid) -> npt.NDArray[Any]:
         "opacity_limit": settings.opacity_limit,
         "shadow_lift": SHADOW_LIFT * voxel,
         "max_steps": int(np.ceil(longest / step)) + 2,
-        "samples": plan.samples,
-        "min_samples": min(settings.used_min_samples, plan.samples),
-        "noise": settings.noise or 0.0,
-        "filter": records.FILTERS.index(settings.filter),
-        "filter_width": width if width is not None else records.FILTER_WIDTHS[settings.filter],
-        "seed": settings.seed,
         "light_count": len(scene.lights),
     }
-    return VOLUME.value(ray_precision(scene, plan), values)
+    return VOLUME.value(precision, values)
 
 
 def full_sample(grid: Grid) -> float:
@@ -247,9 +248,9 @@ def full_sample(grid: Grid) -> float:
     return 255.0 if grid.kind == "byte" else grid.range[1]
 
 
-def unseen_sample(scene: Scene, plan: Plan, grid: Grid) -> float:
+def unseen_sample(scene: Scene, grid: Grid) -> float:
     """The sample at and below which nothing is seen; not a number where the least is seen."""
-    record = volume_record(scene, plan, grid)
+    record = volume_record(scene, grid, "float32")
     if settings_of(scene).transfer.opacity is None:
         return float(np.nextafter(np.float32(record["level"]), np.float32(-np.inf)))
     seen = np.flatnonzero(transfer_table(scene, value_range(scene, grid))[:, 0])

@@ -6,7 +6,6 @@ from math import dist
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.layout import MAX_LAYOUT_PIXELS
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
@@ -150,11 +149,6 @@ def _check_step(step: float | None, radius: float, path: str) -> None:
 
 def _check_views(scene: Scene) -> None:
     """Every view is a scene of its own, and wrong or right by itself."""
-    pixels = scene.image.width * scene.image.height
-    if pixels > MAX_LAYOUT_PIXELS:
-        raise SceneError(
-            f"must be at most {MAX_LAYOUT_PIXELS:,} pixels with a layout, got {pixels:,}", Where(path="image")
-        )
     for number, (view, _) in enumerate(scene.views):
         try:
             check_parts(view, whole=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,12 +21,13 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float32]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)
 class EnvironmentMap:
     """`pixels` has the shape (height, 2 height, 3): linear Rec. 709, finite, none below 0."""
 
     pixels: Floats
 
+    @cached_property
     def digest(self) -> str:
         """A text that differs for different pixels."""
         return hashlib.sha256(np.ascontiguousarray(self.pixels).data).hexdigest()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 _WHERE = Where(path="renderer.file")
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class GivenGrid:
     """Values on a grid along the axes.
 
@@ -36,6 +37,7 @@ class GivenGrid:
     low: float
     high: float
 
+    @cached_property
     def digest(self) -> str:
         """A text that differs for different values."""
         return hashlib.sha256(np.ascontiguousarray(self.values).data).hexdigest()

@@ -13,8 +13,6 @@ from clfractal.scene.parts import Background, Camera, Material
 from clfractal.scene.renderer import Renderer
 
 MAX_VIEWS = 16
-# A picture of several views is kept in memory.
-MAX_LAYOUT_PIXELS = 2**25
 
 
 @dataclass(frozen=True, slots=True)

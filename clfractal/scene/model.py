@@ -4,13 +4,11 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 `formula` and `camera` has a default.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
-from functools import cached_property
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from clfractal.scene.base import Section
 from clfractal.scene.coloring import Coloring
@@ -20,7 +18,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
-from clfractal.scene.stereo import Eye, EyeName, Stereo
+from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 
 if TYPE_CHECKING:
@@ -29,8 +27,14 @@ if TYPE_CHECKING:
     from clfractal.scene.given import GivenGrid
 
 
-# What a scene has read or resolved, and the section that names it.
-_READ = {"chain": "formula", "surroundings": "environment", "given": "renderer"}
+T = TypeVar("T")
+
+# What a scene has read or resolved, and the section that it follows from.
+_SECTIONS = {
+    "chain": "formula",
+    "surroundings": "environment",
+    "given": "renderer",
+}
 
 
 class Scene(Section):
@@ -53,7 +57,49 @@ class Scene(Section):
     stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; one picture if null")
     output: Output = Field(default_factory=dict, validate_default=True)
 
-    @cached_property
+    # Beside the fields: no part of what a scene says, and not compared.
+    _folder: Path = PrivateAttr(default_factory=Path)
+    _read: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both say the same, wherever they were loaded from."""
+        fields = type(self).model_fields
+        return type(other) is type(self) and all(getattr(self, key) == getattr(other, key) for key in fields)
+
+    @property
+    def folder(self) -> Path:
+        """Where the environment's file is looked for: the folder that the scene was loaded from, or the current one."""
+        return self._folder
+
+    def placed(self, folder: Path) -> Self:
+        """The same scene, as loaded from another folder."""
+        copied = super().model_copy()
+        copied._folder = folder
+        copied._read = {name: self._read[name] for name in ("chain",) if name in self._read}
+        return copied
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """As of every section; the copy stays in the scene's folder.
+
+        What was read of a section that is not replaced is kept, so that it is what was checked, and is not read again.
+        """
+        copied = super().model_copy(update=update, deep=deep)
+        copied._folder = self._folder
+        copied._read = {
+            name: found
+            for name, found in self._read.items()
+            if name in _SECTIONS and _SECTIONS[name] not in (update or ())
+        }
+        return copied
+
+    def _once(self, name: str, read: Callable[[], T]) -> T:
+        """What was read under a name, or is read now."""
+        if name not in self._read:
+            self._read[name] = read()
+        found: T = self._read[name]
+        return found
+
+    @property
     def chain(self) -> "Chain":
         """The formula, ready to be evaluated or written as OpenCL.
 
@@ -63,66 +109,25 @@ class Scene(Section):
         from clfractal.errors import Where
         from clfractal.formulas import catalog
 
-        return catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
+        return self._once(
+            "chain", lambda: catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
+        )
 
-    @cached_property
-    def folder(self) -> Path:
-        """Where the environment's file is looked for: the folder that the scene was loaded from, or the current one."""
-        return Path()
-
-    @cached_property
-    def eye(self) -> Eye:
-        """Whose picture of a stereo scene this is; the one between the two unless `seen_by` chose another."""
-        return Eye()
-
-    def seen_by(self, name: EyeName) -> Self:
-        """A stereo scene as one eye sees it: its image is that eye's, what was read and derived is shared."""
-        assert self.stereo is not None
-        wide, high = self.stereo.squeeze
-        changes = {}
-        if (wide, high) != (1, 1):
-            changes["image"] = Image(width=self.image.width // wide, height=self.image.height // high)
-        copied = self.model_copy(update=changes)
-        copied.__dict__.pop("views", None)
-        copied.__dict__["eye"] = replace(self.eye, name=name, wide=wide, high=high)
-        return copied
-
-    def placed(self, folder: Path) -> Self:
-        """The same scene, as loaded from another folder."""
-        copied = super().model_copy()
-        # Beside the fields, as cached properties are: it is no part of what a scene says.
-        copied.__dict__["folder"] = folder
-        for derived in ("surroundings", "given", "views"):
-            copied.__dict__.pop(derived, None)
-        return copied
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As of every section; the copy stays in the scene's folder, and shows the same eye's picture.
-
-        What was read of a section that is not replaced is kept, so that it is what was checked, and is not read again.
-        """
-        copied = super().model_copy(update=update, deep=deep)
-        copied.__dict__["folder"] = self.folder
-        copied.__dict__["eye"] = self.eye
-        for derived, section in _READ.items():
-            if update and section not in update and derived in self.__dict__:
-                copied.__dict__[derived] = self.__dict__[derived]
-        return copied
-
-    @cached_property
+    @property
     def surroundings(self) -> "EnvironmentMap | None":
         """The environment's map, None without one; of a loaded scene a map's file has been read and checked.
 
         Raises:
             SceneError, FileError: it is missing or wrong; the path says where.
         """
-        if self.environment is None:
+        environment = self.environment
+        if environment is None:
             return None
         from clfractal.scene.environment import read_map
 
-        return read_map(self.environment, self.folder)
+        return self._once("surroundings", lambda: read_map(environment, self.folder))
 
-    @cached_property
+    @property
     def given(self) -> "GivenGrid | None":
         """The grid that a volume scene shows in place of its formula; of a loaded scene it has been read and checked.
 
@@ -132,21 +137,25 @@ class Scene(Section):
         """
         from clfractal.scene.volume import VolumeRenderer
 
-        if not isinstance(self.renderer, VolumeRenderer) or self.renderer.file is None:
+        renderer = self.renderer
+        if not isinstance(renderer, VolumeRenderer) or renderer.file is None:
             return None
         from clfractal.scene.given import read_given
 
-        given = read_given(self.renderer, self.folder)
-        self.renderer.check_level(given.low, given.high)
+        given = self._once("given", lambda: read_given(renderer, self.folder))
+        renderer.check_level(given.low, given.high)
         return given
 
-    @cached_property
+    @property
     def views(self) -> "list[tuple[Scene, Place]]":
         """The views of the layout, each a scene of its own, and their places in the picture.
 
         Raises:
             SceneError: there is no room for one.
         """
+        return self._once("views", self._find_views)
+
+    def _find_views(self) -> "list[tuple[Scene, Place]]":
         from clfractal.errors import SceneError, Where
 
         assert self.layout is not None
@@ -162,10 +171,7 @@ class Scene(Section):
             if isinstance(view.renderer, CutPlaneRenderer):
                 # The scene's planes stand in pictures of its object, and a plane by itself is none.
                 own["cut_planes"] = ()
-            shown = self.model_copy(update={**own, **view.changes()})
-            # It takes up a part of the screen.
-            shown.__dict__["eye"] = replace(self.eye, share=self.eye.share * place.width / self.image.width)
-            found.append((shown, place))
+            found.append((self.model_copy(update={**own, **view.changes()}), place))
         return found
 
     @property

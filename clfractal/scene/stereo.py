@@ -31,6 +31,10 @@ Mode = Literal[
 ]
 
 
+APART: tuple[Mode, ...] = ("pair", "multi_view")
+"""Modes that keep both pictures whole; nothing is composed."""
+
+
 @dataclass(frozen=True, slots=True)
 class Eye:
     """Whose picture a scene shows.
@@ -45,6 +49,10 @@ class Eye:
     wide: int = 1
     high: int = 1
     share: float = 1.0
+
+
+MIDDLE = Eye()
+"""The eye of a picture that is nobody's in particular: the cyclopean one, and that of scenes without stereo."""
 
 
 class StereoPlane(Section):

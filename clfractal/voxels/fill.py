@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
+from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import run_in_parts
 from clfractal.device.orbit import orbit_record
 from clfractal.device.select import Device
@@ -57,6 +58,7 @@ def fill_grid(
     precision: Precision,
     on_compile: Callable[[str], None] | None = None,
     progress: ProgressCallback | None = None,
+    token: CancelToken | None = None,
 ) -> Grid:
     """The grid of a scene's formula in the renderer's last box, with its values, normals and octree.
 
@@ -71,14 +73,16 @@ def fill_grid(
         precision: number type of points and orbits; normals by differences are float32.
         on_compile: told a line if programs have to be compiled first.
         progress: called after each launch; an exception in it, or a KeyboardInterrupt, ends the fill.
+        token: ends it between two launches.
 
     Raises:
         DeviceError: status 2, told before anything is evaluated, if the grid does not fit; status 3, the device failed.
         KernelBuildError: a program does not compile.
+        Stopped: the token was set.
     """
     lattice = lattice_of(used_boxes(scene, renderer)[1], renderer.resolution)
     check_grid(lattice, renderer, device)
-    return _Filler(scene, renderer, device, lattice, lanes, precision, progress).run(on_compile)
+    return _Filler(scene, renderer, device, lattice, lanes, precision, progress, token).run(on_compile)
 
 
 def check_grid(lattice: Lattice, renderer: VolumeRenderer, device: Device) -> None:
@@ -127,9 +131,10 @@ class _Filler:
         lanes: int,
         precision: Precision,
         progress: ProgressCallback | None,
+        token: CancelToken | None,
     ) -> None:
         self.scene, self.renderer, self.device, self.lattice = scene, renderer, device, lattice
-        self.lanes, self.precision, self.progress = lanes, precision, progress
+        self.lanes, self.precision, self.progress, self.token = lanes, precision, progress, token
         self.sub_points = renderer.sub_points if renderer.value == "coverage" else 1
         self.formula = write_formula(scene.chain)
         self.decided = 0  # octants
@@ -173,6 +178,7 @@ class _Filler:
             stats=self.stats,
             tell=self._tell,
             show_outside=shows_outside(renderer),
+            token=self.token,
             refine=kernels.get("refine_normals"),
             constants=self.constants,
         )
@@ -226,6 +232,7 @@ class _Filler:
             doing="looking at nodes",
             group=classify_nodes.group,
             first_part=8 * self.first_part,
+            token=self.token,
         )
         self.stats = replace(self.stats, octree_ms=self.stats.octree_ms + milliseconds)
         return flags
@@ -280,6 +287,7 @@ class _Filler:
             group=fill_bricks.group,
             first_part=self.first_part,
             done=lambda done: self._tell("fill", done, len(places)),
+            token=self.token,
         )
         points = (8 * len(places) - self.decided) * OCTANT**3 * self.sub_points**3
         self.stats = replace(self.stats, evaluated_voxels=points, fill_ms=milliseconds)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
+from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
@@ -61,6 +62,7 @@ def store(
     show_outside: bool = False,
     refine: Built | None = None,
     constants: Sequence[cl.Buffer] = (),
+    token: CancelToken | None = None,
 ) -> Grid:
     """The grid of evaluated bricks. Those outside as a whole are left out, those inside as a whole share a slot.
 
@@ -70,6 +72,7 @@ def store(
 
     Raises:
         DeviceError: status 2 if what is kept does not fit.
+        Stopped: the token was set.
     """
     extent = extent_buffer(device, lattice, evaluated.scale, evaluated.whole, evaluated.opaque)
     count = len(evaluated.places)
@@ -96,6 +99,7 @@ def store(
             doing="looking at bricks",
             group=classify.group,
             first_part=4096,
+            token=token,
         )
         with device.failures("looking at bricks"):
             cl.enqueue_copy(device.queue, classes, found)
@@ -160,6 +164,7 @@ def store(
             group=keep.group,
             first_part=1024,
             done=partial(_tell_from, tell, "store", low, count),
+            token=token,
         )
         if refine is not None:
             with device.failures("finding normals"):
@@ -175,6 +180,7 @@ def store(
                 group=refine.group,
                 first_part=16,
                 done=partial(_tell_from, tell, "normals", low, count),
+                token=token,
             )
     stats = replace(
         stats,

@@ -7,8 +7,8 @@ review", Journal of Imaging Science and Technology 53, 2009).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,23 +16,29 @@ import numpy.typing as npt
 from clfractal.device.select import Device
 from clfractal.errors import SceneError, Where
 from clfractal.optics.stereo import degrees, eye_distance, eye_views, parallax
-from clfractal.optics.view import View, scene_view
+from clfractal.optics.view import View, scene_view, seen_by, shown_views
 from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import Picture
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
-from clfractal.scene.stereo import Stereo, StereoPlane
-from clfractal.work import engine
-from clfractal.work import job as jobs
+from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo, StereoPlane
+from clfractal.work.job import Job
+from clfractal.work.prepare import prepare
+from clfractal.work.run import Executor, run
 
 Floats = npt.NDArray[np.float64]
 Ends = tuple[float, float]
 """The nearest and the farthest of something."""
+
+SIDES: tuple[EyeName, ...] = ("left", "right")
 
 LIMIT_DEGREES = 1.0
 """Parallax past which the viewer is warned."""
 
 # The quick look at the depth is that many pixels wide at most.
 _QUICK_SIDE = 320
+# The depth of a picture larger than this is not read again to measure parallax; a quick look tells as much.
+_MOST_PIXELS = 1 << 24
 # It misses the finest spikes: what is fitted is fitted to this part of the budget.
 _MARGIN = 0.95
 # An angle whose tangent is large but no more than that: the eyes of no viewer turn so far.
@@ -82,10 +88,10 @@ class Comfort:
         )
 
 
-def comfort_of(scene: Scene, points: Floats) -> Comfort:
-    """The range of parallax of points of a stereo scene, shape (n, 3), n at least 1, scene units."""
+def comfort_of(scene: Scene, points: Floats, eye: Eye = MIDDLE) -> Comfort:
+    """The range of parallax of points of a stereo scene, shape (n, 3), n at least 1, scene units, seen by an eye."""
     assert scene.stereo is not None
-    across = parallax(scene.stereo, eye_views(scene), points)[:, 0]
+    across = parallax(scene.stereo, eye_views(scene, eye), points)[:, 0]
     nearest, farthest = float(across.min()), float(across.max())
     ends = degrees(scene.stereo, [nearest, farthest])
     return Comfort(nearest, farthest, float(ends[0]), float(ends[1]))
@@ -93,7 +99,7 @@ def comfort_of(scene: Scene, points: Floats) -> Comfort:
 
 def comfort_of_depth(
     scene: Scene,
-    view: View,
+    eye: Eye,
     depth: npt.NDArray[np.float32],
     size: tuple[int, int],
     origin: tuple[int, int] = (0, 0),
@@ -101,72 +107,95 @@ def comfort_of_depth(
     """The range of parallax of what one eye's picture shows, or some of its pixels; None where that is nothing.
 
     Args:
-        scene: the stereo scene.
-        view, depth, size, origin: of the eye's picture, as of `points_of_depth`.
+        scene, eye: the stereo scene as that eye sees it.
+        depth, size, origin: of the eye's picture, as of `points_of_depth`.
     """
     assert scene.stereo is not None
+    view = scene_view(scene, eye)
     if scene.stereo.convergence == "toe_in":
         points = points_of_depth(view, depth, size, origin)
-        return comfort_of(scene, points) if len(points) else None
+        return comfort_of(scene, points, eye) if len(points) else None
     # Of eyes that look straight on parallax follows from depth alone: two points tell of all.
     nearest = float(np.where(depth > 0, depth, np.inf).min())
     farthest = float(np.where(depth < np.inf, depth, 0).max())
     if nearest == np.inf or farthest <= 0:
         return None
-    return comfort_of(scene, view.origin + np.array([[nearest], [farthest]]) * view.axis)
+    return comfort_of(scene, view.origin + np.array([[nearest], [farthest]]) * view.axis, eye)
 
 
-def measured(
-    scene: Scene,
-    device: Device,
-    *,
-    shared: engine.Shared | None = None,
-    on_compile: Callable[[str], None] | None = None,
-) -> Comfort | None:
+class Look:
+    """Quick looks at the depth of a scene, by an executor on a device."""
+
+    def __init__(self, device: Device, executor: Executor) -> None:
+        self.device, self.executor = device, executor
+
+    def points(self, scene: Scene, eye: Eye = MIDDLE) -> Floats:
+        """What an eye sees of a scene with one view, as points: shape (n, 3), scene units.
+
+        Raises:
+            DeviceError, KernelBuildError: as of a render.
+        """
+        scale = min(1.0, _QUICK_SIDE / max(scene.image.width, scene.image.height))
+        sides = {
+            "width": max(round(scene.image.width * scale), 1),
+            "height": max(round(scene.image.height * scale), 1),
+        }
+        small = scene.model_copy(update={"image": sides})
+        # A job of one view, whichever eye's it is.
+        alone = prepare(_with(small, mode="left", fit=None), self.device, samples=1, channels=("Z",))
+        view = replace(alone.views[0], scene=small, eye=eye)
+        film = Film(view.plan.channels, view.size)
+        run(replace(alone, views=(view,)), [film], self.executor)
+        return points_of_depth(view.camera, film["Z"], film.display)
+
+
+def measured(scene: Scene, look: Look) -> Comfort | None:
     """The range of parallax in a stereo scene's picture, by a quick look of either eye; None where nothing is seen.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.
     """
     found = []
-    for eye in _both(scene):
-        for view in [view for view, _ in eye.views] if eye.layout is not None else [eye]:
+    for name in SIDES:
+        for view, eye, _ in shown_views(*seen_by(scene, name)):
             if isinstance(view.renderer, CutPlaneRenderer):
                 found.append(Comfort(0.0, 0.0, 0.0, 0.0))
                 continue
-            points = seen_points(view, device, shared=shared, on_compile=on_compile)
+            points = look.points(view, eye)
             if len(points):
-                found.append(comfort_of(view, points))
+                found.append(comfort_of(view, points, eye))
     return Comfort.joined(found)
 
 
-def _both(scene: Scene) -> tuple[Scene, Scene]:
-    """A stereo scene as its left and its right eye see it: each looks around a thing on its own side."""
-    return scene.seen_by("left"), scene.seen_by("right")
+def comfort_of_job(job: Job, stores: Sequence[Picture], look: Look) -> Comfort | None:
+    """The range of parallax in a finished job: of all its pixels where their depth is at hand, else by quick looks.
 
+    None without stereo, and where nothing is seen.
 
-def seen_points(
-    scene: Scene,
-    device: Device,
-    *,
-    shared: engine.Shared | None = None,
-    on_compile: Callable[[str], None] | None = None,
-) -> Floats:
-    """What a scene's eye sees, as points: shape (n, 3), scene units; of a picture at most 320 pixels wide and high.
+    Args:
+        stores: of the job's views.
 
     Raises:
-        DeviceError, KernelBuildError: as of a render.
+        DeviceError, KernelBuildError: a look failed.
     """
-    scale = min(1.0, _QUICK_SIDE / max(scene.image.width, scene.image.height))
-    sides = {
-        "width": max(round(scene.image.width * scale), 1),
-        "height": max(round(scene.image.height * scale), 1),
-    }
-    small = scene.model_copy(update={"image": sides})
-    job = jobs.prepare(small, device, samples=1, channels=("Z",))
-    film = Film(job.plan.channels, (small.image.width, small.image.height))
-    engine.render(small, job.plan, device, film, on_compile=on_compile, shared=shared)
-    return points_of_depth(scene_view(small), film["Z"], film.display)
+    scene = job.scene
+    if scene.stereo is None:
+        return None
+    exact = (
+        "Z" in job.channels
+        and scene.layout is None
+        and scene.renderer.type != "cut_plane"
+        and scene.image.width * scene.image.height <= _MOST_PIXELS
+    )
+    if not exact:
+        return measured(scene, look)
+    found = []
+    for view, store in zip(job.views, stores, strict=True):
+        for row, band in store.bands():
+            part = comfort_of_depth(view.scene, view.eye, band["Z"], store.display, (store.region.x, row))
+            if part is not None:
+                found.append(part)
+    return Comfort.joined(found)
 
 
 def points_of_depth(
@@ -191,13 +220,7 @@ def points_of_depth(
     return points
 
 
-def fitted(
-    scene: Scene,
-    device: Device,
-    *,
-    shared: engine.Shared | None = None,
-    on_compile: Callable[[str], None] | None = None,
-) -> Scene:
+def fitted(scene: Scene, look: Look) -> Scene:
     """The scene with a plane and a separation that keep its depth within `stereo.budget`; as it is without `fit`.
 
     The eye between the two stays where it is, so what it sees does not change: the screen is placed between the nearest
@@ -214,11 +237,11 @@ def fitted(
     current = _with(scene, fit=None)
     view = scene_view(current)
     # First what the eye between the two sees, then what the two see that follow from it.
-    points = seen_points(current, device, shared=shared, on_compile=on_compile)
+    points = look.points(current)
     if not len(points):
         raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))
     current = _fitted_to(current, stereo, view, points)
-    more = [seen_points(eye, device, shared=shared, on_compile=on_compile) for eye in _both(current)]
+    more = [look.points(*seen_by(current, name)) for name in SIDES]
     return _fitted_to(current, stereo, view, np.concatenate([points, *more]))
 
 

@@ -1,39 +1,208 @@
-"""Rendering a scene: one view, or several that share a picture."""
+"""The engine: a device, an executor that keeps what it made, and pictures one after the other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeAlias
 
-from clfractal.device.select import Device
-from clfractal.pictures.tiled import TiledStore
-from clfractal.renderers.plan import Plan
-from clfractal.renderers.worker import Shared as Shared
+from clfractal.device.cancel import CancelToken
+from clfractal.device.launch import BUDGET_SECONDS
+from clfractal.device.select import Device, choose
+from clfractal.errors import ClfractalError, SceneError, Where
+from clfractal.pictures.film import Film
+from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.loop import Progress as Progress
-from clfractal.work.loop import ProgressCallback as ProgressCallback
-from clfractal.work.loop import render_one
-from clfractal.work.loop import render_tile as render_tile
-from clfractal.work.split import render_views
+from clfractal.work.comfort import Look, fitted
+from clfractal.work.films import JobFilms
+from clfractal.work.job import Job
+from clfractal.work.local import LocalExecutor
+from clfractal.work.prepare import prepare
+from clfractal.work.refine import Refinement, refined
+from clfractal.work.run import ProgressCallback, run
+
+SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
 
-def render(
-    scene: Scene,
-    plan: Plan,
-    device: Device,
-    store: TiledStore,
-    progress: ProgressCallback | None = None,
-    *,
-    on_compile: Callable[[str], None] | None = None,
-    shared: Shared | None = None,
-) -> Progress:
-    """Renders every tile that `store` lacks.
+class Engine:
+    """Renders scenes on one device, and keeps from one to the next what stays equal: programs, buffers, grids, maps.
 
-    `progress` is called after each batch. An exception in it, or a KeyboardInterrupt, ends the render between two
-    tiles; what is finished is in the store. `on_compile` is told a line if the program has to be compiled first.
-    `shared` keeps what further renders of the same picture need again.
+        with clfractal.Engine() as engine:
+            for angle in range(60):
+                film = engine.render(turned(scene, angle))
+
+    One thread may use it at a time; a second one gets an error.
+
+    Args:
+        device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; None: CLFRACTAL_DEVICE, else the best. Or a `Device`.
+        budget_seconds: how long launches under way may take together: what is cancelled ends after about that.
+        tell: told a line if something has to be compiled or measured first, or does not fit.
 
     Raises:
-        DeviceError, KernelBuildError: see `TileWorker`.
+        DeviceError: no device, or an unknown one.
     """
-    way = render_one if scene.layout is None else render_views
-    return way(scene, plan, device, store, progress, on_compile=on_compile, shared=shared)
+
+    def __init__(
+        self,
+        device: str | Device | None = None,
+        *,
+        budget_seconds: float = BUDGET_SECONDS,
+        tell: Callable[[str], None] | None = None,
+    ) -> None:
+        self.device = device if isinstance(device, Device) else choose(device)
+        self.tell = tell
+        self.executor = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
+        # Looks have a size of their own: they would drive a picture's buffers out.
+        self._looking = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
+        self._looking.kept = self.executor.kept
+        self._busy = threading.Lock()
+        self._closed = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Gives back the device's memory; the engine cannot be used any more."""
+        with self._alone():
+            self.executor.close()
+            self._looking.close()
+            self._closed = True
+
+    @property
+    def look(self) -> Look:
+        """Quick looks at a scene's depth, on the engine's device."""
+        return Look(self.device, self._looking)
+
+    def prepare(
+        self,
+        scene: SceneLike,
+        *,
+        precision: str | None = None,
+        samples: int | None = None,
+        region: tuple[int, int, int, int] | None = None,
+        channels: Sequence[str] | None = None,
+    ) -> Job:
+        """The job of a scene's picture: see `prepare.prepare`; a stereo scene is fitted first if it asks for that.
+
+        Raises:
+            SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
+            DeviceError, KernelBuildError: the quick look that `stereo.fit` takes failed.
+        """
+        loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+        decide = partial(
+            prepare,
+            device=self.device,
+            precision=precision,
+            samples=samples,
+            region=region,
+            channels=channels,
+            on_start=self.tell,
+        )
+        # First of all, so that what is wrong is told before anything is rendered.
+        job = decide(loaded)
+        if loaded.stereo is None or loaded.stereo.fit is None:
+            return job
+        return decide(fitted(loaded, self.look))
+
+    def render(
+        self,
+        scene: SceneLike,
+        progress: ProgressCallback | None = None,
+        *,
+        precision: str | None = None,
+        samples: int | None = None,
+        region: tuple[int, int, int, int] | None = None,
+        channels: Sequence[str] | None = None,
+        token: CancelToken | None = None,
+    ) -> Film:
+        """The picture of a scene, in memory; arguments, result and errors as of `clfractal.render`.
+
+        Args:
+            token: ends the render when it is set, from any thread; it then raises `clfractal.Stopped`.
+        """
+        with self._alone():
+            job = self.prepare(scene, precision=precision, samples=samples, region=region, channels=channels)
+            if job.stays_apart:
+                assert job.scene.stereo is not None
+                raise SceneError(
+                    f"{job.scene.stereo.mode} keeps both eyes' pictures; use render_pair, or another mode",
+                    Where(path="stereo.mode"),
+                )
+            films = JobFilms(job)
+            run(job, films.films, self.executor, progress=progress, token=token)
+            return films.picture()
+
+    def render_pair(
+        self,
+        scene: SceneLike,
+        progress: ProgressCallback | None = None,
+        *,
+        precision: str | None = None,
+        samples: int | None = None,
+        channels: Sequence[str] | None = None,
+        token: CancelToken | None = None,
+    ) -> tuple[Film, Film]:
+        """Both eyes' pictures of a stereo scene; arguments, result and errors as of `clfractal.render_pair`."""
+        with self._alone():
+            loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+            if loaded.stereo is None:
+                raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
+            if loaded.stereo.mode not in ("pair", "split_half", "over_under_half"):
+                # The others may need less of a pair.
+                stereo = loaded.stereo.model_copy(update={"mode": "pair"})
+                loaded = loaded.model_copy(update={"stereo": stereo})
+            job = self.prepare(loaded, precision=precision, samples=samples, channels=channels)
+            films = JobFilms(job)
+            run(job, films.films, self.executor, progress=progress, token=token)
+            eyes = films.eyes()
+            return eyes["left"], eyes["right"]
+
+    def refine(
+        self,
+        scene: SceneLike,
+        *,
+        precision: str | None = None,
+        samples: int | None = None,
+        region: tuple[int, int, int, int] | None = None,
+        channels: Sequence[str] | None = None,
+        token: CancelToken | None = None,
+    ) -> Refinement:
+        """Films of a scene from coarse to finished: every 8th, 4th and 2nd pixel, then all with more and more samples.
+
+        Each is a film of the whole size. The last has the bits of `render`. What passes hand on stays on the device, some
+        70 bytes a pixel (twice that in float64); where that does not fit, the samples are made in one pass. In a
+        notebook the result shows itself, and is redrawn with every pass.
+
+        Arguments and errors as of `render`.
+        """
+
+        def films() -> Generator[Film]:
+            with self._alone():
+                job = self.prepare(
+                    scene, precision=precision, samples=samples, region=region, channels=channels
+                )
+                yield from refined(job, self.executor, token)
+
+        return Refinement(films())
+
+    @contextmanager
+    def _alone(self) -> Iterator[None]:
+        if self._closed:
+            raise ClfractalError("this engine is closed")
+        if not self._busy.acquire(blocking=False):
+            raise ClfractalError(
+                "this engine is at work already; give each thread an engine of its own, or finish the refinement first"
+            )
+        try:
+            yield
+        finally:
+            self._busy.release()

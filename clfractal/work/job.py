@@ -1,133 +1,259 @@
-"""What a render needs before it starts, decided in one place for the shell and for Python.
+"""A job: everything that is decided of a picture before a device is touched, as plain data that can be sent anywhere.
 
-A job's scene has everything folded in that shapes the pixels (number type and samples in use included), so
-that rendering the scene in a picture's header gives the same pixels again.
+A job is a list of views and one composition that makes one picture of them. Its scene has everything folded in that shapes
+the pixels (number types and samples in use included), so that rendering the scene in a picture's header gives the same
+pixels again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias
 
 import clfractal
-from clfractal.device.select import Device, has_float64
-from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.device.select import DeviceInfo
+from clfractal.files.channels import CHANNELS
 from clfractal.files.document import write_document
 from clfractal.optics.view import scene_view
-from clfractal.pictures.outputs import save_outputs
+from clfractal.pictures.compose import APART, Composed, Side
+from clfractal.pictures.paste import Pasted
 from clfractal.pictures.tiled import Picture
-from clfractal.renderers.lanes import best_lanes, rule_of
-from clfractal.renderers.plan import Plan, PrecisionChoice, choose_precision, make_plan
+from clfractal.pictures.tiles import Region, TileGrid
+from clfractal.renderers.plan import PlannedView
+from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
+from clfractal.scene.stereo import Stereo
 
-MAX_SAMPLES = 65_536
-PRECISIONS = ("auto", "float32", "float64")
+# What tells how a pair is shown, and changes neither eye's picture.
+_SHOWN = ("mode", "swap", "method", "glasses", "colors")
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """One view is the whole picture; `view` is its number in the job."""
+
+    view: int
+
+
+@dataclass(frozen=True, slots=True)
+class Paste:
+    """Several views put into their places of one picture.
+
+    Attributes:
+        views: their numbers in the job, in the order in which they are put.
+        places: where each stands in the picture.
+        size: width and height of the whole picture, pixels.
+        region: the part of it that is made.
+        background: of what no view covers, linear Rec. 709.
+    """
+
+    views: tuple[int, ...]
+    places: tuple[Place, ...]
+    size: tuple[int, int]
+    region: Region
+    background: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class StereoPair:
+    """Two eyes' pictures, combined as a stereo section says.
+
+    Attributes:
+        stereo: the scene's section.
+        eyes: how each eye's picture is made; an eye whose picture is not needed is not there.
+        image: width and height of the scene's image, pixels.
+        region: the part of the finished picture that is made.
+    """
+
+    stereo: Stereo
+    eyes: Mapping[Side, Identity | Paste]
+    image: tuple[int, int]
+    region: Region
+
+
+Composition: TypeAlias = Identity | Paste | StereoPair
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A scene, how and where it is rendered; `remark` is a line for the user, or empty."""
+    """A picture to be made.
+
+    Attributes:
+        scene: what is shown; of a stereo scene with the screen's place and the eyes' separation decided.
+        views: what is rendered, each by itself.
+        composition: how one picture is made of them.
+        channels: those of the views.
+        device: what the decisions were made for.
+        remark: a line for the user, or empty.
+    """
 
     scene: Scene
-    plan: Plan
-    device: Device
+    views: tuple[PlannedView, ...]
+    composition: Composition
+    channels: tuple[str, ...]
+    device: DeviceInfo
     remark: str
+
+    @property
+    def region(self) -> Region:
+        """The part of the finished picture that is made, pixels."""
+        made = self.composition
+        return self.views[made.view].plan.region if isinstance(made, Identity) else made.region
+
+    @property
+    def tiles(self) -> int:
+        """Tiles of all views together."""
+        return sum(TileGrid(view.plan.region).count for view in self.views)
+
+    @property
+    def precision(self) -> str:
+        """The views' number types."""
+        return ", ".join(sorted({view.plan.precision for view in self.views}))
+
+    @property
+    def lanes(self) -> int:
+        """The views' lanes; the most of them, where they differ."""
+        return max((view.plan.lanes for view in self.views), default=1)
+
+    @property
+    def samples(self) -> int:
+        """Samples of a pixel, at most; the most of any view."""
+        return max((view.plan.samples for view in self.views), default=1)
+
+    @property
+    def sides(self) -> tuple[Side | None, ...]:
+        """Of each view the eye that it belongs to; None in a picture without stereo."""
+        made = self.composition
+        if not isinstance(made, StereoPair):
+            return (None,) * len(self.views)
+        found: dict[int, Side] = {}
+        for side, part in made.eyes.items():
+            found |= dict.fromkeys((part.view,) if isinstance(part, Identity) else part.views, side)
+        return tuple(found[number] for number in range(len(self.views)))
 
     def resolved(self) -> dict[str, Any]:
         """The scene as plain data, with what was decided in the place of what was wished."""
         plain = self.scene.resolved()
-        plain["renderer"] |= {"samples": self.plan.samples, "precision": self.plan.precision}
-        if plain["renderer"]["min_samples"] is not None:
-            plain["renderer"]["min_samples"] = min(plain["renderer"]["min_samples"], self.plan.samples)
-        if (plain["renderer"]["min_samples"] or 0) > self.plan.samples:
-            plain["renderer"]["min_samples"] = None  # the same, and a scene that loads
-        plain["output"]["channels"] = list(self.plan.channels)
+        if self.scene.layout is None:
+            plain["renderer"] = _decided(plain["renderer"], self.views[0])
+        else:
+            first_eye = [
+                view for view, side in zip(self.views, self.sides, strict=True) if side == self.sides[0]
+            ]
+            for view in first_eye:
+                own = plain["layout"]["views"][view.number]
+                own["renderer"] = _decided(view.scene.renderer.model_dump(mode="json"), view)
+        plain["output"]["channels"] = list(self.channels)
         return plain
 
     def header(self) -> dict[str, Any]:
-        """What picture files tell about the picture (see `Film`); `seconds` is added when it is known."""
+        """What picture files tell about the whole picture (see `Film`); `seconds` is added when it is known."""
         scene = self.scene
-        view = scene_view(scene)
+        camera = scene_view(scene)
         return {
             "scene": write_document(self.resolved()),
             "version": clfractal.__version__,
-            "device": self.device.info.name,
-            "platform": f"{self.device.info.platform}, {self.device.info.version}",
-            "precision": self.plan.precision,
+            "device": self.device.name,
+            "platform": f"{self.device.platform}, {self.device.version}",
+            "precision": self.precision,
             "exposure": scene.output.exposure,
             "transparent": scene.background == "transparent",
-            "worldToCamera": view.world_to_camera(),
-            "worldToNDC": view.world_to_ndc(),
+            "worldToCamera": camera.world_to_camera(),
+            "worldToNDC": camera.world_to_ndc(),
         }
 
-    def identity(self) -> dict[str, Any]:
-        """What has to be the same for a tile to have the same bits: kept with unfinished work."""
+    def view_header(self, number: int, whole: Mapping[str, Any]) -> dict[str, Any]:
+        """The same of one view's picture, from what `header` told: of an eye's, that eye's camera."""
+        side = self.sides[number]
+        if side is None:
+            return dict(whole)
+        camera = self.views[number].camera
+        cameras = {"worldToCamera": camera.world_to_camera(), "worldToNDC": camera.world_to_ndc()}
+        return {**whole, **cameras, "view": side}
+
+    def identity(self, number: int) -> dict[str, Any]:
+        """What has to be the same for a tile of one view to have the same bits: kept with unfinished work.
+
+        How files are written, and how a pair is shown, is free to change; the channels are compared by the journal.
+        """
+        view, side = self.views[number], self.sides[number]
         scene = self.resolved()
-        # How files are written is free to change; the channels are compared by the journal.
         del scene["output"]
-        surroundings = self.scene.surroundings
+        found: dict[str, Any] = {}
+        if side is not None:
+            scene["stereo"] = {key: value for key, value in scene["stereo"].items() if key not in _SHOWN}
+            scene["image"] = view.scene.image.model_dump()
+            found["eye"] = side
+        if self.scene.layout is not None:
+            found["view"] = view.number
+        surroundings, given = view.scene.surroundings, view.scene.given
         return {
+            **found,
             "scene": scene,
-            # The scene only names its map, and the file may be another one by now.
-            "environment": surroundings.digest() if surroundings is not None else None,
-            "grid": self.scene.given.digest() if self.scene.given is not None else None,
+            # The scene only names its map and its grid, and the files may be others by now.
+            "environment": surroundings.digest if surroundings is not None else None,
+            "grid": given.digest if given is not None else None,
             "version": clfractal.__version__,
-            "device": self.device.info.name,
-            "driver": self.device.info.key,
-            "lanes": self.plan.lanes,
+            "device": self.device.name,
+            "driver": self.device.key,
+            "lanes": view.plan.lanes,
         }
 
-    def save(self, store: Picture, paths: Sequence[str | Path]) -> None:
-        """Writes a finished film to files, as the scene's `output` wants them.
+    def picture(self, stores: Sequence[Picture], header: Mapping[str, Any] | None = None) -> Picture:
+        """The finished picture of the views' ones, read as it is needed.
+
+        Args:
+            stores: of each view.
+            header: added to what the views' headers agree in.
 
         Raises:
-            FileError: a file cannot be written.
+            ValueError: nothing is composed of a pair that stays apart.
         """
-        output = self.scene.output
-        save_outputs(
-            store,
-            paths,
-            half=output.half_channels,
-            bits=output.png_bits,
+        made = self.composition
+        if not isinstance(made, StereoPair):
+            return self._part(made, stores, header)
+        eyes = self.eyes(stores)
+        alone = made.stereo.mode in ("left", "right")
+        seconds = sum(store.header.get("seconds", 0.0) for store in stores)
+        # A picture of both has no camera of its own, and took the time of two.
+        common = {key: value for key, value in (header or {}).items() if not key.startswith("worldTo")}
+        added = None if alone else {**common, "seconds": seconds}
+        return Composed(made.stereo, made.image, eyes.get("left"), eyes.get("right"), made.region, added)
+
+    def eyes(self, stores: Sequence[Picture]) -> dict[Side, Picture]:
+        """Each eye's whole picture, of a stereo job."""
+        made = self.composition
+        assert isinstance(made, StereoPair)
+        return {side: self._part(part, stores) for side, part in made.eyes.items()}
+
+    @property
+    def stays_apart(self) -> bool:
+        """Whether both eyes' pictures are kept, and none is made of them."""
+        made = self.composition
+        return isinstance(made, StereoPair) and made.stereo.mode in APART
+
+    def _part(
+        self, made: Identity | Paste, stores: Sequence[Picture], header: Mapping[str, Any] | None = None
+    ) -> Picture:
+        if isinstance(made, Identity):
+            return stores[made.view]
+        fill = {"A": 1.0, **dict(zip("RGB", made.background, strict=True))}
+        return Pasted(
+            [stores[number] for number in made.views],
+            made.places,
+            made.size,
+            made.region,
+            {name: fill.get(name, CHANNELS[name].fill) for name in self.channels},
+            header,
         )
 
 
-def prepare(
-    scene: Scene,
-    device: Device,
-    *,
-    precision: str | None = None,
-    samples: int | None = None,
-    region: tuple[int, int, int, int] | None = None,
-    channels: Sequence[str] | None = None,
-    on_start: Callable[[str], None] | None = None,
-) -> Job:
-    """Decides number type, lanes, samples, region and channels; what is None is the scene's.
-
-    Args:
-        region: x, y, width, height in pixels.
-        on_start: told a line if the device is measured first, which takes some seconds, once.
-
-    Raises:
-        SceneError: the region is not inside the picture, an unknown precision or channel, a wrong number of
-            samples, float64 on a device without it.
-        DeviceError: no kernel works on the device.
-    """
-    wanted = precision if precision is not None else scene.renderer.precision
-    if wanted not in PRECISIONS:
-        raise SceneError(unknown_name("precision", wanted, PRECISIONS), Where("--precision"))
-    if samples is not None and not 1 <= samples <= MAX_SAMPLES:
-        raise SceneError(f"must be from 1 to {MAX_SAMPLES}, got {samples}", Where("--samples"))
-    choice = cast(PrecisionChoice, wanted)
-    used, remark = choose_precision(scene, choice, has_float64=has_float64(device.info))
-    plan = make_plan(
-        scene,
-        precision=used,
-        lanes=best_lanes(device, used, rule_of(scene.chain), on_start=on_start),
-        samples=samples,
-        region=region,
-        channels=tuple(channels) if channels is not None else None,
-    )
-    return Job(scene, plan, device, remark)
+def _decided(renderer: dict[str, Any], view: PlannedView) -> dict[str, Any]:
+    """A renderer's settings with the samples and the number type in use."""
+    found = {**renderer, "samples": view.plan.samples, "precision": view.plan.precision}
+    if found["min_samples"] is not None:
+        found["min_samples"] = min(found["min_samples"], view.plan.samples)
+    if (found["min_samples"] or 0) < 4:
+        found["min_samples"] = None  # the same, and a scene that loads
+    return found

@@ -12,11 +12,15 @@ from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.optics.view import View, camera_view
 from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import TiledStore
 from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.plan import Plan, make_plan
+from clfractal.renderers.plan import Plan, PlannedView, make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work import engine
+from clfractal.scene.stereo import MIDDLE, Eye
+from clfractal.work.job import Identity, Job
+from clfractal.work.local import LocalExecutor
+from clfractal.work.run import Progress, run
 
 Floats = npt.NDArray[np.float64]
 
@@ -91,11 +95,30 @@ def plan_of(scene: Scene, device: Device, precision: Precision = "float32", **se
     return make_plan(scene, precision=precision, **settings)
 
 
-def shoot(scene: Scene, device: Device, precision: Precision = "float32", **settings: Any) -> Film:
-    """The picture; settings as for `make_plan`."""
+_executors: dict[Device, LocalExecutor] = {}
+
+
+def job_of(scene: Scene, plan: Plan, device: Device, eye: Eye = MIDDLE) -> Job:
+    """A job of one view, planned as one likes."""
+    return Job(scene, (PlannedView(scene, plan, eye),), Identity(0), plan.channels, device.info, "")
+
+
+def render_planned(
+    scene: Scene, plan: Plan, device: Device, store: TiledStore, eye: Eye = MIDDLE, **settings: Any
+) -> Progress:
+    """Renders what a store lacks; settings as for `run`."""
+    executor = _executors.setdefault(device, LocalExecutor(device))
+    return run(job_of(scene, plan, device, eye), [store], executor, **settings)
+
+
+def shoot(
+    scene: Scene | tuple[Scene, Eye], device: Device, precision: Precision = "float32", **settings: Any
+) -> Film:
+    """The picture of a scene, or of one as an eye sees it; settings as for `make_plan`."""
+    scene, eye = scene if isinstance(scene, tuple) else (scene, MIDDLE)
     plan = plan_of(scene, device, precision, **settings)
     film = Film(plan.channels, (scene.image.width, scene.image.height), plan.region)
-    engine.render(scene, plan, device, film)
+    render_planned(scene, plan, device, film, eye)
     return film
 
 

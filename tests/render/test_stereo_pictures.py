@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from clfractal.work.pair import prepare_pair, render_eyes
 
 from clfractal.device import compiler, program
 from clfractal.device.select import Device
@@ -17,7 +18,6 @@ from clfractal.renderers import surface, volume
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName
 from clfractal.voxels import fill as voxels
-from clfractal.work.pair import prepare_pair, render_eyes
 from tests.render.shots import BALL, BALL_RADIUS, CHANNELS, points_of, scene_of, shoot, stacked
 
 SIZE = (64, 48)
@@ -67,9 +67,9 @@ def test_an_eyes_picture_is_a_mono_one_through_its_view(
 ) -> None:
     """Bit for bit: nothing but the View makes a stereo picture."""
     scene = stereo_scene(kind, convergence=convergence)
-    films = {side: shoot(scene.seen_by(side), device) for side in SIDES}
+    films = {side: shoot(seen_by(scene, side), device) for side in SIDES}
     for side in SIDES:
-        view = scene_view(scene.seen_by(side))
+        view = scene_view(*seen_by(scene, side))
         for module in (surface, volume):
             monkeypatch.setattr(module, "scene_view", lambda _, through=view: through)
         mono = shoot(mono_scene(kind, CAMERA), device)
@@ -91,7 +91,7 @@ def test_eyes_that_look_straight_are_plain_cameras(device: Device, kind: str, co
             "target": [x if parallel else 0.0, 0.0, 0.0],
             "fov": float(np.degrees(2 * np.arctan(1.5 / DISTANCE))),
         }
-        close(shoot(scene.seen_by(side), device), shoot(mono_scene(kind, camera), device))
+        close(shoot(seen_by(scene, side), device), shoot(mono_scene(kind, camera), device))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -107,7 +107,7 @@ def test_an_eye_beside_the_middle_sees_a_part_of_a_wider_picture(device: Device,
         wider = shoot(mono_scene(kind, camera, (70, 48)), device)
         first = 6 if side == "left" else 0
         part = {name: wider[name][:, first : first + 64] for name in CHANNELS}
-        close(shoot(scene.seen_by(side), device), part)
+        close(shoot(seen_by(scene, side), device), part)
 
 
 def close(found: Film, expected: Any) -> None:
@@ -124,7 +124,7 @@ def close(found: Film, expected: Any) -> None:
 def test_disparity_in_the_pictures(device: Device, kind: str) -> None:
     """What the left eye shows in a pixel the right eye shows in the same row, as far beside it as the parallax says."""
     scene = stereo_scene(kind)
-    left, right = (shoot(scene.seen_by(side), device) for side in SIDES)
+    left, right = (shoot(seen_by(scene, side), device) for side in SIDES)
     points = points_of(left)
     assert scene.stereo is not None
     across = parallax(scene.stereo, eye_views(scene), points.reshape(-1, 3))[:, 0].reshape(SIZE[::-1])
@@ -158,7 +158,7 @@ def test_the_middle_of_a_ball_before_and_behind_the_screen(device: Device) -> No
         scene = stereo_scene(size=size, plane=plane)
         middles = []
         for side in SIDES:
-            disc = shoot(scene.seen_by(side), device)["A"] > 0
+            disc = shoot(seen_by(scene, side), device)["A"] > 0
             middles.append(float((disc.sum(axis=0) * columns).sum() / disc.sum()))
         to_side = np.arctan2(APART / 2, depth)
         half = np.arcsin(BALL_RADIUS / np.hypot(APART / 2, depth))
@@ -192,13 +192,13 @@ class TestFlat:
         views: list[dict[str, Any]] = [{}, {"renderer": self.RENDERER}]
         scene = scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout={"views": views})
         half = (SIZE[0] // 2, SIZE[1])
-        films = {side: stacked(shoot(scene.seen_by(side), device)) for side in SIDES}
+        films = {side: stacked(shoot(seen_by(scene, side), device)) for side in SIDES}
         plane = stacked(shoot(scene_of(BALL, CAMERA, half, renderer=self.RENDERER), device))
         alone = scene_of(BALL, CAMERA, half, stereo={**VIEWER, "screen_width": 0.5})
         for side in SIDES:
             np.testing.assert_array_equal(films[side][:, half[0] :], plane)
             np.testing.assert_array_equal(
-                films[side][:, : half[0]], stacked(shoot(alone.seen_by(side), device))
+                films[side][:, : half[0]], stacked(shoot(seen_by(alone, side), device))
             )
         assert (films["left"] != films["right"]).any()
 
@@ -269,8 +269,8 @@ class TestCost:
 def test_depth_is_measured_from_the_eye_across_the_plane(device: Device) -> None:
     """Along the view's axis, which is not where an eye beside the middle looks."""
     scene = stereo_scene()
-    view: View = scene_view(scene.seen_by("left"))
-    film = shoot(scene.seen_by("left"), device)
+    view: View = scene_view(*seen_by(scene, "left"))
+    film = shoot(seen_by(scene, "left"), device)
     hit = film["A"] > 0
     depth = (points_of(film)[hit] - view.origin) @ view.axis
     np.testing.assert_allclose(film["Z"][hit], depth, atol=1e-5)

@@ -447,9 +447,9 @@ class TestScenes:
         squeezed = scene_of(BALL, CAMERA, (96, 54), stereo={"mode": mode})
         size = (48, 54) if mode == "split_half" else (96, 27)
         for name in SIDES:
-            small = squeezed.seen_by(name)
+            small = seen_by(squeezed, name)
             assert (small.image.width, small.image.height) == size
-            same_view(scene_view(small), scene_view(whole.seen_by(name)))
+            same_view(scene_view(small), scene_view(*seen_by(whole, name)))
 
     def test_a_view_of_a_layout_takes_up_a_part_of_the_screen(self) -> None:
         """Half of the screen's pixels are half of its width: the viewer sits twice as many of its widths before it."""
@@ -459,7 +459,9 @@ class TestScenes:
         for number, fov in ((0, 50), (1, 20)):
             alone = scene_of(BALL, {**CAMERA, "fov": fov}, (48, 54), stereo={**stereo, "screen_width": 0.25})
             for name in SIDES:
-                same_view(scene_view(scene.seen_by(name).views[number][0]), scene_view(alone.seen_by(name)))
+                same_view(
+                    scene_view(seen_by(scene, name).views[number][0]), scene_view(*seen_by(alone, name))
+                )
 
     @pytest.mark.parametrize("mode", ["split_half", "over_under_half"])
     def test_squeezed_views_of_a_layout(self, mode: str) -> None:
@@ -468,7 +470,7 @@ class TestScenes:
             scene_of(BALL, CAMERA, (96, 54), stereo={"mode": m}, layout=layout) for m in (mode, "split")
         ]
         for name in SIDES:
-            found, expected = (scene_view(scene.seen_by(name).views[1][0]) for scene in scenes)
+            found, expected = (scene_view(seen_by(scene, name).views[1][0]) for scene in scenes)
             same_view(found, expected)
 
     def test_the_lens_stays_sharp_where_it_was_told_to_be(self) -> None:
@@ -476,11 +478,11 @@ class TestScenes:
         lens = {**CAMERA, "f_number": 2.0}
         scene = scene_of(BALL, lens, (96, 54), stereo={})
         for name in SIDES:
-            view = scene_view(scene.seen_by(name))
+            view = scene_view(*seen_by(scene, name))
             assert view.focus_distance == pytest.approx(dot(view.center - view.origin, view.axis))
             assert view.lens_radius == camera_view(scene.camera, 96, 54).lens_radius != 0
         told = scene_of(BALL, {**lens, "focus_distance": 1.5}, (96, 54), stereo={})
-        assert scene_view(told.seen_by("left")).focus_distance == 1.5
+        assert scene_view(*seen_by(told, "left")).focus_distance == 1.5
 
     def test_copies_show_the_same_eye(self) -> None:
         scene: Scene = scene_of(BALL, CAMERA, (96, 54), stereo={}).seen_by("left")

@@ -1,0 +1,112 @@
+"""Work in progress of a job: a journal for each of its views, beside the first output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from clfractal.commands.order import PARTIAL
+from clfractal.commands.shell import Shell
+from clfractal.pictures.compose import Side
+from clfractal.pictures.store import JournalFilm
+from clfractal.work.job import Job
+
+
+class Unfinished:
+    """The journals of a job's views, open. Left by an exception they stay, for `--resume`; those without a tile go.
+
+    Args:
+        job: what is rendered.
+        header: what files tell about its whole picture.
+        output: the first output, which they stand beside.
+        resume: whether to continue earlier ones.
+        shell: is told of earlier work that is dropped.
+
+    Raises:
+        FileError: see `JournalFilm`.
+    """
+
+    def __init__(
+        self, job: Job, header: Mapping[str, Any], output: Path, shell: Shell, *, resume: bool
+    ) -> None:
+        self.paths = partial_paths(job, output)
+        self.films: list[JournalFilm] = []
+        try:
+            for number, (view, path) in enumerate(zip(job.views, self.paths, strict=True)):
+                if path.exists() and not resume:
+                    shell.say(f"{path}: earlier work is dropped; --resume would continue it")
+                self.films.append(
+                    JournalFilm(
+                        path,
+                        job.identity(number),
+                        view.plan.channels,
+                        view.size,
+                        view.plan.region,
+                        job.view_header(number, header),
+                        resume=resume,
+                    )
+                )
+        except BaseException:
+            self._leave()
+            raise
+        if not resume:
+            self._drop_others(output, shell)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            for film in self.films:
+                film.discard()
+        else:
+            self._leave()
+
+    def interrupted(self) -> str:
+        """What to say of an interrupt."""
+        done = sum(int(film.done.sum()) for film in self.films)
+        tiles = sum(film.grid.count for film in self.films)
+        return f"{self.paths[0]}: interrupted with {done} of {tiles} tiles done; --resume continues"
+
+    def _leave(self) -> None:
+        for film in self.films:
+            if film.done.any():
+                film.close()
+            else:
+                film.discard()
+
+    def _drop_others(self, output: Path, shell: Shell) -> None:
+        """Removes what an earlier render to the same output left of views that this one does not have."""
+        for stale in output.parent.glob(f"{_escaped(output.name)}.*{PARTIAL}"):
+            if stale not in self.paths and _names_a_view(stale.name[len(output.name) : -len(PARTIAL)]):
+                shell.say(f"{stale}: earlier work is dropped")
+                stale.unlink(missing_ok=True)
+
+
+def partial_paths(job: Job, output: Path) -> list[Path]:
+    """Where the unfinished work of each view is kept: of the first one in OUTPUT.partial."""
+    sides: list[Side] = [side for side in job.sides if side is not None]
+    found = []
+    for number, (view, side) in enumerate(zip(job.views, job.sides, strict=True)):
+        words = [
+            *(["right"] if side == "right" and "left" in sides else []),
+            *([f"view{view.number + 1}"] if view.number and number else []),
+        ]
+        found.append(output.with_name("".join([output.name, *(f".{word}" for word in words), PARTIAL])))
+    return found
+
+
+def _names_a_view(words: str) -> bool:
+    return all(
+        word == "right" or (word[:4] == "view" and word[4:].isdecimal()) for word in words.split(".")[1:]
+    )
+
+
+def _escaped(name: str) -> str:
+    from glob import escape
+
+    return escape(name)

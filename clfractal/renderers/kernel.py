@@ -1,0 +1,88 @@
+"""A renderer of tiles: how a planned view becomes the text of a program, and what that program reads.
+
+`kernels/passes.h` has what all their kernels have in common. What a kernel is launched over, and where its results go, is
+no concern of a renderer.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.source import FlatText, flatten
+from clfractal.device.structs import Precision
+from clfractal.renderers.passes import sampling_record, slots
+from clfractal.renderers.plan import PlannedView
+from clfractal.renderers.records import view_record
+from clfractal.renderers.resources import Resources
+
+KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
+
+
+class TileKernel(ABC):
+    """A kernel that renders tiles of one view. Nothing is compiled or uploaded here.
+
+    The text follows from the formula, the scene and the plan's number type and lanes, so that every executor uses the same.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, view: PlannedView, resources: Resources) -> None:
+        self.view, self.resources = view, resources
+        self.scene, self.plan = view.scene, view.plan
+
+    @property
+    def precision(self) -> Precision:
+        """The number type of the kernel's `real`."""
+        return self.plan.precision
+
+    @abstractmethod
+    def text(self) -> FlatText:
+        """The whole text of the program."""
+
+    @abstractmethod
+    def own_arguments(self) -> list[KernelArgument]:
+        """The kernel's own arguments, in its order: constants, or buffers that are on the device already."""
+
+    def arguments(self) -> list[KernelArgument]:
+        """All arguments that stay the same from one launch to the next, in the kernel's order."""
+        image, transparent = self.scene.image, self.scene.background == "transparent"
+        return [
+            view_record(self.view.camera, image.width, image.height, self.plan, self.precision),
+            sampling_record(
+                self.scene.renderer,
+                self.plan.samples,
+                self.precision,
+                transparent=transparent and self.has_alpha,
+            ),
+            *self.own_arguments(),
+            slots(self.plan, self.scene.renderer),
+        ]
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether pixels may be covered in part, so that coverage has noise of its own."""
+        return True
+
+
+def flat_text(entry: str, *, generated: Mapping[str, str], defines: Mapping[str, object]) -> FlatText:
+    """As `flatten`; the last texts are kept, since a picture after the other asks for the same."""
+    return _flat_text(entry, tuple(generated.items()), tuple(defines.items()))
+
+
+@lru_cache(maxsize=32)
+def _flat_text(
+    entry: str, generated: tuple[tuple[str, str], ...], defines: tuple[tuple[str, object], ...]
+) -> FlatText:
+    return flatten(entry, generated=dict(generated), defines=dict(defines), user=["formula.h"])
+
+
+def palette_or_none(table: npt.NDArray[np.float32] | None) -> npt.NDArray[np.float32]:
+    """A palette's colours, or a stand-in where the program reads none: no buffer is empty."""
+    return np.zeros(3, np.float32) if table is None else np.ascontiguousarray(table, np.float32)

@@ -1,0 +1,255 @@
+"""One view on one device: its program, what that reads, and its launches. What is equal from view to view stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device import program
+from clfractal.device.compiler import Argument, Warm
+from clfractal.device.launch import Pace
+from clfractal.device.select import Device
+from clfractal.pictures.tiles import TILE, TileGrid
+from clfractal.renderers.cut_plane import CutPlaneKernel
+from clfractal.renderers.kernel import KernelArgument, TileKernel
+from clfractal.renderers.passes import STATISTICS, kept_numbers
+from clfractal.renderers.plan import PlannedView
+from clfractal.renderers.resources import Resources
+from clfractal.renderers.surface import SurfaceKernel
+from clfractal.renderers.volume import VolumeKernel
+
+KERNELS: dict[str, type[TileKernel]] = {
+    kernel.name: kernel for kernel in (SurfaceKernel, VolumeKernel, CutPlaneKernel)
+}
+"""The kernel of each kind of renderer."""
+
+TILE_PIXELS = TILE * TILE
+# Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
+GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
+# Tiles of the largest launch: 1024 of them are a megapixel.
+CAPACITY = 512
+_SLOTS = 2
+
+Floats = npt.NDArray[np.float32]
+Counts = npt.NDArray[np.uint64]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What one launch renders.
+
+    Attributes:
+        tiles: indices in the view's grid of tiles.
+        packets: first packet of each tile, and the one after the last.
+        samples: first sample of each pixel, and the one after the last.
+        mode: PASS_KEEP and PASS_ADD, as bits.
+        kept_places: of each tile, its number among those that are kept for later passes.
+        slot: which of the two sets of buffers the results go into.
+    """
+
+    tiles: npt.NDArray[np.int32]
+    packets: tuple[int, int]
+    samples: tuple[int, int]
+    mode: int
+    kept_places: npt.NDArray[np.int32]
+    slot: int
+
+
+class OutputBuffers:
+    """Where launches leave their results: two sets, so that the device does not wait for the host to read one."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self.sizes = (0, 0, 0)
+        self.sets: list[tuple[cl.Buffer, cl.Buffer, cl.Buffer]] = []
+
+    def fit(self, film: int, statistics: int, places: int) -> bool:
+        """Makes sure that each set has room for so many bytes; True if there are other buffers now."""
+        wanted = (film, statistics, places)
+        if all(have >= want for have, want in zip(self.sizes, wanted, strict=True)):
+            return False
+        self.sizes = tuple(map(max, self.sizes, wanted))  # type: ignore[assignment]
+        self.sets = []
+        names = ("the film", "statistics", "tiles' places")
+        for _ in range(_SLOTS):
+            first, second, third = (
+                self.device.buffer(size, name) for size, name in zip(self.sizes, names, strict=True)
+            )
+            self.sets.append((first, second, third))
+        return True
+
+
+class Drawing:
+    """A view's program and arguments on a device, ready to be launched."""
+
+    def __init__(self, device: Device, outputs: OutputBuffers) -> None:
+        self.device, self.outputs = device, outputs
+        self.view: PlannedView | None = None
+        self.packets = self.group = self.capacity = 0
+        self.build_ms = 0.0
+        self.pace = Pace(1.0)
+        self._program: program.Program | None = None
+        self._kernels: list[cl.Kernel] = []
+        self._buffers: list[cl.Buffer] = []
+        self._given: list[KernelArgument] = []
+        self._kept: cl.Buffer | None = None
+        self._kept_count = 0
+
+    def update(self, view: PlannedView, resources: Resources, *, tiles: int) -> None:
+        """Takes a view, of which at most `tiles` tiles are rendered at a time.
+
+        What is equal to the view before stays; a program is built only if its text is another one.
+
+        Raises:
+            DeviceError: too little memory (status 2), or the device failed.
+            KernelBuildError: the program does not compile.
+            Stopped: cancelled while a program was built or a grid was filled.
+        """
+        plan = view.plan
+        kernel = KERNELS[view.scene.renderer.type](view, resources)
+        arguments = kernel.arguments()
+        self.packets = TILE_PIXELS // plan.lanes
+        self.group = max(GROUP_PIXELS[plan.lanes] // plan.lanes, 1)
+        self.capacity = max(1, min(CAPACITY, tiles))
+        film = self.capacity * len(plan.channels) * TILE_PIXELS * 4
+        statistics = self.capacity * self.packets * 4 * len(STATISTICS)
+        sizes = [_size(argument) for argument in arguments]
+        self.device.check_memory(
+            _SLOTS * (film + statistics) + sum(sizes), "rendering", largest=max(film, *sizes)
+        )
+        text = kernel.text()
+        built = program.build(
+            self.device,
+            text.text,
+            flags=program.math_flags(plan.precision),
+            sources=text.sources,
+            warm=self._warm(kernel.name, len(plan.channels), sizes),
+            on_compile=resources.on_compile,
+        )
+        self.build_ms = built.build_ms
+        if self._program is None or built.cl_program is not self._program.cl_program:
+            self._kernels = [built.kernel(kernel.name) for _ in range(_SLOTS)]
+            units = max(self.device.info.compute_units, 1)
+            # One sample of a tile for each core: what that takes is not known yet.
+            self.pace = Pace(float(units * self.packets))
+        self._program, self.view = built, view
+        self.outputs.fit(film, statistics, self.capacity * 16)
+        self._upload(arguments)
+        self._kept_count = len(kept_numbers(plan, view.scene.renderer))
+        self._set_arguments()
+
+    def keep(self, tiles: int) -> None:
+        """Makes room for what passes keep of so many tiles for each other.
+
+        Raises:
+            DeviceError: status 2, with the memory needed and had, if it does not fit.
+        """
+        needed = self.kept_bytes(tiles)
+        if self._kept is None or self._kept.size < needed:
+            self._kept = None
+            self._kept = self.device.buffer(needed, "unfinished pixels")
+            for kernel in self._kernels:
+                kernel.set_arg(1, self._kept)
+
+    def kept_bytes(self, tiles: int) -> int:
+        """Memory that so many tiles need between passes."""
+        assert self.view is not None
+        width = 8 if self.view.plan.precision == "float64" else 4
+        return tiles * self._kept_count * TILE_PIXELS * width
+
+    def forget(self) -> None:
+        """Gives back what is kept between passes."""
+        self._kept = None
+
+    def start(self, span: Span) -> cl.Event:
+        """Enqueues a launch; its results are there when the event is complete."""
+        assert self.view is not None
+        grid = TileGrid(self.view.plan.region)
+        places = np.zeros((len(span.tiles), 4), np.int32)
+        places[:, 0] = (grid.first_column + span.tiles % grid.columns) * TILE
+        places[:, 1] = (grid.first_row + span.tiles // grid.columns) * TILE
+        places[:, 2] = span.kept_places
+        kernel, (first, end) = self._kernels[span.slot], span.packets
+        numbers = (first, end, *span.samples, span.mode)
+        with self.device.failures("rendering"):
+            cl.enqueue_copy(self.device.transfers, self.outputs.sets[span.slot][2], places)
+            for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
+                kernel.set_arg(index, np.int32(number))
+            count = -(-(end - first) // self.group) * self.group
+            event = cl.enqueue_nd_range_kernel(
+                self.device.queue, kernel, (count, len(span.tiles)), (self.group, 1)
+            )
+            self.device.queue.flush()
+        return event
+
+    def collect(self, span: Span) -> tuple[Floats, Counts]:
+        """Channels of finished tiles, shape (tiles, channels, TILE, TILE), and the sums of STATISTICS."""
+        assert self.view is not None
+        film = np.empty((len(span.tiles), len(self.view.plan.channels), TILE, TILE), np.float32)
+        statistics = np.empty((len(span.tiles) * self.packets, len(STATISTICS)), np.uint32)
+        from_film, from_statistics, _ = self.outputs.sets[span.slot]
+        with self.device.failures("reading the film"):
+            cl.enqueue_copy(self.device.transfers, statistics, from_statistics)
+            cl.enqueue_copy(self.device.transfers, film, from_film)
+        return film, statistics.sum(axis=0, dtype=np.uint64)
+
+    def _upload(self, arguments: list[KernelArgument]) -> None:
+        """Brings arguments to the device that differ from those of the view before."""
+        given = [each if isinstance(each, cl.Buffer) else np.ascontiguousarray(each) for each in arguments]
+        buffers = []
+        for index, argument in enumerate(given):
+            if isinstance(argument, cl.Buffer):
+                buffers.append(argument)
+                continue
+            before = self._given[index] if index < len(self._given) else None
+            if before is not argument and not _same(before, argument):
+                reusable = isinstance(before, np.ndarray) and before.nbytes == argument.nbytes
+                buffers.append(self._sent(argument, self._buffers[index] if reusable else None))
+            else:
+                buffers.append(self._buffers[index])
+        self._buffers, self._given = buffers, given
+
+    def _sent(self, data: npt.NDArray[Any], buffer: cl.Buffer | None) -> cl.Buffer:
+        """A buffer, perhaps one that is there, with an array's bytes."""
+        if buffer is None:
+            buffer = self.device.buffer(max(data.nbytes, 16), "constants", read_only=True)
+        with self.device.failures("uploading constants"):
+            cl.enqueue_copy(self.device.queue, buffer, data.reshape(-1).view(np.uint8))
+        return buffer
+
+    def _set_arguments(self) -> None:
+        assert self.view is not None
+        kept = (
+            self._kept if self._kept is not None else self.outputs.sets[0][2]
+        )  # a stand-in: nobody reads it
+        counts = (len(self.view.plan.channels), self._kept_count)
+        with self.device.failures("setting arguments"):
+            for kernel, (film, statistics, places) in zip(self._kernels, self.outputs.sets, strict=True):
+                for index, buffer in enumerate((film, kept, statistics, places, *self._buffers)):
+                    kernel.set_arg(index, buffer)
+                for index, number in enumerate(counts, start=4 + len(self._buffers)):
+                    kernel.set_arg(index, np.int32(number))
+
+    def _warm(self, name: str, channels: int, sizes: list[int]) -> Warm:
+        """A first launch that renders nothing: it ends before its first packet."""
+        outputs = [TILE_PIXELS * 4 * channels, 16, self.packets * 4 * len(STATISTICS), 16]
+        # Of a large environment map a part is enough.
+        buffers = [*outputs, *(min(max(size, 16), 65_536) for size in sizes)]
+        arguments = [Argument("buffer", size) for size in buffers]
+        arguments += [Argument("scalar", dtype="int32", value=0.0)] * 7
+        return Warm(name, (self.packets, 1), (self.group, 1), tuple(arguments))
+
+
+def _size(argument: KernelArgument) -> int:
+    return int(argument.size if isinstance(argument, cl.Buffer) else argument.nbytes)
+
+
+def _same(before: KernelArgument | None, now: npt.NDArray[Any]) -> bool:
+    """Whether two arrays have the same bytes; records are compared whole, not field by field."""
+    return (
+        isinstance(before, np.ndarray) and before.nbytes == now.nbytes and before.tobytes() == now.tobytes()
+    )

@@ -1,0 +1,196 @@
+"""The executor of this process: one device, launches sized to a time budget."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.cancel import CancelToken
+from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
+from clfractal.device.select import Device
+from clfractal.pictures.tiles import TILE, TileGrid
+from clfractal.renderers.passes import PASS_ADD, PASS_KEEP
+from clfractal.renderers.plan import PlannedView
+from clfractal.renderers.resources import Kept, Resources
+from clfractal.work.drawing import Drawing, OutputBuffers, Span
+from clfractal.work.job import Job
+from clfractal.work.run import Result, Tally, WorkItem
+
+Tiles = npt.NDArray[np.int32]
+
+
+class LocalExecutor:
+    """Does work items on one device. Context, programs, buffers, grids and maps stay from one job to the next.
+
+    Args:
+        device: where.
+        budget_seconds: how long the launches under way may take together: what is cancelled ends after about that.
+        tell: told a line if a program has to be compiled first, or if something does not fit.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        *,
+        budget_seconds: float = BUDGET_SECONDS,
+        tell: Callable[[str], None] | None = None,
+    ) -> None:
+        self.device = device
+        self.budget_seconds = budget_seconds
+        self.tell = tell
+        self.kept = Kept()
+        self._outputs = OutputBuffers(device)
+        self._drawings: dict[int, Drawing] = {}
+
+    def execute(
+        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+    ) -> Iterator[Result]:
+        """See `Executor`. Tiles of a view come in the order in which they are wanted."""
+        self.kept.begin_picture()
+        for item in items:
+            if len(item.tiles) == 0:
+                continue
+            view = job.views[item.view]
+            drawing = self._drawing(item.view, view, len(item.tiles), token)
+            partial = item.samples != (0, view.plan.samples)
+            if partial:
+                drawing.keep(TileGrid(view.plan.region).count)
+            yield from _launched(drawing, item, self.budget_seconds, token, keep=partial)
+        for number in [number for number in self._drawings if number >= len(job.views)]:
+            del self._drawings[number]
+
+    def check_room(self, job: Job) -> None:
+        """Makes sure that a job can be rendered in passes.
+
+        Raises:
+            DeviceError: status 2, with the memory needed and had, if what passes hand on does not fit.
+        """
+        needs = [
+            self._drawing(number, view, 1, None).kept_bytes(TileGrid(view.plan.region).count)
+            for number, view in enumerate(job.views)
+        ]
+        self.device.check_memory(sum(needs), "a picture in passes", largest=max(needs))
+
+    def forget(self) -> None:
+        """Gives back what is kept between the passes of a picture."""
+        for drawing in self._drawings.values():
+            drawing.forget()
+
+    def close(self) -> None:
+        """Gives back all memory; the executor can be used again."""
+        self._drawings.clear()
+        self._outputs = OutputBuffers(self.device)
+        self.kept = Kept()
+
+    def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
+        if number not in self._drawings:
+            self._drawings[number] = Drawing(self.device, self._outputs)
+        drawing = self._drawings[number]
+        drawing.update(view, Resources(self.device, self.kept, self.tell, token), tiles=tiles)
+        return drawing
+
+
+def _launched(
+    drawing: Drawing, item: WorkItem, budget_seconds: float, token: CancelToken | None, *, keep: bool
+) -> Iterator[Result]:
+    """Launches an item's tiles and gives them as they are finished."""
+    cutter = _Cutter(drawing, item, keep=keep)
+    pace = drawing.pace
+    pace.seconds = budget_seconds / IN_FLIGHT
+    pace.most = float(drawing.capacity * cutter.per_tile)
+    pace.begin()
+    tally = Tally(build_ms=drawing.build_ms)
+    for span, milliseconds in in_launches(
+        drawing.device, cutter.enqueue, pace, doing="rendering", token=token
+    ):
+        tally.kernel_ms += milliseconds
+        if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
+            # A part of a tile: nothing to be read yet.
+            yield Result(item.view, np.zeros(0, np.int32), np.zeros((0, 0, TILE, TILE), np.float32), tally)
+        else:
+            film, sums = drawing.collect(span)
+            tally.rays, tally.steps, tally.iterations, tally.bad_distances = (int(each) for each in sums)
+            yield Result(item.view, span.tiles, film, tally)
+        tally = Tally()
+
+
+class _Cutter:
+    """Cuts an item into launches; work is counted in samples of a packet.
+
+    Most launches are of whole tiles. A tile that is too heavy is rendered in parts: some of its packets with all samples,
+    or if one work-group is still too heavy some of its samples, down to one sample of one packet.
+    """
+
+    def __init__(self, drawing: Drawing, item: WorkItem, *, keep: bool) -> None:
+        self.drawing, self.item, self.keep = drawing, item, keep
+        self.first, self.end = item.samples
+        self.per_tile = drawing.packets * (self.end - self.first)
+        self.place = 0  # of the next tile
+        self.slot = 0
+        # Of a tile in parts: its packets, and the next sample; no packets between two tiles.
+        self.packets = (0, 0)
+        self.sample = self.first
+
+    def enqueue(self, size: float) -> Part[Span] | None:
+        """Starts the next launch, of at most `size` samples of packets if that can be."""
+        span = self._next(size)
+        if span is None:
+            return None
+        event = self.drawing.start(span)
+        amount = (
+            len(span.tiles) * (span.packets[1] - span.packets[0]) * max(span.samples[1] - span.samples[0], 1)
+        )
+        return Part(event, float(amount), span)
+
+    def _next(self, size: float) -> Span | None:
+        tiles, drawing = self.item.tiles, self.drawing
+        left = len(tiles) - self.place
+        if self.packets == (0, 0):
+            if left == 0:
+                return None
+            count = int(min(size / self.per_tile, drawing.capacity, left))
+            if count >= 1:
+                # The last launch is not much shorter than the others: no core idles long at the end.
+                if count < left < 1.5 * count:
+                    count = (left + 1) // 2
+                chosen = tiles[self.place : self.place + count]
+                self.place += count
+                return self._span(chosen, (0, drawing.packets), self.item.samples, last=True)
+            self.packets = self._some_packets(0, size)
+            self.sample = self.first
+        packets, sample = self.packets, self.sample
+        width = packets[1] - packets[0]
+        samples = (sample, min(sample + max(int(size / width), 1), self.end))
+        chosen = tiles[self.place : self.place + 1]
+        last = samples[1] == self.end and packets[1] == drawing.packets
+        span = self._span(chosen, packets, samples, last=last)
+        if samples[1] < self.end:
+            self.sample = samples[1]
+        elif last:
+            self.packets = (0, 0)
+            self.place += 1
+        else:
+            self.packets = self._some_packets(packets[1], size)
+            self.sample = self.first
+        return span
+
+    def _some_packets(self, first: int, size: float) -> tuple[int, int]:
+        """Packets of a tile from the first on: whole groups with all samples, one group, or a part of one."""
+        group, samples = self.drawing.group, self.end - self.first
+        count = max(int(size / samples) // group * group, group) if size >= group else max(int(size), 1)
+        return first, min(first + count, self.drawing.packets)
+
+    def _span(self, tiles: Tiles, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
+        mode = 0
+        if self.keep or samples[1] < self.end:
+            mode |= PASS_KEEP
+            self.drawing.keep(1)
+        if samples[0] > self.first:
+            mode |= PASS_ADD
+        kept = tiles if self.keep else np.zeros(len(tiles), np.int32)
+        span = Span(tiles, packets, samples, mode, kept, self.slot)
+        if last:
+            self.slot = 1 - self.slot
+        return span

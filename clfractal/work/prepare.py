@@ -1,0 +1,116 @@
+"""Deciding everything about a picture: one place for the shell, for Python, and for every kind of picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import cast
+
+from clfractal.device.select import Device, has_float64
+from clfractal.device.structs import Precision
+from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.files.channels import check_channels
+from clfractal.optics.view import seen_by, shown_views
+from clfractal.pictures.compose import Side, composed_channels, eye_regions, picture_size
+from clfractal.pictures.tiles import Region
+from clfractal.renderers.lanes import best_lanes, rule_of
+from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region
+from clfractal.scene.layout import Place
+from clfractal.scene.model import Scene
+from clfractal.scene.stereo import MIDDLE, Eye
+from clfractal.work.job import Composition, Identity, Job, Paste, StereoPair
+
+MAX_SAMPLES = 65_536
+PRECISIONS = ("auto", "float32", "float64")
+
+
+def prepare(
+    scene: Scene,
+    device: Device,
+    *,
+    precision: str | None = None,
+    samples: int | None = None,
+    region: tuple[int, int, int, int] | None = None,
+    channels: Sequence[str] | None = None,
+    on_start: Callable[[str], None] | None = None,
+) -> Job:
+    """The job of a scene's picture; what is None is the scene's, or that of each of its views.
+
+    A stereo scene that shall be fitted (`stereo.fit`) is taken as it is; see `comfort.fitted`.
+
+    Args:
+        region: x, y, width, height of the part of the finished picture to make, pixels.
+        on_start: told a line if the device is measured first, which takes some seconds, once.
+
+    Raises:
+        SceneError: the region is not inside the picture, an unknown precision or channel, a wrong number of
+            samples, float64 on a device without it.
+        DeviceError: no kernel works on the device.
+    """
+    if precision is not None and precision not in PRECISIONS:
+        raise SceneError(unknown_name("precision", precision, PRECISIONS), Where("--precision"))
+    if samples is not None and not 1 <= samples <= MAX_SAMPLES:
+        raise SceneError(f"must be from 1 to {MAX_SAMPLES}, got {samples}", Where("--samples"))
+    names = check_channels(channels if channels is not None else scene.output.channels)
+    chooser = _Chooser(device, precision, on_start)
+    # One number type for both eyes, by what the eye between them sees.
+    chosen = [chooser.number_type(view, eye) for view, eye, _ in shown_views(scene)]
+    views: list[PlannedView] = []
+
+    def part(seen: Scene, eye: Eye, wanted: Region) -> Identity | Paste:
+        """Adds the views of one eye's picture, as far as they lie in a region of it."""
+        numbers, places = [], []
+        for number, (view, own_eye, place) in enumerate(shown_views(seen, eye)):
+            needed = _within(wanted, place)
+            if needed is None:
+                continue
+            used, lanes = chosen[number]
+            plan = Plan(used, lanes, samples if samples is not None else view.renderer.samples, needed, names)
+            numbers.append(len(views))
+            places.append(place)
+            views.append(PlannedView(view, plan, own_eye, number))
+        if seen.layout is None:
+            return Identity(numbers[0])
+        size = (seen.image.width, seen.image.height)
+        return Paste(tuple(numbers), tuple(places), size, wanted, seen.layout.background)
+
+    image, stereo = (scene.image.width, scene.image.height), scene.stereo
+    composition: Composition
+    if stereo is None:
+        composition = part(scene, MIDDLE, make_region(image, region))
+    else:
+        composed_channels(stereo, names)
+        whole = make_region(picture_size(stereo, image), region)
+        eyes: Mapping[Side, Identity | Paste] = {
+            side: part(*seen_by(scene, side), needed)
+            for side, needed in eye_regions(stereo, image, whole).items()
+            if needed is not None
+        }
+        composition = StereoPair(stereo, eyes, image, whole)
+    return Job(scene, tuple(views), composition, names, device.info, chooser.remark)
+
+
+class _Chooser:
+    """Chooses number types and lanes for one device."""
+
+    def __init__(self, device: Device, precision: str | None, on_start: Callable[[str], None] | None) -> None:
+        self.device, self.wanted, self.on_start = device, precision, on_start
+        self.remark = ""
+
+    def number_type(self, view: Scene, eye: Eye) -> tuple[Precision, int]:
+        wanted = self.wanted if self.wanted is not None else view.renderer.precision
+        info = self.device.info
+        used, remark = choose_precision(
+            view, cast(PrecisionChoice, wanted), has_float64=has_float64(info), eye=eye
+        )
+        self.remark = self.remark or remark
+        lanes = best_lanes(self.device, used, rule_of(view.chain), on_start=self.on_start)
+        return used, lanes
+
+
+def _within(region: Region, place: Place) -> Region | None:
+    """The part of a view that lies in a region of the picture, in the view's own pixels; None if it is none."""
+    left, top = max(place.x, region.x), max(place.y, region.y)
+    right, bottom = min(place.x + place.width, region.right), min(place.y + place.height, region.bottom)
+    if left >= right or top >= bottom:
+        return None
+    return Region(left - place.x, top - place.y, right - left, bottom - top)

@@ -1,0 +1,117 @@
+"""A picture in passes: coarse at first, then whole with more and more samples, the same bits at the end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from dataclasses import replace
+from importlib import import_module
+from itertools import pairwise
+
+import numpy as np
+
+from clfractal.device.cancel import CancelToken
+from clfractal.errors import DeviceError
+from clfractal.pictures.film import Film
+from clfractal.work.films import JobFilms
+from clfractal.work.job import Job
+from clfractal.work.local import LocalExecutor
+from clfractal.work.run import run
+
+DIVIDERS = (8, 4, 2)
+"""Pixels of the picture, in each direction, that a pixel of the first passes stands for.
+
+They are pictures of their own: a quarter of the next pass's pixels could be taken from the one before, but not where its
+rays' cones are as wide as its pixels, which makes it cheap; and a packet with a quarter of its lanes idle takes as long as
+a full one.
+"""
+
+
+class Refinement(Iterator[Film]):
+    """Films from coarse to finished: see `Engine.refine`. In a notebook it shows itself, redrawn with every pass."""
+
+    def __init__(self, films: Generator[Film]) -> None:
+        self._films = films
+
+    def __next__(self) -> Film:
+        return next(self._films)
+
+    def close(self) -> None:
+        """Ends the refinement before its last pass; the engine is free again."""
+        self._films.close()
+
+    def _ipython_display_(self) -> None:
+        display = import_module("IPython.display").display
+        handle = None
+        for film in self:
+            if handle is None:
+                handle = display(film, display_id=True)
+            else:
+                handle.update(film)
+
+
+def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None) -> Generator[Film]:
+    """The passes of a job, each as a film of the whole picture. The last has the bits of `run`.
+
+    Raises:
+        DeviceError, KernelBuildError, Stopped: as of `run`.
+    """
+    start = time.perf_counter()
+    try:
+        for divider in DIVIDERS:
+            coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
+            small = JobFilms(coarse)
+            run(coarse, small.films, executor, token=token)
+            whole = JobFilms(job)
+            for film, found in zip(whole.films, small.films, strict=True):
+                _enlarge(found, film, divider)
+            yield _shown(
+                whole, start, f"every {'8th' if divider == 8 else '4th' if divider == 4 else '2nd'} pixel"
+            )
+        ranges = _ranges(job.samples) if _fits(job, executor) else [(0, job.samples)]
+        films = JobFilms(job)
+        for samples in ranges:
+            before, films = films, JobFilms(job)
+            for film, old in zip(films.films, before.films, strict=True):
+                film.take(old)  # of views that are finished before the others
+            run(job, films.films, executor, token=token, samples=samples)
+            last = samples[1] == job.samples
+            yield _shown(films, start, "" if last else f"{samples[1]} of {job.samples} samples")
+    finally:
+        executor.forget()
+
+
+def _ranges(samples: int) -> list[tuple[int, int]]:
+    """The first sample and the one after the last of each pass: one, and then twice as many in all."""
+    ends = [0, 1]
+    while ends[-1] < samples:
+        ends.append(min(2 * ends[-1], samples))
+    return list(pairwise(ends))
+
+
+def _fits(job: Job, executor: LocalExecutor) -> bool:
+    """Whether the device has room for what passes hand on; says so if it has not."""
+    if job.samples == 1:
+        return True
+    try:
+        executor.check_room(job)
+    except DeviceError as error:
+        if executor.tell is not None:
+            executor.tell(f"{error.message}; the samples are made in one pass")
+        return False
+    return True
+
+
+def _enlarge(small: Film, whole: Film, divider: int) -> None:
+    """Each pixel of a coarse film becomes those that it stands for."""
+    region = whole.region
+    rows = np.arange(region.y, region.bottom) // divider - small.region.y
+    columns = np.arange(region.x, region.right) // divider - small.region.x
+    whole.fill({name: small[name][np.ix_(rows, columns)] for name in whole})
+
+
+def _shown(films: JobFilms, start: float, stage: str) -> Film:
+    film = films.picture()
+    film.tell("seconds", time.perf_counter() - start)
+    film.stage = stage
+    return film

@@ -1,0 +1,186 @@
+"""Doing a job: its work is cut into items, an executor does them, and the tiles go into stores.
+
+An executor is whatever does work items: this process (`local.py`), and later the window, several devices, or a cluster.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.cancel import CancelToken
+from clfractal.pictures.tiled import TiledStore
+from clfractal.pictures.tiles import TILE, Tile
+from clfractal.work.job import Job
+
+Floats = npt.NDArray[np.float32]
+Tiles = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class WorkItem:
+    """A part of a job. It may be cut by tiles as one likes.
+
+    By samples it may be cut only in order, on one device: sums of floats keep their order, so each range of a tile's
+    samples goes on from what the one before left there.
+
+    Attributes:
+        view: number of the view in the job.
+        tiles: indices in the grid of the view's region, in the order in which they are wanted.
+        samples: the first sample of each pixel, and the one after the last.
+    """
+
+    view: int
+    tiles: Tiles
+    samples: tuple[int, int]
+
+
+@dataclass(slots=True, kw_only=True)
+class Tally:
+    """What work took: camera rays over all samples, distance evaluations and applications of all rays, times in ms."""
+
+    rays: int = 0
+    steps: int = 0
+    iterations: int = 0
+    bad_distances: int = 0
+    kernel_ms: float = 0.0
+    build_ms: float = 0.0
+
+    def add(self, other: Tally) -> None:
+        """Adds what other work took."""
+        self.rays += other.rays
+        self.steps += other.steps
+        self.iterations += other.iterations
+        self.bad_distances += other.bad_distances
+        self.kernel_ms += other.kernel_ms
+        self.build_ms += other.build_ms
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """Finished tiles of a view, or of none, with what has been done since the result before.
+
+    Attributes:
+        view: number of the view in the job.
+        tiles: indices of the tiles.
+        film: their channels, shape (tiles, channels, TILE, TILE).
+        tally: see `Tally`.
+    """
+
+    view: int
+    tiles: Tiles
+    film: Floats
+    tally: Tally
+
+
+class Executor(Protocol):
+    """Does work items."""
+
+    def execute(
+        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+    ) -> Iterator[Result]:
+        """Does the items of a job and gives results as they come, tiles whole and each once, in any order.
+
+        When the iterator is closed, or raises, nothing of the job is under way any more.
+
+        Raises:
+            DeviceError, KernelBuildError: a device failed, or a program does not compile.
+            Stopped: the token was set.
+        """
+
+
+@dataclass(slots=True)
+class Progress(Tally):
+    """How far a job is, and what it has taken; `remaining` is None until it can be told."""
+
+    tiles: int
+    tiles_done: int = 0
+    started: float = field(default_factory=time.perf_counter)
+    tiles_before: int = 0
+
+    @property
+    def seconds(self) -> float:
+        """Wall time since the job was begun, without what programs took to be built."""
+        return max(time.perf_counter() - self.started - 1e-3 * self.build_ms, 0.0)
+
+    @property
+    def rays_per_second(self) -> float:
+        """Camera rays per second of wall time, over all samples."""
+        return self.rays / max(self.seconds, 1e-9)
+
+    @property
+    def remaining(self) -> float | None:
+        """Seconds left at the present rate."""
+        finished = self.tiles_done - self.tiles_before
+        if finished == 0:
+            return None
+        return self.seconds / finished * (self.tiles - self.tiles_done)
+
+    @property
+    def steps_per_ray(self) -> float:
+        """Distance evaluations per camera ray, shadow rays' included."""
+        return self.steps / max(self.rays, 1)
+
+
+ProgressCallback = Callable[[Progress], None]
+
+
+def run(
+    job: Job,
+    stores: Sequence[TiledStore],
+    executor: Executor,
+    *,
+    progress: ProgressCallback | None = None,
+    token: CancelToken | None = None,
+    samples: tuple[int, int] | None = None,
+) -> Progress:
+    """Renders every tile that the stores lack, and tells each store's header the seconds that its view took.
+
+    Args:
+        stores: where the tiles of each of the job's views go.
+        executor: does the work.
+        progress: called after each launch. An exception in it, or a KeyboardInterrupt, ends the work between two tiles;
+            what is finished is in the stores.
+        token: ends the work in the same way, with Stopped.
+        samples: the first sample and the one after the last, for a picture that is made in passes: then all tiles are
+            rendered, also those that are there. None: all samples of the tiles that are not.
+
+    Raises:
+        DeviceError, KernelBuildError, Stopped: see `Executor.execute`.
+        FileError: a store cannot be written.
+    """
+    grids = [store.grid for store in stores]
+    before = sum(int(np.count_nonzero(store.done)) for store in stores) if samples is None else 0
+    state = Progress(sum(grid.count for grid in grids), before, tiles_before=before)
+    items = []
+    for number, (view, store) in enumerate(zip(job.views, stores, strict=True)):
+        order = store.grid.order_from_center()
+        if samples is None:
+            items.append(WorkItem(number, order[~store.done[order]], (0, view.plan.samples)))
+        elif samples[0] < view.plan.samples:
+            items.append(WorkItem(number, order, (samples[0], min(samples[1], view.plan.samples))))
+    results = executor.execute(job, items, token)
+    last, seconds = state.seconds, [0.0] * len(stores)
+    for result in results:
+        for index, film in zip(result.tiles.tolist(), result.film, strict=True):
+            tile = grids[result.view].tile(index)
+            stores[result.view].put(index, cut(film, tile))
+        state.tiles_done += len(result.tiles)
+        state.add(result.tally)
+        seconds[result.view] += state.seconds - last
+        stores[result.view].tell("seconds", seconds[result.view])
+        last = state.seconds
+        if progress is not None:
+            progress(state)
+    return state
+
+
+def cut(film: Floats, tile: Tile) -> Floats:
+    """The part of a whole tile that lies in the region."""
+    left, top = tile.x % TILE, tile.y % TILE
+    return film[:, top : top + tile.height, left : left + tile.width]

@@ -1,0 +1,37 @@
+"""The files of a finished job."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from clfractal.pictures.outputs import output_files, save_outputs, save_views
+from clfractal.pictures.tiled import Picture
+from clfractal.work.job import Job
+
+
+def save_job(
+    job: Job, stores: Sequence[Picture], paths: Sequence[str | Path], header: Mapping[str, Any]
+) -> None:
+    """Writes a finished job's picture to files, as the scene's `output` and `stereo.mode` want them.
+
+    Args:
+        stores: of each view.
+        header: what files tell about the whole picture.
+
+    Raises:
+        FileError: a file cannot be written.
+    """
+    output = job.scene.output
+    if not job.stays_apart:
+        save_outputs(job.picture(stores, header), paths, half=output.half_channels, bits=output.png_bits)
+        return
+    eyes = job.eyes(stores)
+    for path in paths:
+        files = output_files(job.scene.stereo, path)
+        if len(files) == 2:
+            for eye, file in zip((eyes["left"], eyes["right"]), files, strict=True):
+                save_outputs(eye, [file], half=output.half_channels, bits=output.png_bits)
+        else:
+            save_views(eyes["left"], eyes["right"], path, half=output.half_channels)

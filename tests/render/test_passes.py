@@ -1,0 +1,160 @@
+"""A picture in passes has the bits of one that is made at once, for every renderer, however its samples are split."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.pictures.film import Film
+from clfractal.renderers.passes import kept_numbers
+from clfractal.renderers.plan import Plan, PlannedView
+from clfractal.scene.model import Scene
+from clfractal.work.local import LocalExecutor
+from clfractal.work.run import run
+from tests.render.shots import BALL, CHANNELS, PERSPECTIVE, job_of, plan_of, scene_of, shoot, stacked
+
+SIZE = (72, 48)
+NOISY = {"samples": 16, "noise": 0.02, "min_samples": 4}
+RENDERERS = {
+    "surface": {},
+    "volume": {"type": "volume", "resolution": 32},
+    "fog": {
+        "type": "volume",
+        "resolution": 32,
+        "value": "coverage",
+        "transfer": {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.5}]},
+    },
+    "cut_plane": {"type": "cut_plane", "plane": {"width": 3, "height": 2}},
+}
+SPLITS = ((1, 1, 2, 12), (16,), (4, 4, 4, 4), (5, 11), (3, 1, 8, 4))
+
+
+def scene_with(kind: str, **settings: object) -> Scene:
+    lights = [{"direction": [-1, 1, -1], "angular_size": 4, "rays": 2}]
+    renderer = {**RENDERERS[kind], "samples": 16, **settings}
+    formula = {"name": "hast", "iterations": 12} if kind == "cut_plane" else BALL
+    return scene_of(formula, PERSPECTIVE, SIZE, renderer=renderer, lights=lights)
+
+
+def in_passes(
+    scene: Scene, plan: Plan, device: Device, split: tuple[int, ...], executor: LocalExecutor
+) -> Iterator[Film]:
+    """The picture after each of some passes."""
+    done = 0
+    for count in split:
+        film = Film(plan.channels, SIZE, plan.region)
+        run(job_of(scene, plan, device), [film], executor, samples=(done, done + count))
+        done += count
+        yield film
+
+
+@pytest.mark.parametrize("adaptive", [False, True])
+@pytest.mark.parametrize("kind", RENDERERS)
+def test_passes_have_the_bits_of_one(kind: str, adaptive: bool, device: Device) -> None:
+    scene = scene_with(kind, **(NOISY if adaptive else {}))
+    plan = plan_of(scene, device)
+    whole = stacked(shoot(scene, device))
+    if adaptive and kind != "cut_plane":
+        assert len(np.unique(whole[..., CHANNELS.index("samples")])) > 1
+    executor = LocalExecutor(device)
+    for split in SPLITS:
+        *_, last = in_passes(scene, plan, device, split, executor)
+        np.testing.assert_array_equal(stacked(last).view(np.uint32), whole.view(np.uint32), str(split))
+
+
+@pytest.mark.parametrize("kind", ["surface", "cut_plane"])
+def test_passes_of_float64(kind: str, device: Device) -> None:
+    scene = scene_with(kind, **NOISY)
+    plan = plan_of(scene, device, "float64")
+    *_, last = in_passes(scene, plan, device, (1, 1, 2, 12), LocalExecutor(device))
+    np.testing.assert_array_equal(stacked(last), stacked(shoot(scene, device, "float64")))
+
+
+def test_a_pass_is_the_picture_of_its_samples(device: Device) -> None:
+    """After n of 16 samples each pixel is the mean of its first n: sums of differences tell the single samples."""
+    scene = scene_with("surface")
+    films = list(in_passes(scene, plan_of(scene, device), device, (1, 1, 2, 12), LocalExecutor(device)))
+    assert [float(film["samples"].max()) for film in films] == [1, 2, 4, 16]
+    sums = [film["R"] * film["samples"] for film in films]
+    assert all((after - before >= -1e-5).all() for before, after in zip(sums, sums[1:], strict=False))
+    assert np.abs(films[0]["R"] - films[-1]["R"]).max() > 0.01
+
+
+@pytest.mark.parametrize("budget", [1e-7, 1e-3])
+@pytest.mark.parametrize("kind", RENDERERS)
+def test_tiles_in_parts_have_the_same_bits(
+    kind: str, budget: float, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So little time that a launch is one sample of one packet: packets and samples of a tile are split."""
+    scene = scene_with(kind, **NOISY)
+    plan = plan_of(scene, device)
+    spans: list[tuple[tuple[int, int], tuple[int, int]]] = []
+    from clfractal.work.drawing import Drawing, Span
+
+    start = Drawing.start
+
+    def noted(self: Drawing, span: Span) -> object:
+        spans.append((span.packets, span.samples))
+        return start(self, span)
+
+    monkeypatch.setattr(Drawing, "start", noted)
+    film = Film(plan.channels, SIZE, plan.region)
+    executor = LocalExecutor(device, budget_seconds=budget)
+    state = run(job_of(scene, plan, device), [film], executor)
+    whole = shoot(scene, device)
+    np.testing.assert_array_equal(stacked(film), stacked(whole))
+    assert state.rays == whole["samples"].sum()
+    if budget < 1e-5:
+        assert any(samples[1] - samples[0] < 16 for _, samples in spans)
+        assert any(packets[1] - packets[0] < 1024 // plan.lanes for packets, _ in spans)
+
+
+def test_what_passes_keep_follows_from_the_channels(device: Device) -> None:
+    """70 bytes a pixel with all channels and noise; colours alone need 16."""
+    precision: Precision = "float32"
+    all_of_it = plan_of(scene_with("surface"), device, precision)
+    colors = plan_of(scene_with("surface"), device, precision, channels=("R", "G", "B"))
+    plain, noisy = scene_with("surface").renderer, scene_with("surface", **NOISY).renderer
+    assert len(kept_numbers(all_of_it, noisy)) == 18
+    assert kept_numbers(colors, plain) == ("red", "green", "blue", "shots")
+    assert kept_numbers(colors, noisy) == (
+        *("red", "green", "blue", "coverage", "shots"),
+        *("brightness", "brightness_square", "coverage_square"),
+    )
+
+
+def test_channels_that_are_not_wanted_change_nothing(device: Device) -> None:
+    scene = scene_with("surface", **NOISY)
+    plan = plan_of(scene, device, channels=("Z", "B"))
+    *_, last = in_passes(scene, plan, device, (1, 1, 2, 12), LocalExecutor(device))
+    whole = shoot(scene, device)
+    for name in ("Z", "B"):
+        np.testing.assert_array_equal(last[name], whole[name])
+
+
+def test_a_coarse_view_lies_on_the_same_plane(device: Device) -> None:
+    """Its pixels are blocks of the picture's, also where the size is no multiple. (Steps: their hits know no cone.)"""
+    scene = scene_of(BALL, PERSPECTIVE, (50, 37), renderer={"search": "steps"})
+    view = PlannedView(scene, plan_of(scene, device))
+    small = view.coarse(8)
+    assert small.size == (7, 5)
+    assert (small.plan.region.width, small.plan.region.height) == (7, 5)
+    film = Film(small.plan.channels, small.size, small.plan.region)
+    job = job_of(scene, small.plan, device)
+    run(job, [film], LocalExecutor(device))
+    fine = shoot(scene, device)
+    # The middle of a block of 8 x 8 lies between its 4th and 5th pixels.
+    blocks = {
+        (row, column): fine["Z"][8 * row + 3 :][:2, 8 * column + 3 :][:, :2]
+        for row, column in np.ndindex(5, 6)
+    }
+    smooth = {
+        place: block for place, block in blocks.items() if np.isfinite(block).all() and np.ptp(block) < 0.1
+    }
+    assert len(smooth) >= 6
+    for place, block in smooth.items():
+        assert abs(float(film["Z"][place]) - float(block.mean())) < 0.01
