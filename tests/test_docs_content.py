@@ -20,12 +20,13 @@ import typer
 import clfractal
 from clfractal import api, errors
 from clfractal.commands.app import app
-from clfractal.device import cache, select, tune
+from clfractal.device import cache, select
 from clfractal.files import document, regular
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser
+from clfractal.renderers import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
 from tests.shell import SCENE, InProcess
 
@@ -306,7 +307,7 @@ def test_exit_statuses() -> None:
 
 def test_environment_variables() -> None:
     told = {code(row[0]) for row in table("command-line.md", "Environment variables")}
-    ours = {select.ENVIRONMENT_VARIABLE, tune.LANES_VARIABLE, cache.ENVIRONMENT_VARIABLE}
+    ours = {select.ENVIRONMENT_VARIABLE, lanes.LANES_VARIABLE, cache.ENVIRONMENT_VARIABLE}
     assert ours == {name for name in told if name.startswith("CLFRACTAL_")}
     sources = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
     assert set(re.findall(r'"(CLFRACTAL_\w+)"', sources)) == ours | {"CLFRACTAL_TEST_ABORT"}

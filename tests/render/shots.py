@@ -12,8 +12,8 @@ from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.optics.view import View, camera_view
 from clfractal.pictures.film import Film
-from clfractal.renderers.lanes import best_lanes
 from clfractal.pictures.tiled import TiledStore
+from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.plan import Plan, PlannedView, make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
