@@ -46,7 +46,7 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
     int n = FIRST_COUNT, limit = orbit->iterations;
     for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
         while (n < limit) {
-            if (!any_lane(alive)) break;
+            if (!any_lane(alive) || orbit_cancelled(orbit)) break;
             const int end = min(n + PERIOD_CHECK, limit);
             for (; n < end; ++n) {
                 if (!any_lane(alive)) break;

@@ -59,6 +59,13 @@ INLINE real distance_from_growth(real square, real relative, real count, __const
     return fmax(pick(is_nan(distance), R(0.0), distance), R(0.0));
 }
 
+// Whether the work was cancelled. Long orbits look now and then, or a launch could last as long as it likes: the host writes
+// there while kernels run, which reaches them where both share their memory. What such a launch leaves is thrown away.
+#define ORBIT_LOOK 4096
+INLINE int orbit_cancelled(__constant const struct Orbit *orbit) {
+    return *(volatile __constant const int *)&orbit->cancelled;
+}
+
 // Lanes that end the orbit inside at the iteration limit: true for those still within the bailout.
 INLINE mask settled(real square, __constant const struct Orbit *orbit) {
     return less_equal(square, (real)(orbit->bailout_square));
@@ -71,8 +78,12 @@ INLINE orbit_end orbit_count(vec point, mask active, __constant const struct Orb
     real square = state_square(z);
     real count = R(0.0) + (real)((scalar)min(FIRST_COUNT, orbit->iterations));
     mask alive = active & less_equal(square, (real)(orbit->bailout_square));
-    for (int n = FIRST_COUNT; n < orbit->iterations; ++n) {
+    for (int n = FIRST_COUNT, look = ORBIT_LOOK; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;
+        if (n == look) {
+            if (orbit_cancelled(orbit)) break;
+            look += ORBIT_LOOK;
+        }
         const state next = apply(n, z, c, k);
         z = state_pick(alive, next, z);
         square = pick(alive, state_square(next), square);
@@ -92,8 +103,12 @@ INLINE orbit_end orbit_solid(vec point, mask active, int limit, __constant const
     real square = state_square(z);
     real count = (real)((scalar)min(FIRST_COUNT, limit));
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
-    for (int n = FIRST_COUNT; n < limit; ++n) {
+    for (int n = FIRST_COUNT, look = ORBIT_LOOK; n < limit; ++n) {
         if (!any_lane(alive)) break;
+        if (n == look) {
+            if (orbit_cancelled(orbit)) break;
+            look += ORBIT_LOOK;
+        }
         const state next = apply(n, z, c, k);
         z = state_pick(alive, next, z);
         square = pick(alive, state_square(next), square);
@@ -124,10 +139,15 @@ INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const 
     real count = (real)((scalar)FIRST_COUNT);
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
     mask inside = alive & ~alive;
-    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
-        if (n == orbit->iterations) {
-            inside = alive & settled(square, orbit);
-            alive &= ~inside;
+    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
+        if (n == look) {
+            if (n == orbit->iterations) {
+                inside = alive & settled(square, orbit);
+                alive &= ~inside;
+            } else if (orbit_cancelled(orbit)) {
+                break;
+            }
+            look = n < orbit->iterations ? min(n + ORBIT_LOOK, orbit->iterations) : INT_MAX;
         }
         if (!any_lane(alive)) break;
         real next_growth = growth;
@@ -168,10 +188,15 @@ INLINE clearance orbit_dual_distance(vec point, mask active, __constant const st
     real count = (real)((scalar)FIRST_COUNT);
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
     mask inside = alive & ~alive;
-    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
-        if (n == orbit->iterations) {
-            inside = alive & settled(square, orbit);
-            alive &= ~inside;
+    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
+        if (n == look) {
+            if (n == orbit->iterations) {
+                inside = alive & settled(square, orbit);
+                alive &= ~inside;
+            } else if (orbit_cancelled(orbit)) {
+                break;
+            }
+            look = n < orbit->iterations ? min(n + ORBIT_LOOK, orbit->iterations) : INT_MAX;
         }
         if (!any_lane(alive)) break;
         const dual_state next = dual_apply(n, z, c, k);

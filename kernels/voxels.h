@@ -78,6 +78,7 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
     }
     int n = FIRST_COUNT, renewed = 1, chunks = 0;
     while (n + CHUNK <= limit && any_lane(open)) {
+        if ((chunks & 1023) == 1023 && orbit_cancelled(orbit)) return;
         #pragma unroll
         for (int step = 0; step < CHUNK; ++step) {
             #pragma unroll

@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from clfractal.commands import frames
 from clfractal.commands.shell import Shell
 from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, choose
@@ -112,7 +113,7 @@ class Row:
 
 def row_names() -> list[str]:
     """The table's rows, in its order."""
-    return [*ROWS, GRID_ROW, SHELL_ROW]
+    return [*ROWS, GRID_ROW, *frames.ROWS, SHELL_ROW]
 
 
 def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Sequence[str] = ()) -> None:
@@ -134,12 +135,15 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
     for name in names:
         if name == GRID_ROW:
             rows.append(_grid_row(chosen))
+        elif name in frames.ROWS:
+            ms, wall_ms = frames.frame_times(name, chosen)
+            rows.append(Row(name, ms=ms, wall_ms=wall_ms))
         elif name == SHELL_ROW:
             rows.append(_shell_row(chosen))
         else:
             text, changes, repetitions = ROWS[name]
             rows.append(_render_row(name, load_scene(text, overrides=changes), chosen, peak, repetitions))
-        shell.say(f"{name}: {rows[-1].ms:.0f} ms")
+        shell.say(f"{name}: {rows[-1].ms:.1f} ms")
     report = {
         "device": chosen.info.name,
         "platform": f"{chosen.info.platform}, {chosen.info.version}",
@@ -203,20 +207,6 @@ def _once(job: Job, engine: Engine) -> tuple[float, Progress]:
     start = time.perf_counter()
     state = do(job, films.films, engine.executor)
     return time.perf_counter() - start, state
-
-
-def _frames_row(name: str, frames: Sequence[Scene], device: Device) -> Row:
-    """Frames of one engine, one after the other; times are of a frame, and what is before the first does not count."""
-    kernel_ms: list[float] = []
-    with Engine(device) as engine:
-        engine.render(frames[0])
-        times = []
-        for frame in frames:
-            start = time.perf_counter()
-            engine.render(frame, lambda state: kernel_ms.append(state.kernel_ms))
-            times.append((kernel_ms[-1], 1e3 * (time.perf_counter() - start)))
-    ms, wall_ms = (statistics.median(column) for column in zip(*times, strict=True))
-    return Row(name, ms=ms, wall_ms=wall_ms)
 
 
 def _grid_row(device: Device) -> Row:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -14,6 +14,7 @@ import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.device.watched import Watched
 from clfractal.errors import ClfractalError, DeviceError
 
 # Time that the work under way on a device should take, unless a caller gives another.
@@ -69,11 +70,12 @@ class Pace:
         self.size = float(np.clip(rate * self.seconds, self.least, largest))
 
 
-def wait(event: cl.Event, device: Device, doing: str) -> float:
+def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None = None) -> float:
     """Waits for a launch in short sleeps, so that an interrupt is seen; gives its milliseconds on the device.
 
     Raises:
         DeviceError: the launch failed.
+        Stopped: the token was set.
     """
     pause = POLL_SECONDS / 16
     with device.failures(doing):
@@ -83,6 +85,8 @@ def wait(event: cl.Event, device: Device, doing: str) -> float:
                 break
             if status < 0:
                 raise DeviceError(f"{device.info.name}: the device failed while {doing}: status {status}")
+            if token is not None:
+                token.check()
             time.sleep(pause)
             pause = min(2 * pause, POLL_SECONDS)
         return float(event.profile.end - event.profile.start) * 1e-6
@@ -95,6 +99,7 @@ def in_launches(
     *,
     doing: str,
     token: CancelToken | None = None,
+    watched: Sequence[Watched] = (),
 ) -> Iterator[tuple[T, float]]:
     """Runs work in launches, two of them under way at a time, and gives what `enqueue` told of each with its milliseconds.
 
@@ -103,6 +108,8 @@ def in_launches(
     Args:
         enqueue: starts the next part, of at most the given amount; None if there is nothing more to do.
         pace: sizes the launches, and learns from them.
+        token: ends the work.
+        watched: records of the kernel's that make launches under way end early, where that can be.
 
     Raises:
         DeviceError: a launch failed.
@@ -122,16 +129,28 @@ def in_launches(
                     flying.append(part)
             if not flying:
                 return
-            milliseconds = wait(flying[0].event, device, doing)
+            milliseconds = wait(flying[0].event, device, doing, token)
             part = flying.popleft()
             pace.learn(part.amount, milliseconds)
             if token is not None:
                 token.check()
             yield part.about, milliseconds
     finally:
+        if flying:
+            _end(flying, device, doing, watched)
+
+
+def _end(flying: Iterable[Part[T]], device: Device, doing: str, watched: Sequence[Watched]) -> None:
+    """Waits until launches under way are over, sooner where they look whether somebody does."""
+    for records in watched:
+        records.cancel(True)
+    try:
         for part in flying:
             with suppress(ClfractalError):
                 wait(part.event, device, doing)
+    finally:
+        for records in watched:
+            records.cancel(False)
 
 
 def run_in_parts(
@@ -146,6 +165,7 @@ def run_in_parts(
     first_part: int = 256,
     done: Callable[[int], None] | None = None,
     token: CancelToken | None = None,
+    watched: Sequence[Watched] = (),
 ) -> float:
     """Runs `kernel` over `count` things with `items` work-items each, in launches of about the usual budget.
 
@@ -162,7 +182,8 @@ def run_in_parts(
         group: work-group, along both dimensions.
         first_part: things of the first part.
         done: told how many things are finished after each part.
-        token: ends the work between two launches.
+        token: ends the work.
+        watched: see `in_launches`.
 
     Returns:
         Milliseconds on the device.
@@ -191,7 +212,7 @@ def run_in_parts(
 
     total = 0.0
     for finished, milliseconds in in_launches(
-        device, enqueue, Pace(float(first_part)), doing=doing, token=token
+        device, enqueue, Pace(float(first_part)), doing=doing, token=token, watched=watched
     ):
         total += milliseconds
         if done is not None:

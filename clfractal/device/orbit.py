@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.device.watched import CANCELLED
 from clfractal.formulas.language import Chain
 
 Record = np.ndarray[Any, np.dtype[np.void]]
@@ -23,6 +24,7 @@ ORBIT = Struct(
         Field("log_distance_bailout", "real", 0, "natural logarithm of the distance bailout"),
         Field("log2_degree", "real", 0, "binary logarithm of the degree of one application"),
         Field("solid_radius", "real", 0, "radius in z that holds the last solid, for degree 1"),
+        Field(CANCELLED, "int", 0, "1: the work was cancelled, and long orbits end at once"),
     ],
 )
 
@@ -46,5 +48,6 @@ def orbit_record(chain: Chain, iterations: int, precision: Precision, bailout: f
         "log_distance_bailout": math.log(outer),
         "log2_degree": math.log2(chain.degree) / chain.cycle_length if chain.degree > 1 else 0.0,
         "solid_radius": chain.solid_radius,
+        CANCELLED: 0,
     }
     return ORBIT.value(precision, values)

@@ -237,6 +237,15 @@ def vectorises_across_work_items(info: DeviceInfo) -> bool:
     return info.kind == "gpu" or is_intel_cpu(info)
 
 
+def sees_host_writes(info: DeviceInfo) -> bool:
+    """Whether a running kernel sees what the host writes into a buffer made of the host's own memory.
+
+    Processors do: their drivers use that memory in its place (tried with PoCL 3.0 and 3.1). The standard promises nothing,
+    so only the wish to end early is told that way.
+    """
+    return info.kind == "cpu" and not is_simulator(info)
+
+
 def is_out_of_memory(error: cl.Error) -> bool:
     """Whether a failure means that memory is short: drivers use any of four codes for it."""
     status = cl.status_code

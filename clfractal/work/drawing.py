@@ -13,6 +13,7 @@ from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device
+from clfractal.device.watched import Watched, is_watched
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.cut_plane import CutPlaneKernel
 from clfractal.renderers.kernel import KernelArgument, TileKernel
@@ -96,6 +97,7 @@ class Drawing:
         self._kernels: list[cl.Kernel] = []
         self._buffers: list[cl.Buffer] = []
         self._given: list[KernelArgument] = []
+        self._watched: dict[int, Watched] = {}
         self._kept: cl.Buffer | None = None
         self._kept_count = 0
 
@@ -142,6 +144,11 @@ class Drawing:
         self._upload(arguments)
         self._kept_count = len(kept_numbers(plan, view.scene.renderer))
         self._set_arguments()
+
+    @property
+    def watched(self) -> list[Watched]:
+        """Arguments that make launches under way end early, where that can be."""
+        return list(self._watched.values())
 
     def keep(self, tiles: int) -> None:
         """Makes room for what passes keep of so many tiles for each other.
@@ -209,13 +216,18 @@ class Drawing:
             before = self._given[index] if index < len(self._given) else None
             if before is not argument and not _same(before, argument):
                 reusable = isinstance(before, np.ndarray) and before.nbytes == argument.nbytes
-                buffers.append(self._sent(argument, self._buffers[index] if reusable else None))
+                buffers.append(self._sent(index, argument, self._buffers[index] if reusable else None))
             else:
                 buffers.append(self._buffers[index])
         self._buffers, self._given = buffers, given
+        self._watched = {index: each for index, each in self._watched.items() if index < len(given)}
 
-    def _sent(self, data: npt.NDArray[Any], buffer: cl.Buffer | None) -> cl.Buffer:
-        """A buffer, perhaps one that is there, with an array's bytes."""
+    def _sent(self, index: int, data: npt.NDArray[Any], buffer: cl.Buffer | None) -> cl.Buffer:
+        """A buffer, perhaps one that is there, with the bytes of an argument."""
+        self._watched.pop(index, None)
+        if is_watched(data):
+            self._watched[index] = Watched(self.device, data)
+            return self._watched[index].buffer
         if buffer is None:
             buffer = self.device.buffer(max(data.nbytes, 16), "constants", read_only=True)
         with self.device.failures("uploading constants"):

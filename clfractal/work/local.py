@@ -103,7 +103,7 @@ def _launched(
     pace.begin()
     tally = Tally(build_ms=drawing.build_ms)
     for span, milliseconds in in_launches(
-        drawing.device, cutter.enqueue, pace, doing="rendering", token=token
+        drawing.device, cutter.enqueue, pace, doing="rendering", token=token, watched=drawing.watched
     ):
         tally.kernel_ms += milliseconds
         if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:

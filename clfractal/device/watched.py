@@ -1,0 +1,48 @@
+"""Records that kernels look at while they run: so the host can end launches that would last too long.
+
+OpenCL has no way to end a launch. Where host and device share their memory, as processors do, a kernel sees what the host
+writes into a buffer that lies in the host's own memory. Elsewhere the record is an ordinary one, and launches are only as
+short as they are made.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.select import Device, sees_host_writes
+
+CANCELLED = "cancelled"
+"""The field of a struct that kernels look at."""
+
+# What drivers want of memory that they are to use in its place.
+_ALIGNMENT = 4096
+
+
+def is_watched(record: npt.NDArray[Any]) -> bool:
+    """Whether kernels look at records of this kind while they run."""
+    return CANCELLED in (record.dtype.names or ())
+
+
+class Watched:
+    """Records on a device, in `buffer`, that tell kernels that look at them to end."""
+
+    def __init__(self, device: Device, records: npt.NDArray[Any]) -> None:
+        nbytes = -(-records.nbytes // _ALIGNMENT) * _ALIGNMENT
+        memory = np.zeros(nbytes + _ALIGNMENT, np.uint8)
+        first = -memory.ctypes.data % _ALIGNMENT
+        self._bytes = memory[first : first + nbytes]
+        self._bytes[: records.nbytes] = np.ascontiguousarray(records).reshape(-1).view(np.uint8)
+        self._records = self._bytes[: records.nbytes].view(records.dtype)
+        self._shared = sees_host_writes(device.info)
+        flags = cl.mem_flags.USE_HOST_PTR if self._shared else cl.mem_flags.COPY_HOST_PTR
+        with device.failures("uploading constants"):
+            self.buffer = cl.Buffer(device.context, cl.mem_flags.READ_ONLY | flags, hostbuf=self._bytes)
+
+    def cancel(self, cancelled: bool) -> None:
+        """Tells the kernels under way to end, or those to come that they need not. Only while work is under way, or idle."""
+        if self._shared:
+            self._records[CANCELLED] = int(cancelled)
