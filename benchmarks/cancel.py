@@ -2,8 +2,8 @@
 
     python -m benchmarks.cancel [--device NAME] [--count N] [--budget SECONDS] [--size PIXELS] [--set KEY=VALUE]
 
-The scene is the thesis's fractal with a hard shadow (row 2 of the speed table). After each cancel the engine renders a small
-picture, to show that it can be used at once.
+The scene is the thesis's fractal with a hard shadow (row 2 of the speed table). After each cancel the engine renders a
+small picture, to show that it can be used at once.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ def waits(engine: Engine, scene: Scene, count: int, seed: int = 1) -> list[float
     start = time.perf_counter()
     engine.render(scene)
     duration = time.perf_counter() - start
-    source, found = random.Random(seed), []
+    source = random.Random(seed)
+    found: list[float] = []
     small = scene.model_copy(update={"image": {"width": 32, "height": 32}})
     while len(found) < count:
         wait = cancelled_after(engine, scene, source.uniform(0, 0.95 * duration))

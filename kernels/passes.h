@@ -87,7 +87,7 @@ INLINE void render_packet(pass s, world w) {
             active &= less((real)(s.sampling->noise), noise_of(&p, s.sampling->transparent));
         }
 #endif
-        if (!any_lane(active)) break;
+        if (!any_lane(active) || *(volatile __constant const int *)&s.sampling->cancelled) break;
         // One sample lies in the middle.
         real across = R(0.0), below = R(0.0);
         if (s.sampling->samples > 1) {

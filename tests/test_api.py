@@ -9,7 +9,7 @@ import pytest
 
 import clfractal
 from clfractal.files.exr import read_exr
-from clfractal.work.engine import Progress
+from clfractal.work.run import Progress
 from tests.shell import SCENE
 
 

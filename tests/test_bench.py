@@ -21,10 +21,10 @@ from clfractal.commands.shell import Shell
 from clfractal.device.select import choose
 from clfractal.errors import ClfractalError
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.renderers.workers import WORKERS
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
+from clfractal.work.engine import Engine
 
 
 def scene_of(row: str, *changes: str) -> Scene:
@@ -184,11 +184,10 @@ def test_vtk_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_table_of_growth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its smallest lines, in a picture and a grid that are quick."""
-    monkeypatch.setitem(WORKERS, "volume", WORKERS["volume"])
     monkeypatch.setattr(growth, "RESOLUTIONS", (24, 1024))
     monkeypatch.setattr(growth, "SHOWN", (24, 1024))
     monkeypatch.setattr(growth, "MEGAPIXELS", (0.01, 16))
-    lines = list(growth.figures(choose(None), 1, 24, 1))
+    lines = list(growth.figures(Engine(), 1, 24, 1))
     assert [(line.row, line.size) for line in lines] == [
         ("grid", "24^3"),
         ("volume, composited", "24^3, 0.01 MP"),

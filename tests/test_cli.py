@@ -18,7 +18,7 @@ from clfractal.commands.shell import Shell
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import catalog
-from clfractal.work.engine import Progress
+from clfractal.work.run import Progress
 from tests.shell import SCENE, InProcess, command, environment, process
 
 

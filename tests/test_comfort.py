@@ -9,21 +9,31 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal import comfort
 from clfractal.device.select import Device, choose
 from clfractal.optics.stereo import degrees, eye_distance
-from clfractal.optics.view import scene_view
+from clfractal.optics.view import scene_view, seen_by
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.stereo import Stereo
-from clfractal.work import engine
-from clfractal.work.comfort import Comfort, comfort_of, comfort_of_depth, fitted, measured, points_of_depth
-from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, points_of, scene_of, shoot
+from clfractal.scene.stereo import EyeName, Stereo
+from clfractal.work import comfort
+from clfractal.work.comfort import (
+    Comfort,
+    Look,
+    comfort_of,
+    comfort_of_depth,
+    fitted,
+    measured,
+    points_of_depth,
+)
+from clfractal.work.job import Job
+from clfractal.work.run import run
+from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, scene_of, shoot
 from tests.shell import SCENE
 
 CAMERA: dict[str, Any] = {"position": [0.0, -3.0, 0.0], "fov": 50.0}
 VIEWER: dict[str, Any] = {"screen_width": 0.6, "screen_distance": 0.7, "interpupillary_distance": 0.065}
 SIZE = (96, 80)
+SIDES: tuple[EyeName, EyeName] = ("left", "right")
 # Renderers of other solids, each of whose programs other tests have too.
 SOLIDS_SEEN: dict[str, dict[str, Any]] = {
     "ball": {},
@@ -39,6 +49,12 @@ def device() -> Device:
     return choose()
 
 
+@pytest.fixture(scope="module")
+def look(device: Device) -> Look:
+    """The look of an engine, which keeps what its looks have in common."""
+    return engine_of(device).look
+
+
 def seen(kind: str, size: tuple[int, int] = SIZE, **stereo: Any) -> Scene:
     """A stereo scene of one of the solids."""
     sections = {"camera": CAMERA, **SOLIDS_SEEN[kind], "stereo": {**VIEWER, **stereo}}
@@ -50,7 +66,7 @@ def seen(kind: str, size: tuple[int, int] = SIZE, **stereo: Any) -> Scene:
 
 
 class TestMeasured:
-    def test_a_ball(self, device: Device) -> None:
+    def test_a_ball(self, look: Look) -> None:
         """Seen from depth d - r to the circle where lines from an eye touch it. That lies r^2 / l before its middle, on the
         way to an eye at a distance l, and has the radius r sqrt(1 - r^2 / l^2); an eye that is beside the middle by a sees
         a / l of that radius deeper on its own side. The plane is at d, so the parallax at depth z is e (1 - d / z)."""
@@ -61,7 +77,7 @@ class TestMeasured:
         distance = np.hypot(d, a)
         near = d - r
         far = d - d * (r / distance) ** 2 + r * np.sqrt(1 - (r / distance) ** 2) * a / distance
-        found = measured(scene, device)
+        found = measured(scene, look)
         assert found is not None
         # A hit lies a pixel or two before the surface, and no pixel's middle exactly on the rim.
         assert eyes * (1 - d / (near - 2 * high / 160)) < found.nearest < eyes * (1 - d / near)
@@ -70,30 +86,30 @@ class TestMeasured:
         ends = degrees(Stereo.model_validate({**VIEWER}), [found.nearest, found.farthest])
         np.testing.assert_allclose([found.nearest_degrees, found.farthest_degrees], ends)
 
-    def test_a_look_is_quick(self, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_look_is_quick(self, look: Look, monkeypatch: pytest.MonkeyPatch) -> None:
         """However large the picture and how many its samples: 320 pixels on the longer side, one ray each."""
         looks: list[tuple[int, int, int, tuple[str, ...]]] = []
-        render = engine.render
 
-        def watched(scene: Scene, plan: Any, *arguments: Any, **named: Any) -> Any:
-            looks.append((scene.image.width, scene.image.height, plan.samples, plan.channels))
-            return render(scene, plan, *arguments, **named)
+        def watched(job: Job, *arguments: Any, **named: Any) -> Any:
+            (view,) = job.views
+            looks.append((*view.size, view.plan.samples, view.plan.channels))
+            return run(job, *arguments, **named)
 
-        monkeypatch.setattr(engine, "render", watched)
+        monkeypatch.setattr(comfort, "run", watched)
         large = seen("ball", (16000, 4000))
         large = large.model_copy(update={"renderer": large.renderer.model_copy(update={"samples": 64})})
-        found, small = measured(large, device), measured(seen("ball", (320, 80)), device)
+        found, small = measured(large, look), measured(seen("ball", (320, 80)), look)
         assert looks == [(320, 80, 1, ("Z",))] * 4  # of either eye
         assert found == small
 
-    def test_all_views_of_a_layout(self, device: Device) -> None:
+    def test_all_views_of_a_layout(self, look: Look) -> None:
         """The nearest and the farthest of any; a plane by itself has none, and nothing seen is nothing."""
         away = {"camera": {"position": [0, -3, 0], "target": [0, -9, 0]}}
         plane = {"renderer": {"type": "cut_plane"}}
 
         def of(*views: dict[str, Any]) -> Comfort | None:
             layout = {"views": list(views)}
-            return measured(scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout=layout), device)
+            return measured(scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout=layout), look)
 
         near = of({}, {})
         assert near is not None
@@ -106,58 +122,59 @@ class TestMeasured:
 
     def test_points_are_where_the_picture_says(self, device: Device) -> None:
         """From depth alone, what the channel P tells; of a part of the picture too."""
-        scene = seen("solids").seen_by("right")
-        film = shoot(scene, device)
+        scene, eye = seen_by(seen("solids"), "right")
+        film = shoot((scene, eye), device)
         hit = np.isfinite(film["Z"])
-        found = points_of_depth(scene_view(scene), film["Z"], SIZE)
+        found = points_of_depth(scene_view(scene, eye), film["Z"], SIZE)
         np.testing.assert_allclose(found, points_of(film)[hit], atol=1e-5)
         part = film["Z"][30:60, 20:90]
-        found = points_of_depth(scene_view(scene), part, SIZE, (20, 30))
+        found = points_of_depth(scene_view(scene, eye), part, SIZE, (20, 30))
         np.testing.assert_allclose(found, points_of(film)[30:60, 20:90][np.isfinite(part)], atol=1e-5)
 
     @pytest.mark.parametrize("convergence", ["off_axis", "parallel", "toe_in"])
     def test_a_pictures_depth_tells_what_its_points_do(self, device: Device, convergence: str) -> None:
         """The range over all pixels, and over all of a part of them; of none there is no range."""
-        scene = seen("solids", convergence=convergence)
-        view = scene_view(*seen_by(scene, "left"))
-        depth = shoot(seen_by(scene, "left"), device, channels=("Z",))["Z"]
+        scene, eye = seen_by(seen("solids", convergence=convergence), "left")
+        view = scene_view(scene, eye)
+        depth = shoot((scene, eye), device, channels=("Z",))["Z"]
         for y, x, part in ((0, 0, depth), (30, 20, depth[30:60, 20:90])):
-            found = comfort_of_depth(scene, view, part, SIZE, (x, y))
+            found = comfort_of_depth(scene, eye, part, SIZE, (x, y))
             assert found is not None
-            expected = comfort_of(scene, points_of_depth(view, part, SIZE, (x, y)))
+            expected = comfort_of(scene, points_of_depth(view, part, SIZE, (x, y)), eye)
             for name in Comfort.__slots__:
                 assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-5)
         for nothing in (np.inf, 0.0):
-            assert comfort_of_depth(scene, view, np.full((2, 3), nothing, np.float32), SIZE) is None
+            assert comfort_of_depth(scene, eye, np.full((2, 3), nothing, np.float32), SIZE) is None
 
 
 class TestFitted:
     @pytest.mark.parametrize("budget", [0.3, 1.0])
     @pytest.mark.parametrize("kind", SOLIDS_SEEN)
-    def test_all_of_the_depth_is_within_the_budget(self, device: Device, kind: str, budget: float) -> None:
+    def test_all_of_the_depth_is_within_the_budget(
+        self, device: Device, look: Look, kind: str, budget: float
+    ) -> None:
         """Of the picture's own pixels, of both eyes, which are finer than those of the quick look."""
         scene = seen(kind, (400, 330), fit="auto", budget=budget)
-        shared = engine.Shared()
-        found = fitted(scene, device, shared=shared)
+        found = fitted(scene, look)
         assert found.stereo is not None
         assert found.stereo.fit is None
         assert 0 < found.stereo.separation <= 1
-        look = measured(found, device, shared=shared)
-        assert look is not None
-        assert look.nearest < 0 < look.farthest
-        assert look.nearest_degrees == pytest.approx(-look.farthest_degrees, rel=0.06)
-        for side in ("left", "right"):
+        told = measured(found, look)
+        assert told is not None
+        assert told.nearest < 0 < told.farthest
+        assert told.nearest_degrees == pytest.approx(-told.farthest_degrees, rel=0.06)
+        for side in SIDES:
             film = shoot(seen_by(found, side), device, channels=("Z",))
             points = points_of_depth(scene_view(*seen_by(found, side)), film["Z"], (400, 330))
             assert comfort_of(found, points).worst_degrees <= budget
         # And it is used: either the eyes are as far apart as they may be, or the depth takes up nearly all of it.
-        assert found.stereo.separation == 1 or look.worst_degrees > 0.9 * budget
+        assert found.stereo.separation == 1 or told.worst_degrees > 0.9 * budget
 
     @pytest.mark.parametrize("kind", ["ball", "near"])
-    def test_the_eye_between_stays(self, device: Device, kind: str) -> None:
+    def test_the_eye_between_stays(self, look: Look, kind: str) -> None:
         """What it sees is as without a fit: only the screen moves, through the picture."""
         before = scene_view(seen(kind))
-        scene = fitted(seen(kind, fit="auto"), device)
+        scene = fitted(seen(kind, fit="auto"), look)
         after = scene_view(scene)
         np.testing.assert_allclose(after.origin, before.origin, atol=1e-12)
         np.testing.assert_allclose(after.axis, before.axis, atol=1e-12)
@@ -165,28 +182,28 @@ class TestFitted:
         assert after.height / after.width == pytest.approx(before.height / before.width)
         assert eye_distance(after) < eye_distance(before)  # nearer than the target in the middle of the ball
 
-    def test_its_own_plane_stays(self, device: Device) -> None:
+    def test_its_own_plane_stays(self, look: Look) -> None:
         plane = {"center": [0, -0.3, 0], "normal": [0.1, -1, 0.2], "width": 3.0}
         scene = seen("ball", fit="auto", plane=plane, budget=0.5)
-        found = fitted(scene, device)
+        found = fitted(scene, look)
         assert found.stereo is not None
         assert scene.stereo is not None
         assert found.stereo == scene.stereo.model_copy(
             update={"fit": None, "separation": found.stereo.separation}
         )
-        look = measured(found, device)
-        assert look is not None
-        assert look.worst_degrees == pytest.approx(0.95 * 0.5, rel=1e-3)
+        told = measured(found, look)
+        assert told is not None
+        assert told.worst_degrees == pytest.approx(0.95 * 0.5, rel=1e-3)
 
-    def test_what_fits_already_keeps_its_separation(self, device: Device) -> None:
+    def test_what_fits_already_keeps_its_separation(self, look: Look) -> None:
         for separation in (0.05, 0.0):
-            found = fitted(seen("ball", fit="auto", separation=separation), device)
+            found = fitted(seen("ball", fit="auto", separation=separation), look)
             assert found.stereo is not None
             assert found.stereo.separation == separation
 
-    def test_a_scene_without_fit_stays_itself(self, device: Device) -> None:
+    def test_a_scene_without_fit_stays_itself(self, look: Look) -> None:
         for scene in (seen("ball"), scene_of(BALL, CAMERA)):
-            assert fitted(scene, device) is scene
+            assert fitted(scene, look) is scene
 
     @given(
         st.tuples(st.floats(1e-3, 1e3), st.floats(1.0, 1e4)),

@@ -29,9 +29,9 @@ from clfractal.pictures.anaglyph import (
     mix,
 )
 from clfractal.pictures.compose import eye_size, picture_size
+from clfractal.pictures.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
-from clfractal.work.pair import output_files
 from tests.test_docs_content import DOCS, code, table, text
 
 WIDTH, HEIGHT = 640, 360

@@ -13,7 +13,7 @@ from clfractal.commands.slices import Stack, slice_scene
 from clfractal.files.exr import read_exr
 from clfractal.renderers.cut_plane import renderer_of
 from clfractal.scene.load import load_scene
-from clfractal.work import engine
+from clfractal.work import run as work
 from tests.shell import InProcess
 
 SCENE = """version: 1
@@ -64,7 +64,7 @@ def test_by_default_they_reach_through_the_set(clf: InProcess) -> None:
 
 
 def test_interrupted_the_finished_ones_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    render, calls = engine.render, []
+    render, calls = work.run, []
 
     def interrupted(*arguments: Any, **settings: Any) -> Any:
         calls.append(arguments)
@@ -72,7 +72,7 @@ def test_interrupted_the_finished_ones_stay(clf: InProcess, monkeypatch: pytest.
             raise KeyboardInterrupt
         return render(*arguments, **settings)
 
-    monkeypatch.setattr(engine, "render", interrupted)
+    monkeypatch.setattr(work, "run", interrupted)
     with pytest.raises(KeyboardInterrupt):
         clf("slices", "scene.yaml", "--count", "4")
     assert names() == ["slice_0001.png", "slice_0002.png"]

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.device.select import choose
 from clfractal.pictures.compose import compose
 from clfractal.scene import given
 from clfractal.scene.stereo import Stereo
 from clfractal.work.comfort import fitted
-from clfractal.work.engine import Progress
+from clfractal.work.run import Progress
 from tests.render.volumes import keep
 from tests.shell import SCENE
 
@@ -102,5 +101,5 @@ def test_a_volumes_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
         film = clfractal.render(scene)
         assert 0.1 < (film["A"] > 0).mean() < 1
         assert film["R"].shape == (36, 80 if mode == "split" else 40)
-        fitted(scene, choose())
+        fitted(scene, clfractal.Engine().look)
         assert reads == [tmp_path]

@@ -32,6 +32,7 @@ class Unfinished:
         self, job: Job, header: Mapping[str, Any], output: Path, shell: Shell, *, resume: bool
     ) -> None:
         self.paths = partial_paths(job, output)
+        self.first = output.with_name(output.name + PARTIAL)
         self.films: list[JournalFilm] = []
         try:
             for number, (view, path) in enumerate(zip(job.views, self.paths, strict=True)):
@@ -70,7 +71,7 @@ class Unfinished:
         """What to say of an interrupt."""
         done = sum(int(film.done.sum()) for film in self.films)
         tiles = sum(film.grid.count for film in self.films)
-        return f"{self.paths[0]}: interrupted with {done} of {tiles} tiles done; --resume continues"
+        return f"{self.first}: interrupted with {done} of {tiles} tiles done; --resume continues"
 
     def _leave(self) -> None:
         for film in self.films:

@@ -3,10 +3,38 @@
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 _MOST = 64
 """A picture has one program and a grid of voxels five; loading one from the disk takes PoCL some 50 ms."""
+
+
+class BuildTime:
+    """How long programs have been built for a device in all: time in which several were counts once."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._under_way = 0
+        self._since = 0.0
+        self._seconds = 0.0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._under_way == 0:
+                self._since = time.perf_counter()
+            self._under_way += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._under_way -= 1
+            if self._under_way == 0:
+                self._seconds += time.perf_counter() - self._since
+
+    @property
+    def milliseconds(self) -> float:
+        """Until now, without builds that are under way."""
+        return 1e3 * self._seconds
 
 
 class LoadedPrograms:
@@ -15,6 +43,7 @@ class LoadedPrograms:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._programs: dict[str, Any] = {}  # the one used last at the end
+        self.building = BuildTime()
 
     def get(self, key: str) -> Any | None:
         """The program kept under `key`, or None."""

@@ -94,26 +94,42 @@ def build(
     program = device.loaded.get(key)
     if program is not None:
         return Program(device, program, _milliseconds(start), cached=True)
+    with device.loaded.building:
+        try:
+            program, cached = _built(device, key, text, flags, warm, isolated, on_compile, stopped)
+        except BuildFailureError as failure:
+            raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
+    device.loaded.keep(key, program)
+    return Program(device, program, _milliseconds(start), cached=cached)
+
+
+def _built(
+    device: Device,
+    key: str,
+    text: str,
+    flags: Sequence[str],
+    warm: Warm | None,
+    isolated: bool,
+    on_compile: Callable[[str], None] | None,
+    stopped: Callable[[], bool] | None,
+) -> tuple[Any, bool]:
+    """The program, and whether the cache on the disk had it."""
     binary = cache.load_blob(key)
     if binary is not None:
         program = compiler.load_kept(device, binary, text, flags)
         if program is not None:
-            device.loaded.keep(key, program)
-            return Program(device, program, _milliseconds(start), cached=True)
+            return program, True
         cache.drop_blob(key)
     remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"compiling for {device.info.name}, once"))
     remark.daemon = True
     remark.start()
     try:
         program, binary = _compile(device, text, flags, warm, isolated=isolated, stopped=stopped)
-    except BuildFailureError as failure:
-        raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
     finally:
         remark.cancel()
     if binary:
         cache.store_blob(key, binary)
-    device.loaded.keep(key, program)
-    return Program(device, program, _milliseconds(start), cached=False)
+    return program, False
 
 
 def _tell(listener: Callable[[str], None] | None, line: str) -> None:

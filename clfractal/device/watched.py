@@ -43,6 +43,6 @@ class Watched:
             self.buffer = cl.Buffer(device.context, cl.mem_flags.READ_ONLY | flags, hostbuf=self._bytes)
 
     def cancel(self, cancelled: bool) -> None:
-        """Tells the kernels under way to end, or those to come that they need not. Only while work is under way, or idle."""
+        """Tells kernels that look there to end, or that they need not."""
         if self._shared:
             self._records[CANCELLED] = int(cancelled)

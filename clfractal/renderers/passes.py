@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.device.watched import CANCELLED
 from clfractal.files.channels import CHANNELS
 from clfractal.pictures.tiles import TILE
 from clfractal.renderers.plan import Plan
@@ -24,6 +25,7 @@ SAMPLING = Struct(
         Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
         Field("filter_width", "real", 0, "its width, pixels"),
         Field("seed", "uint", 0, "chooses the places of the samples"),
+        Field(CANCELLED, "int", 0, "1: the work was cancelled, and no further sample is begun"),
     ],
 )
 
@@ -83,6 +85,7 @@ def sampling_record(sampled: Sampled, samples: int, precision: Precision, *, tra
         "filter": FILTERS.index(sampled.filter),
         "filter_width": width if width is not None else FILTER_WIDTHS[sampled.filter],
         "seed": sampled.seed,
+        CANCELLED: 0,
     }
     return SAMPLING.value(precision, values)
 

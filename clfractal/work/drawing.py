@@ -98,6 +98,7 @@ class Drawing:
         self._buffers: list[cl.Buffer] = []
         self._given: list[KernelArgument] = []
         self._watched: dict[int, Watched] = {}
+        self._places: dict[int, npt.NDArray[np.int32]] = {}
         self._kept: cl.Buffer | None = None
         self._kept_count = 0
 
@@ -111,7 +112,7 @@ class Drawing:
             KernelBuildError: the program does not compile.
             Stopped: cancelled while a program was built or a grid was filled.
         """
-        plan = view.plan
+        plan, built_before = view.plan, self.device.loaded.building.milliseconds
         kernel = KERNELS[view.scene.renderer.type](view, resources)
         arguments = kernel.arguments()
         self.packets = TILE_PIXELS // plan.lanes
@@ -133,12 +134,12 @@ class Drawing:
             on_compile=resources.on_compile,
             stopped=resources.token,
         )
-        self.build_ms = built.build_ms
+        self.build_ms = self.device.loaded.building.milliseconds - built_before
         if self._program is None or built.cl_program is not self._program.cl_program:
             self._kernels = [built.kernel(kernel.name) for _ in range(_SLOTS)]
-            units = max(self.device.info.compute_units, 1)
-            # One sample of a tile for each core: what that takes is not known yet.
-            self.pace = Pace(float(units * self.packets))
+            self._begin_pace()
+        elif self.view is not None and view.scene.formula.iterations > self.view.scene.formula.iterations:
+            self._begin_pace()
         self._program, self.view = built, view
         self.outputs.fit(film, statistics, self.capacity * 16)
         self._upload(arguments)
@@ -184,7 +185,12 @@ class Drawing:
         kernel, (first, end) = self._kernels[span.slot], span.packets
         numbers = (first, end, *span.samples, span.mode)
         with self.device.failures("rendering"):
-            cl.enqueue_copy(self.device.transfers, self.outputs.sets[span.slot][2], places)
+            # In the kernels' own queue, and nobody waits: with every core at work PoCL would let a write wait for the launch
+            # before. The array has to live as long.
+            self._places[span.slot] = places
+            cl.enqueue_copy(
+                self.device.queue, self.outputs.sets[span.slot][2], places, is_blocking=False
+            )
             for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
                 kernel.set_arg(index, np.int32(number))
             count = -(-(end - first) // self.group) * self.group
@@ -204,6 +210,10 @@ class Drawing:
             cl.enqueue_copy(self.device.transfers, statistics, from_statistics)
             cl.enqueue_copy(self.device.transfers, film, from_film)
         return film, statistics.sum(axis=0, dtype=np.uint64)
+
+    def _begin_pace(self) -> None:
+        """One sample of a tile for each core: what that takes is not known yet."""
+        self.pace = Pace(float(max(self.device.info.compute_units, 1) * self.packets))
 
     def _upload(self, arguments: list[KernelArgument]) -> None:
         """Brings arguments to the device that differ from those of the view before."""

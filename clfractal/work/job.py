@@ -15,7 +15,7 @@ import clfractal
 from clfractal.device.select import DeviceInfo
 from clfractal.files.channels import CHANNELS
 from clfractal.files.document import write_document
-from clfractal.optics.view import scene_view
+from clfractal.optics.view import scene_view, seen_by
 from clfractal.pictures.compose import APART, Composed, Side
 from clfractal.pictures.paste import Pasted
 from clfractal.pictures.tiled import Picture
@@ -164,11 +164,11 @@ class Job:
         }
 
     def view_header(self, number: int, whole: Mapping[str, Any]) -> dict[str, Any]:
-        """The same of one view's picture, from what `header` told: of an eye's, that eye's camera."""
+        """The same of one view's picture, from what `header` told: in an eye's picture, that eye's camera."""
         side = self.sides[number]
         if side is None:
             return dict(whole)
-        camera = self.views[number].camera
+        camera = scene_view(*seen_by(self.scene, side))
         cameras = {"worldToCamera": camera.world_to_camera(), "worldToNDC": camera.world_to_ndc()}
         return {**whole, **cameras, "view": side}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 from importlib import import_module
@@ -56,27 +55,26 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
     """
-    start = time.perf_counter()
+    seconds = 0.0
     try:
         for divider in DIVIDERS:
             coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
             small = JobFilms(coarse)
-            run(coarse, small.films, executor, token=token)
+            seconds += run(coarse, small.films, executor, token=token).seconds
             whole = JobFilms(job)
             for film, found in zip(whole.films, small.films, strict=True):
                 _enlarge(found, film, divider)
-            yield _shown(
-                whole, start, f"every {'8th' if divider == 8 else '4th' if divider == 4 else '2nd'} pixel"
-            )
+            stage = {8: "8th", 4: "4th", 2: "2nd"}[divider]
+            yield _shown(whole, seconds, f"every {stage} pixel")
         ranges = _ranges(job.samples) if _fits(job, executor) else [(0, job.samples)]
         films = JobFilms(job)
         for samples in ranges:
             before, films = films, JobFilms(job)
             for film, old in zip(films.films, before.films, strict=True):
                 film.take(old)  # of views that are finished before the others
-            run(job, films.films, executor, token=token, samples=samples)
+            seconds += run(job, films.films, executor, token=token, samples=samples).seconds
             last = samples[1] == job.samples
-            yield _shown(films, start, "" if last else f"{samples[1]} of {job.samples} samples")
+            yield _shown(films, seconds, "" if last else f"{samples[1]} of {job.samples} samples")
     finally:
         executor.forget()
 
@@ -110,8 +108,8 @@ def _enlarge(small: Film, whole: Film, divider: int) -> None:
     whole.fill({name: small[name][np.ix_(rows, columns)] for name in whole})
 
 
-def _shown(films: JobFilms, start: float, stage: str) -> Film:
+def _shown(films: JobFilms, seconds: float, stage: str) -> Film:
     film = films.picture()
-    film.tell("seconds", time.perf_counter() - start)
+    film.tell("seconds", seconds)
     film.stage = stage
     return film

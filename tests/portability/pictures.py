@@ -20,10 +20,12 @@ from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
 from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.plan import make_plan
+from clfractal.renderers.plan import PlannedView, make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.work import engine
+from clfractal.work.job import Identity, Job
+from clfractal.work.local import LocalExecutor
+from clfractal.work.run import run
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 
@@ -94,7 +96,8 @@ def picture(
     scene = load_scene(_scene_text(name, position, (x, y, z), lamp, size))
     plan = make_plan(scene, precision=precision, lanes=lanes, channels=CHANNELS)
     film = Film(plan.channels, size, plan.region)
-    engine.render(scene, plan, device, film)
+    job = Job(scene, (PlannedView(scene, plan),), Identity(0), plan.channels, device.info, "")
+    run(job, [film], LocalExecutor(device))
     if isinstance(scene.renderer, SurfaceRenderer) and scene.renderer.search == "steps":
         # A binary search down to the last digit takes a step more or less where that digit differs.
         film["steps"][:] = 0

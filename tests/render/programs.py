@@ -8,8 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.renderers.surface import SurfaceWorker
+from clfractal.renderers.plan import PlannedView
+from clfractal.renderers.resources import Resources
 from clfractal.scene.model import Scene
+from clfractal.work.drawing import Drawing, OutputBuffers
 from tests.render.shots import plan_of
 
 
@@ -17,7 +19,8 @@ def compile_all(scenes: Iterable[Scene], device: Device, precision: Precision = 
     """Leaves the programs of the scenes in the cache, from where later renders take them."""
 
     def compile_one(scene: Scene) -> None:
-        SurfaceWorker(scene, plan_of(scene, device, precision), device, capacity=1)
+        view = PlannedView(scene, plan_of(scene, device, precision))
+        Drawing(device, OutputBuffers(device)).update(view, Resources(device), tiles=1)
 
     plan_of(next(iter(scenes := list(scenes))), device, precision)  # measures the lanes, once
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:

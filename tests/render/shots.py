@@ -13,14 +13,16 @@ from clfractal.device.structs import Precision
 from clfractal.optics.view import View, camera_view
 from clfractal.pictures.film import Film
 from clfractal.pictures.tiled import TiledStore
+from clfractal.pictures.tiles import TILE, Tile
 from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.plan import Plan, PlannedView, make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
+from clfractal.work.engine import Engine
 from clfractal.work.job import Identity, Job
 from clfractal.work.local import LocalExecutor
-from clfractal.work.run import Progress, run
+from clfractal.work.run import Progress, WorkItem, run
 
 Floats = npt.NDArray[np.float64]
 
@@ -96,6 +98,7 @@ def plan_of(scene: Scene, device: Device, precision: Precision = "float32", **se
 
 
 _executors: dict[Device, LocalExecutor] = {}
+_engines: dict[Device, Engine] = {}
 
 
 def job_of(scene: Scene, plan: Plan, device: Device, eye: Eye = MIDDLE) -> Job:
@@ -103,23 +106,59 @@ def job_of(scene: Scene, plan: Plan, device: Device, eye: Eye = MIDDLE) -> Job:
     return Job(scene, (PlannedView(scene, plan, eye),), Identity(0), plan.channels, device.info, "")
 
 
+def executor_of(device: Device, budget_seconds: float | None = None) -> LocalExecutor:
+    """An executor that all tests share, or one of its own with another budget."""
+    if budget_seconds is not None:
+        return LocalExecutor(device, budget_seconds=budget_seconds)
+    return _executors.setdefault(device, LocalExecutor(device))
+
+
 def render_planned(
-    scene: Scene, plan: Plan, device: Device, store: TiledStore, eye: Eye = MIDDLE, **settings: Any
+    scene: Scene,
+    plan: Plan,
+    device: Device,
+    store: TiledStore,
+    eye: Eye = MIDDLE,
+    *,
+    budget_seconds: float | None = None,
+    **settings: Any,
 ) -> Progress:
-    """Renders what a store lacks; settings as for `run`."""
-    executor = _executors.setdefault(device, LocalExecutor(device))
+    """Renders what a store lacks of a scene with one view; settings as for `run`."""
+    executor = executor_of(device, budget_seconds)
     return run(job_of(scene, plan, device, eye), [store], executor, **settings)
+
+
+def render_tile(scene: Scene, plan: Plan, device: Device, tile: Tile) -> npt.NDArray[np.float32]:
+    """One tile on its own, by an executor that knows nothing of the others: shape (channels, height, width)."""
+    item = WorkItem(0, np.array([tile.index], np.int32), (0, plan.samples))
+    results = list(executor_of(device).execute(job_of(scene, plan, device), [item]))
+    (whole,) = [result for result in results if len(result.tiles)]
+    assert whole.tiles.tolist() == [tile.index]
+    top, left = tile.y % TILE, tile.x % TILE
+    part: npt.NDArray[np.float32] = whole.film[0][:, top : top + tile.height, left : left + tile.width]
+    return part
 
 
 def shoot(
     scene: Scene | tuple[Scene, Eye], device: Device, precision: Precision = "float32", **settings: Any
 ) -> Film:
-    """The picture of a scene, or of one as an eye sees it; settings as for `make_plan`."""
+    """The picture of a scene, or of one as an eye sees it; settings as for `make_plan`, and a budget."""
     scene, eye = scene if isinstance(scene, tuple) else (scene, MIDDLE)
+    budget_seconds = settings.pop("budget_seconds", None)
     plan = plan_of(scene, device, precision, **settings)
     film = Film(plan.channels, (scene.image.width, scene.image.height), plan.region)
-    render_planned(scene, plan, device, film, eye)
+    render_planned(scene, plan, device, film, eye, budget_seconds=budget_seconds)
     return film
+
+
+def shoot_whole(scene: Scene, device: Device, **settings: Any) -> Film:
+    """The picture of a scene of several views, all of whose channels are made; settings as for `Engine.render`."""
+    return engine_of(device).render(scene, **{"precision": "float32", "channels": CHANNELS, **settings})
+
+
+def engine_of(device: Device) -> Engine:
+    """An engine that all tests share."""
+    return _engines.setdefault(device, Engine(device))
 
 
 def stacked(film: Film, names: Sequence[str] = CHANNELS) -> npt.NDArray[np.float32]:

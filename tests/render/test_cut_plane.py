@@ -17,9 +17,8 @@ from clfractal.renderers.cut_plane import renderer_of
 from clfractal.renderers.plan import choose_precision
 from clfractal.scene.palette import named_table
 from clfractal.scene.plane import moved
-from clfractal.work import engine
 from tests.render.planes import SMOOTH_RADIUS, Floats, mandelbrot, picture_of, pixel_points, plane_scene, sure
-from tests.render.shots import plan_of, shoot, stacked
+from tests.render.shots import plan_of, render_tile, shoot, stacked
 
 STEPPED, SMOOTH = {"mode": "stepped"}, {"mode": "smooth"}
 # Around the whole set; a piece of the seahorse valley, 10^-8 wide, where counts are high.
@@ -142,7 +141,7 @@ class TestChannels:
         assert whole[21:58, 13:63].tobytes() == part.tobytes()
         plan = plan_of(scene, device)
         tile = TileGrid(plan.region).tile(4)
-        alone = engine.render_tile(scene, plan, device, tile)
+        alone = render_tile(scene, plan, device, tile)
         cut = whole[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
         assert np.moveaxis(alone, 0, -1).tobytes() == cut.tobytes()
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from tests.render.shots import BALL, CHANNELS, PERSPECTIVE, job_of, plan_of, sce
 
 SIZE = (72, 48)
 NOISY = {"samples": 16, "noise": 0.02, "min_samples": 4}
-RENDERERS = {
+RENDERERS: dict[str, dict[str, Any]] = {
     "surface": {},
     "volume": {"type": "volume", "resolution": 32},
     "fog": {
@@ -80,7 +82,7 @@ def test_a_pass_is_the_picture_of_its_samples(device: Device) -> None:
     films = list(in_passes(scene, plan_of(scene, device), device, (1, 1, 2, 12), LocalExecutor(device)))
     assert [float(film["samples"].max()) for film in films] == [1, 2, 4, 16]
     sums = [film["R"] * film["samples"] for film in films]
-    assert all((after - before >= -1e-5).all() for before, after in zip(sums, sums[1:], strict=False))
+    assert all((after - before >= -1e-5).all() for before, after in pairwise(sums))
     assert np.abs(films[0]["R"] - films[-1]["R"]).max() > 0.01
 
 

@@ -7,18 +7,29 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from clfractal.work.pair import prepare_pair, render_eyes
 
 from clfractal.device import compiler, program
 from clfractal.device.select import Device
 from clfractal.optics.stereo import eye_views, parallax
-from clfractal.optics.view import View, scene_view
+from clfractal.optics.view import View, scene_view, seen_by
 from clfractal.pictures.film import Film
-from clfractal.renderers import surface, volume
+from clfractal.renderers import plan, volume
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName
 from clfractal.voxels import fill as voxels
-from tests.render.shots import BALL, BALL_RADIUS, CHANNELS, points_of, scene_of, shoot, stacked
+from clfractal.work.engine import Engine
+from clfractal.work.job import StereoPair
+from clfractal.work.prepare import prepare
+from tests.render.shots import (
+    BALL,
+    BALL_RADIUS,
+    CHANNELS,
+    engine_of,
+    points_of,
+    scene_of,
+    shoot,
+    stacked,
+)
 
 SIZE = (64, 48)
 SIDES: tuple[EyeName, EyeName] = ("left", "right")
@@ -70,8 +81,7 @@ def test_an_eyes_picture_is_a_mono_one_through_its_view(
     films = {side: shoot(seen_by(scene, side), device) for side in SIDES}
     for side in SIDES:
         view = scene_view(*seen_by(scene, side))
-        for module in (surface, volume):
-            monkeypatch.setattr(module, "scene_view", lambda _, through=view: through)
+        monkeypatch.setattr(plan, "scene_view", lambda *_, through=view: through)
         mono = shoot(mono_scene(kind, CAMERA), device)
         np.testing.assert_array_equal(bits(films[side]), bits(mono))
     covered = films["left"]["A"] > 0
@@ -175,14 +185,13 @@ class TestFlat:
 
     def test_as_the_renderer(self, device: Device) -> None:
         films = [
-            shoot(scene, device)
-            for scene in (
-                scene_of(BALL, CAMERA, SIZE, renderer=self.RENDERER),
-                *(
-                    scene_of(BALL, CAMERA, SIZE, renderer=self.RENDERER, stereo=VIEWER).seen_by(side)
-                    for side in SIDES
-                ),
-            )
+            shoot(scene_of(BALL, CAMERA, SIZE, renderer=self.RENDERER), device),
+            *(
+                shoot(
+                    seen_by(scene_of(BALL, CAMERA, SIZE, renderer=self.RENDERER, stereo=VIEWER), side), device
+                )
+                for side in SIDES
+            ),
         ]
         for film in films[1:]:
             np.testing.assert_array_equal(bits(film), bits(films[0]))
@@ -192,7 +201,8 @@ class TestFlat:
         views: list[dict[str, Any]] = [{}, {"renderer": self.RENDERER}]
         scene = scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout={"views": views})
         half = (SIZE[0] // 2, SIZE[1])
-        films = {side: stacked(shoot(seen_by(scene, side), device)) for side in SIDES}
+        both = engine_of(device).render_pair(scene, precision="float32", channels=CHANNELS)
+        films = {side: stacked(film) for side, film in zip(SIDES, both, strict=True)}
         plane = stacked(shoot(scene_of(BALL, CAMERA, half, renderer=self.RENDERER), device))
         alone = scene_of(BALL, CAMERA, half, stereo={**VIEWER, "screen_width": 0.5})
         for side in SIDES:
@@ -207,12 +217,8 @@ class TestCost:
     """What both pictures need is made once."""
 
     def pair(self, scene: Scene, device: Device) -> None:
-        pair = prepare_pair(scene, device, precision="float32")
-        films = {
-            side: Film(job.plan.channels, SIZE, job.plan.region, pair.header(side))
-            for side, job in pair.eyes.items()
-        }
-        render_eyes(pair, films)
+        with Engine(device) as engine:
+            engine.render_pair(scene, precision="float32")
 
     @pytest.mark.parametrize("kind", KINDS)
     def test_one_program(self, device: Device, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
@@ -263,7 +269,10 @@ class TestCost:
 
     @pytest.mark.parametrize("mode", ["left", "right"])
     def test_one_eye_where_one_is_shown(self, device: Device, mode: str) -> None:
-        assert list(prepare_pair(stereo_scene(mode=mode), device).eyes) == [mode]
+        job = prepare(stereo_scene(mode=mode), device)
+        assert isinstance(job.composition, StereoPair)
+        assert list(job.composition.eyes) == [mode]
+        assert job.sides == (mode,)
 
 
 def test_depth_is_measured_from_the_eye_across_the_plane(device: Device) -> None:

@@ -26,7 +26,15 @@ from clfractal.optics.stereo import (
     parallax,
     relation,
 )
-from clfractal.optics.view import View, camera_view, eye_view, middle_view, scene_view
+from clfractal.optics.view import (
+    View,
+    camera_view,
+    eye_view,
+    middle_view,
+    scene_view,
+    seen_by,
+    shown_views,
+)
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, EyeName, Stereo
@@ -447,9 +455,9 @@ class TestScenes:
         squeezed = scene_of(BALL, CAMERA, (96, 54), stereo={"mode": mode})
         size = (48, 54) if mode == "split_half" else (96, 27)
         for name in SIDES:
-            small = seen_by(squeezed, name)
+            small, eye = seen_by(squeezed, name)
             assert (small.image.width, small.image.height) == size
-            same_view(scene_view(small), scene_view(*seen_by(whole, name)))
+            same_view(scene_view(small, eye), scene_view(*seen_by(whole, name)))
 
     def test_a_view_of_a_layout_takes_up_a_part_of_the_screen(self) -> None:
         """Half of the screen's pixels are half of its width: the viewer sits twice as many of its widths before it."""
@@ -459,9 +467,7 @@ class TestScenes:
         for number, fov in ((0, 50), (1, 20)):
             alone = scene_of(BALL, {**CAMERA, "fov": fov}, (48, 54), stereo={**stereo, "screen_width": 0.25})
             for name in SIDES:
-                same_view(
-                    scene_view(seen_by(scene, name).views[number][0]), scene_view(*seen_by(alone, name))
-                )
+                same_view(view_of(scene, name, number), scene_view(*seen_by(alone, name)))
 
     @pytest.mark.parametrize("mode", ["split_half", "over_under_half"])
     def test_squeezed_views_of_a_layout(self, mode: str) -> None:
@@ -470,7 +476,7 @@ class TestScenes:
             scene_of(BALL, CAMERA, (96, 54), stereo={"mode": m}, layout=layout) for m in (mode, "split")
         ]
         for name in SIDES:
-            found, expected = (scene_view(seen_by(scene, name).views[1][0]) for scene in scenes)
+            found, expected = (view_of(scene, name, 1) for scene in scenes)
             same_view(found, expected)
 
     def test_the_lens_stays_sharp_where_it_was_told_to_be(self) -> None:
@@ -485,10 +491,17 @@ class TestScenes:
         assert scene_view(*seen_by(told, "left")).focus_distance == 1.5
 
     def test_copies_show_the_same_eye(self) -> None:
-        scene: Scene = scene_of(BALL, CAMERA, (96, 54), stereo={}).seen_by("left")
+        scene, eye = seen_by(scene_of(BALL, CAMERA, (96, 54), stereo={}), "left")
         lit = scene.model_copy(update={"lights": scene.lights})
-        same_view(scene_view(lit), scene_view(scene))
-        assert lit.eye == scene.eye == Eye("left")
+        same_view(scene_view(lit, eye), scene_view(scene, eye))
+        assert eye == Eye("left")
+        assert lit == scene
+
+
+def view_of(scene: Scene, name: EyeName, number: int) -> View:
+    """What an eye sees of one view of a layout."""
+    shown, eye, _ = shown_views(*seen_by(scene, name))[number]
+    return scene_view(shown, eye)
 
 
 def same_view(found: View, expected: View) -> None:

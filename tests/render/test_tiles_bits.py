@@ -13,12 +13,22 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes
 from clfractal.pictures.film import Film
 from clfractal.pictures.store import JournalFilm
-from clfractal.pictures.tiles import TileGrid
+from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
-from clfractal.work import engine, loop
-from clfractal.work.engine import Progress
-from tests.render.shots import CHANNELS, ORTHOGRAPHIC, PERSPECTIVE, plan_of, scene_of, shoot, stacked
+from clfractal.work import drawing
+from clfractal.work.run import Progress
+from tests.render.shots import (
+    CHANNELS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    plan_of,
+    render_planned,
+    render_tile,
+    scene_of,
+    shoot,
+    stacked,
+)
 
 SIZE = (100, 75)  # no multiple of a tile's side, in neither direction
 LIGHTS: list[dict[str, Any]] = [
@@ -59,14 +69,14 @@ def test_again(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_tile_by_tile(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
-    """`render_tile`, which knows nothing of the other tiles."""
+    """By an executor, which knows nothing of the other tiles."""
     scene = SCENES[name]
     plan = plan_of(scene, device)
     grid = TileGrid(plan.region)
     assert grid.count == 12
     for index in (0, 3, 5, 6, 11):
         tile = grid.tile(index)
-        pixels = np.moveaxis(engine.render_tile(scene, plan, device, tile), 0, -1)
+        pixels = np.moveaxis(render_tile(scene, plan, device, tile), 0, -1)
         expected = wholes[name][tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
         assert same(np.ascontiguousarray(pixels), np.ascontiguousarray(expected))
 
@@ -94,7 +104,7 @@ def test_batches(
     capacity: int,
 ) -> None:
     """How many tiles are launched at once, in which order."""
-    monkeypatch.setattr(loop, "CAPACITY", capacity)
+    monkeypatch.setattr(drawing, "CAPACITY", capacity)
     assert same(stacked(shoot(SCENES[name], device)), wholes[name])
 
 
@@ -103,32 +113,40 @@ def test_tiles_in_parts(
     device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """A budget so short that every tile takes many launches."""
-    monkeypatch.setattr(loop, "BATCH_SECONDS", 1e-6)
-    monkeypatch.setattr(loop, "CAPACITY", 1)
-    launches = []
+    monkeypatch.setattr(drawing, "CAPACITY", 1)
+    launches: list[int] = []
     scene = SCENES[name]
     plan = plan_of(scene, device)
     film = Film(plan.channels, SIZE, plan.region)
-    state = engine.render(scene, plan, device, film, lambda progress: launches.append(progress.tiles_done))
-    assert len(launches) > 24
+    state = render_planned(
+        scene,
+        plan,
+        device,
+        film,
+        progress=lambda progress: launches.append(progress.tiles_done),
+        budget_seconds=1e-9,
+    )
+    # One sample of a packet each, once the first two launches have told how long they take.
+    assert len(launches) >= 10 * plan.samples * TILE * TILE // plan.lanes
+    assert launches == sorted(launches)
     assert state.tiles_done == 12
     assert same(stacked(film), wholes[name])
 
 
-def test_statistics_do_not_depend_on_batches(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_statistics_do_not_depend_on_batches(device: Device) -> None:
     """Rays, steps and applications are counted once each, in parts of tiles too."""
     scene = SCENES["hast"]
     plan = plan_of(scene, device)
 
-    def counted() -> tuple[int, int, int, int]:
+    def counted(budget_seconds: float | None = None) -> tuple[int, int, int, int]:
         film = Film(plan.channels, SIZE, plan.region)
-        state = engine.render(scene, plan, device, film)
+        state = render_planned(scene, plan, device, film, budget_seconds=budget_seconds)
         return state.rays, state.steps, state.iterations, state.bad_distances
 
     at_once = counted()
     assert at_once[0] == 3 * 100 * 75
-    monkeypatch.setattr(loop, "BATCH_SECONDS", 1e-6)
-    assert counted() == at_once
+    assert counted(1e-9) == at_once
+    assert counted(2e-3) == at_once
 
 
 def test_the_rest_of_a_film(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
@@ -137,11 +155,11 @@ def test_the_rest_of_a_film(device: Device, wholes: dict[str, npt.NDArray[np.flo
     plan = plan_of(scene, device)
     film = Film(plan.channels, SIZE, plan.region)
     for index in (1, 5, 6, 10):
-        film.put(index, engine.render_tile(scene, plan, device, film.grid.tile(index)))
+        film.put(index, render_tile(scene, plan, device, film.grid.tile(index)))
     marked = film.grid.tile(11)
     film.put(11, np.full((len(CHANNELS), marked.height, marked.width), 7, np.float32))
     seen: list[tuple[int, int]] = []
-    engine.render(scene, plan, device, film, lambda p: seen.append((p.tiles_before, p.tiles_done)))
+    render_planned(scene, plan, device, film, progress=lambda p: seen.append((p.tiles_before, p.tiles_done)))
     assert all(before == 5 for before, _ in seen)
     assert seen[-1] == (5, 12)
     result = stacked(film)
@@ -157,7 +175,7 @@ def test_interrupted_and_resumed(
     tmp_path: Path,
 ) -> None:
     """A journal left by a render that ended after some tiles is continued to the same picture."""
-    monkeypatch.setattr(loop, "CAPACITY", 1)
+    monkeypatch.setattr(drawing, "CAPACITY", 1)
     scene = SCENES["hast"]
     plan = plan_of(scene, device)
 
@@ -168,11 +186,11 @@ def test_interrupted_and_resumed(
     path = tmp_path / "picture.partial"
     first = JournalFilm(path, {"scene": "hast"}, plan.channels, SIZE, plan.region)
     with pytest.raises(KeyboardInterrupt):
-        engine.render(scene, plan, device, first, stop)
+        render_planned(scene, plan, device, first, progress=stop)
     first.close()
     again = JournalFilm(path, {"scene": "hast"}, plan.channels, SIZE, plan.region, resume=True)
     assert again.done.sum() == 5
-    engine.render(scene, plan, device, again)
+    render_planned(scene, plan, device, again)
     assert again.done.all()
     assert same(stacked(again.to_film()), wholes["hast"])
     again.discard()

@@ -18,8 +18,8 @@ from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
-from clfractal.work import engine, loop
-from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, shoot, stacked
+from clfractal.work import drawing
+from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, render_tile, shoot, stacked
 from tests.render.test_tiles_bits import close, same
 from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
 
@@ -75,16 +75,15 @@ def test_tiles_and_regions(
     plan = plan_of(scene, device)
     for index in (1, 3, 5):
         tile = TileGrid(plan.region).tile(index)
-        pixels = np.moveaxis(engine.render_tile(scene, plan, device, tile), 0, -1)
+        pixels = np.moveaxis(render_tile(scene, plan, device, tile), 0, -1)
         expected = whole[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
         assert same(np.ascontiguousarray(pixels), np.ascontiguousarray(expected))
     for x, y, width, height in ((13, 7, 50, 31), (33, 20, 1, 1), (64, 32, 6, 8)):
         part = stacked(shoot(scene, device, region=(x, y, width, height)))
         assert same(part, np.ascontiguousarray(whole[y : y + height, x : x + width]))
-    monkeypatch.setattr(loop, "CAPACITY", 1)
+    monkeypatch.setattr(drawing, "CAPACITY", 1)
     assert same(stacked(shoot(scene, device)), whole)
-    monkeypatch.setattr(loop, "BATCH_SECONDS", 1e-6)
-    assert same(stacked(shoot(scene, device)), whole)
+    assert same(stacked(shoot(scene, device, budget_seconds=1e-9)), whole)
 
 
 @pytest.mark.parametrize(("name", "counts"), [("surface", {1}), ("fog", {4, 8, 16})])

@@ -162,7 +162,7 @@ def test_where_a_scene_comes_from_is_no_part_of_it(folder: Path, tmp_path: Path)
     assert load_scene(dump_scene(scene), folder=folder) == scene
     assert moved.surroundings is not None
     assert scene.surroundings is not None
-    assert moved.surroundings.digest() == scene.surroundings.digest()
+    assert moved.surroundings.digest == scene.surroundings.digest
 
 
 def test_plain_data_finds_its_map_in_the_current_folder(

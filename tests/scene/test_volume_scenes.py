@@ -13,10 +13,8 @@ from hypothesis import strategies as st
 from clfractal.device.select import choose
 from clfractal.errors import DeviceError
 from clfractal.files.volume import Volume, write_volume
-from clfractal.pictures.film import Film
-from clfractal.renderers.plan import make_plan
 from clfractal.scene.load import dump_scene, load_scene
-from clfractal.work.engine import render
+from clfractal.work.engine import Engine
 from tests.scene.test_messages import error_of, marked
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
@@ -193,11 +191,8 @@ def test_a_grid_that_does_not_fit_is_told_before_anything_starts(keys: dict[str,
             "renderer": {"type": "volume", "resolution": 16384, **keys},
         }
     )
-    plan = make_plan(scene, precision="float32", lanes=8)
     with pytest.raises(DeviceError) as caught:
-        render(
-            scene, plan, choose(), Film(plan.channels, (8, 8), plan.region), lambda _: pytest.fail("it began")
-        )
+        Engine(choose()).render(scene, lambda _: pytest.fail("it began"), precision="float32")
     assert caught.value.status == 2
     line = str(caught.value)
     assert "\n" not in line

@@ -9,7 +9,6 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clfractal.renderers.plan import make_plan
 from clfractal.renderers.volume import (
     TRANSFER_SIZE,
     transfer_table,
@@ -62,10 +61,9 @@ def test_nothing_is_seen_up_to_the_unseen_sample(ramp: str) -> None:
     scene = volume_scene(
         "hast", 20, resolution=16, value="iterations", store="float", transfer={"opacity": RAMPS[ramp]}
     )
-    plan = make_plan(scene, precision="float32", lanes=1)
     grid = filled(scene)
-    sample = np.float32(unseen_sample(scene, plan, grid))
-    record = volume_record(scene, plan, grid)
+    sample = np.float32(unseen_sample(scene, grid))
+    record = volume_record(scene, grid, "float32")
     opacity = transfer_table(scene, value_range(scene, grid))[:, 0]
     low, scale = np.float32(record["low"]), np.float32(record["range"])
     place = (sample - low) * scale * np.float32(TRANSFER_SIZE - 1)
@@ -78,7 +76,7 @@ def test_nothing_is_seen_up_to_the_unseen_sample(ramp: str) -> None:
 def test_the_unseen_sample_where_all_or_nothing_is_seen() -> None:
     for opacity, test in ((0.0, np.isposinf), (0.1, np.isnan)):
         scene = volume_scene("hast", 20, resolution=16, transfer={"opacity": [{"at": 0, "opacity": opacity}]})
-        assert test(unseen_sample(scene, make_plan(scene, precision="float32", lanes=1), filled(scene)))
+        assert test(unseen_sample(scene, filled(scene)))
     surface = volume_scene("hast", 20, resolution=16)
-    found = unseen_sample(surface, make_plan(surface, precision="float32", lanes=1), filled(surface))
+    found = unseen_sample(surface, filled(surface))
     assert found == np.nextafter(np.float32(127.5), np.float32(0))

@@ -1,0 +1,88 @@
+"""`seconds` in a picture's header is the time of its rays: compiling, which happens once, is no part of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import pytest
+
+import clfractal
+from clfractal.device import program
+from clfractal.files.exr import read_exr
+from clfractal.files.png import read_texts
+from clfractal.voxels import programs
+from clfractal.work.run import Progress
+from tests.shell import SCENE, Ended, InProcess
+
+COMPILING = 1.5  # seconds that each program takes to be built, at least
+KINDS = {
+    "surface": "",
+    "cut plane": "renderer: {type: cut_plane}\n",
+    "volume": "renderer: {type: volume, resolution: 32}\n",
+    "stereo": "stereo: {mode: split}\n",
+    "layout": "layout: {views: [{}, {renderer: {type: cut_plane}}]}\n",
+}
+
+
+@pytest.fixture
+def builds(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The texts of the programs that are built from now on, each of which takes its time (some beside each other)."""
+    texts: list[str] = []
+    build = program.build
+
+    def slow(device: Any, text: str, **named: Any) -> program.Program:
+        texts.append(text)
+        time.sleep(COMPILING)
+        built = build(device, text, **named)
+        return replace(built, build_ms=built.build_ms + 1e3 * COMPILING)
+
+    for kind in KINDS:  # whatever they really take is over
+        clfractal.render(SCENE + KINDS[kind])
+    monkeypatch.setattr(program, "build", slow)
+    monkeypatch.setattr(programs, "_loaded", WeakKeyDictionary())  # those that fill grids
+    return texts
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_of_python(kind: str, builds: list[str]) -> None:
+    seen: list[Progress] = []
+    start = time.perf_counter()
+    film = clfractal.render(SCENE + KINDS[kind], progress=seen.append)
+    assert time.perf_counter() - start > COMPILING
+    assert builds
+    state, seconds = seen[-1], film.header["seconds"]
+    assert 1e-3 * state.kernel_ms < seconds < 1
+    assert seconds == pytest.approx(state.seconds, abs=0.1)
+    assert state.build_ms >= 1e3 * COMPILING
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_of_the_shell(
+    kind: str,
+    builds: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(SCENE + KINDS[kind])
+    outputs = ("-o", "a.exr", "-o", "a.png", "--stats", "stats.json", "--quiet")
+    assert InProcess(capfd)("render", "scene.yaml", *outputs) == Ended(0, "", "")
+    told = json.loads(Path("stats.json").read_text())
+    assert builds
+    assert told["wall_ms"] > 1e3 * COMPILING <= told["build_ms"]
+    seconds = read_exr("a.exr")[1]["clfractalSeconds"]
+    assert 1e-3 * told["kernel_ms"] < seconds < 1
+    assert float(read_texts("a.png")["clfractalSeconds"]) == pytest.approx(seconds)
+
+
+def test_of_both_eyes_films(builds: list[str]) -> None:
+    """Each tells its own time."""
+    films = clfractal.render_pair(SCENE + KINDS["stereo"])
+    assert len(builds) == 2
+    assert all(0 < film.header["seconds"] < 1 for film in films)
