@@ -64,7 +64,11 @@ typedef JOIN(int, LANES) mask;
 #define less_equal(a, b) ((real)(a) <= (real)(b))
 #define equal(a, b) ((real)(a) == (real)(b))
 #define is_nan(a) ((a) != (a))
+#ifdef DIRECT_BUILT_INS
+#define pick(m, yes, no) direct_pick(m, (real)(yes), (real)(no))
+#else
 #define pick(m, yes, no) ((m) ? (real)(yes) : (real)(no))
+#endif
 #define lanes_store(value, array) JOIN(vstore, LANES)(value, 0, array)
 #define lanes_load(array) JOIN(vload, LANES)(0, array)
 #endif

@@ -26,18 +26,18 @@ INLINE real real_sign(real a) {
 }
 
 // 0 below 0.
-INLINE real real_sqrt(real a) { return sqrt(most(R(0.0), a)); }
+INLINE real real_sqrt(real a) { return sqrt(fmax(a, R(0.0))); }
 
 // 1/sqrt(a): infinite at 0 and below, where real_sqrt is 0; 0 at infinity. Within 2 ulp, as OpenCL demands of its rsqrt,
 // which on processors is a root and a division, one waiting for the other.
 INLINE real real_rsqrt(real a) {
 #ifdef estimate_rsqrt
-    // One step of Newton's iteration squares the error of the processor's own estimate, which is exact at 0 and infinity, where
-    // the step gives NaN.
-    const real positive = most(R(0.0), a);
+    // One step of Newton's iteration squares the error of the processor's own estimate, which is exact at 0 and infinity.
+    const real positive = fmax(a, R(0.0));
     const real y = estimate_rsqrt(positive);
     const real refined = y + (R(0.5) * y) * (R(1.0) - (positive * y) * y);
-    return pick(is_nan(refined), y, refined);
+    const mask usual = less_equal((real)(REAL_SMALLEST), positive) & less_equal(positive, (real)(REAL_LARGEST));
+    return pick(usual, refined, y);
 #else
     return R(1.0) / sqrt(fmax(a, R(0.0)));
 #endif
