@@ -123,7 +123,7 @@ def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts:
         ),
         (
             "coloring:\n  palette:\n  - {at: 1, color: [0, 0, 0]}\n  - {at: 0, color: [0, 0, 0]}",
-            "8:10: coloring.palette.1.at: must be at least 1, that of the stop before, got 0",
+            "8:10: coloring.palette.1.at: must be at least 1, the value at the stop before, got 0",
         ),
         (
             "lights:\n- type: point\n  position: [0.1, 0, 0]",

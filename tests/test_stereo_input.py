@@ -58,11 +58,11 @@ def added(here: Path) -> set[str]:
         ("stereo: {fit: yes}", "5:15: stereo.fit: must be auto, got 'yes'"),
         (
             "stereo: {mode: split_half}\nimage: {width: 41, height: 36}",
-            "6:16: image.width: must be even for stereo.mode split_half, where each eye has half of it, got 41",
+            "6:16: image.width: must be even for stereo.mode split_half, where each eye gets half of it, got 41",
         ),
         (
             "stereo: {mode: over_under_half}\nimage: {width: 40, height: 35}",
-            "6:28: image.height: must be even for stereo.mode over_under_half, where each eye has half of it, got 35",
+            "6:28: image.height: must be even for stereo.mode over_under_half, where each eye gets half of it, got 35",
         ),
         (
             "stereo: {colors: [[1, 0, 1.5], [0, 1, 0]]}",
@@ -92,11 +92,11 @@ def added(here: Path) -> set[str]:
         ("stereo: {plane: {width: 0}}", "5:25: stereo.plane.width: must be at least 1e-18, got 0"),
         (
             "stereo: {fit: auto}\nlayout: {views: [{}, {}]}",
-            "5:15: stereo.fit: auto cannot suit several views at once; give plane and separation in its place",
+            "5:15: stereo.fit: auto cannot fit several views at once; give plane and separation instead",
         ),
         (
             "stereo: {fit: auto}\nrenderer: {type: cut_plane}",
-            "5:15: stereo.fit: auto has no depth to fit where renderer.type is cut_plane, which is flat",
+            "5:15: stereo.fit: auto needs depth, but the picture of a cut_plane renderer is flat",
         ),
         (
             "stereo: {fit: auto, convergence: toe_in}",
@@ -132,7 +132,7 @@ def test_an_orthographic_camera(here: Path, shell: InProcess) -> None:
     ended = shell("render", "scene.yaml", "-o", "a.png")
     assert ended.is_one_line(
         STATUS_BAD_INPUT,
-        "scene.yaml:4:22: camera.projection: must be perspective with stereo: rays from infinity are the same for both"
+        "scene.yaml:4:22: camera.projection: must be perspective with stereo: parallel rays look the same to both"
         " eyes; use {projection: perspective, position, target, fov}, or remove stereo",
     )
 

@@ -51,12 +51,12 @@ def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
     used_boxes(scene, renderer)
     if renderer.file is not None and renderer.zoom:
         raise SceneError(
-            "a file's grid has no more to zoom to; remove zoom or file", Where(path="renderer.zoom")
+            "is not possible in a grid from a file; remove zoom or file", Where(path="renderer.zoom")
         )
     if renderer.level is not None:
         if renderer.transfer.opacity is not None:
             raise SceneError(
-                "is of a surface, and transfer.opacity shows all values; remove one of them",
+                "applies to a surface, but transfer.opacity shows all values; remove one of them",
                 Where(path="renderer.level"),
             )
         if renderer.file is None:
@@ -96,7 +96,7 @@ def _check_eyes(scene: Scene) -> None:
     flat = isinstance(scene.renderer, CutPlaneRenderer)
     if isinstance(scene.camera, OrthographicCamera) and not flat and scene.layout is None:
         raise SceneError(
-            "must be perspective with stereo: rays from infinity are the same for both eyes; use"
+            "must be perspective with stereo: parallel rays look the same to both eyes; use"
             " {projection: perspective, position, target, fov}, or remove stereo",
             Where(path="camera.projection"),
         )
@@ -109,7 +109,7 @@ def _check_stereo(scene: Scene, stereo: Stereo) -> None:
         side = getattr(scene.image, squeezed)
         if side % 2:
             raise SceneError(
-                f"must be even for stereo.mode {stereo.mode}, where each eye has half of it, got {side}",
+                f"must be even for stereo.mode {stereo.mode}, where each eye gets half of it, got {side}",
                 Where(path=f"image.{squeezed}"),
             )
     stereo.check_channels(scene.output.channels)
@@ -117,11 +117,9 @@ def _check_stereo(scene: Scene, stereo: Stereo) -> None:
         return
     problem = ""
     if scene.layout is not None:
-        problem = (
-            "cannot suit several views at once; give plane and separation in its place, or remove layout"
-        )
+        problem = "cannot fit several views at once; give plane and separation instead, or remove layout"
     elif isinstance(scene.renderer, CutPlaneRenderer):
-        problem = "has no depth to fit where renderer.type is cut_plane, which is flat; remove it"
+        problem = "needs depth, but the picture of a cut_plane renderer is flat; remove fit"
     elif stereo.convergence != "off_axis":
         problem = (
             f"needs convergence off_axis, where parallax follows from depth alone, got {stereo.convergence}"
@@ -163,7 +161,7 @@ def _check_planes(scene: Scene) -> None:
     count = sum(plane.count for plane in scene.cut_planes)
     if count > MAX_PLANES:
         raise SceneError(
-            f"must be at most {MAX_PLANES} planes together, got {count}", Where(path="cut_planes")
+            f"must be at most {MAX_PLANES} planes in total, got {count}", Where(path="cut_planes")
         )
     if count and isinstance(scene.renderer, CutPlaneRenderer):
         raise SceneError("are for surface and volume renderers; remove them", Where(path="cut_planes"))
@@ -174,7 +172,7 @@ def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
     count = renderer.used_points.count
     if scene.coloring.by == "residual" and count < 4:
         raise SceneError(
-            f"residual needs at least 4 points of a pixel (renderer.points), got {count}",
+            f"residual needs at least 4 points per pixel (renderer.points), got {count}",
             Where(path="coloring.by"),
         )
 

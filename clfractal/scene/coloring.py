@@ -33,7 +33,8 @@ def check_order(palette: str | Sequence[Stop]) -> None:
         at, before = palette[index].at, palette[index - 1].at
         if at < before:
             raise problem(
-                f"must be at least {before:g}, that of the stop before, got {at:g}", f"palette.{index}.at"
+                f"must be at least {before:g}, the value at the stop before, got {at:g}",
+                f"palette.{index}.at",
             )
 
 
@@ -41,11 +42,13 @@ class Trap(Section):
     """A shape in the formula's space; the colour follows how near the orbit comes to it."""
 
     shape: Literal["point", "axis", "plane", "sphere"] = Field(
-        "point", description="what the orbit comes near to"
+        "point", description="the shape to which the orbit's distance is measured"
     )
-    center: Position = Field((0.0, 0.0, 0.0), description="a point of it; a sphere's centre")
-    direction: Position = Field((0.0, 0.0, 1.0), description="an axis' direction, or a plane's normal")
-    radius: Length = Field(1.0, description="a sphere's radius")
+    center: Position = Field(
+        (0.0, 0.0, 0.0), description="the point, a point of the axis or plane, or the sphere's centre"
+    )
+    direction: Position = Field((0.0, 0.0, 1.0), description="the axis's direction, or the plane's normal")
+    radius: Length = Field(1.0, description="the sphere's radius")
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
@@ -65,7 +68,7 @@ class Coloring(Section):
     """
 
     by: Literal["solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap"] = Field(
-        "solid", description="what chooses the colour"
+        "solid", description="the quantity that chooses the colour"
     )
     palette: (
         Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
@@ -75,19 +78,20 @@ class Coloring(Section):
         discriminator=chosen_by_word("name", "stops"),
         description="a palette's name, or stops in order of `at`",
     )
-    scale: Coordinate = Field(0.1, description="palettes per unit")
-    offset: Coordinate = Field(0.0, description="start in the palette")
+    scale: Coordinate = Field(0.1, description="palette lengths per unit of the quantity")
+    offset: Coordinate = Field(0.0, description="position in the palette where the quantity is 0")
     repeat: bool = Field(
-        True, description="whether the palette begins again after its end; else its ends go on"
+        True, description="true: the palette repeats; false: its first and last colour continue"
     )
     along: Literal["view", "normal", "reflection"] = Field(
-        "normal", description="the way of `thickness` (view or normal) and `layer_distance`"
+        "normal",
+        description="direction in which `thickness` (view or normal) or `layer_distance` is measured",
     )
-    layer: int = Field(1, ge=1, le=1_000_000, description="iterations of the other layer")
+    layer: int = Field(1, ge=1, le=1_000_000, description="iterations of the other layer of `layer_distance`")
     step: Length | None = Field(
-        None, description="step along the way, scene units; 1/100 of the bounds' radius if null"
+        None, description="step in that direction, scene units; null: 1/100 of the bounds' radius"
     )
-    trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape of `trap`")
+    trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape for `by: trap`")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:

@@ -27,12 +27,14 @@ class EscapeColors(Section):
     palette: Palette = "viridis"
     mode: Literal["smooth", "stepped"] = Field("smooth", description="smooth counts, or whole ones")
     curve: Literal["linear", "root", "log"] = Field(
-        "linear", description="of count / limit: itself, its square root, or log(count) / log(limit)"
+        "linear", description="the quantity: count / limit, its square root, or log(count) / log(limit)"
     )
-    scale: Coordinate = Field(1.0, description="palettes from count 0 to the limit")
-    offset: Coordinate = Field(0.0, description="start in the palette")
-    repeat: bool = Field(False, description="whether the palette begins again after its end")
-    inside: Color = Field((0.0, 0.0, 0.0), description="of points that never escape, linear Rec. 709")
+    scale: Coordinate = Field(1.0, description="palette lengths between count 0 and the limit")
+    offset: Coordinate = Field(0.0, description="position in the palette where the quantity is 0")
+    repeat: bool = Field(
+        False, description="true: the palette repeats; false: its first and last colour continue"
+    )
+    inside: Color = Field((0.0, 0.0, 0.0), description="colour of points that never escape, linear Rec. 709")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -45,35 +47,37 @@ class CutPlaneRenderer(Sampled):
 
     tag = "cut_plane"
     type: Literal["cut_plane"] = "cut_plane"
-    plane: Plane = Field(default_factory=dict, validate_default=True, description="where it lies")
+    plane: Plane = Field(default_factory=dict, validate_default=True, description="where the plane lies")
     colors: EscapeColors = Field(
         default_factory=dict, validate_default=True, description="colours by escape counts"
     )
     iterations: Iterations | None = Field(
-        None, description="most applications of the formula on the plane; formula.iterations if null"
+        None, description="maximum number of iterations on the plane; null: formula.iterations"
     )
     periodicity: bool = Field(
-        True, description="whether points inside are found early, by orbits that come back"
+        True, description="find points inside early, by orbits that repeat; never changes the picture"
     )
 
 
 class CutPlane(Section):
     """A plane that stands in the picture of the object, coloured by escape counts."""
 
-    plane: Plane = Field(default_factory=dict, validate_default=True, description="where it lies")
+    plane: Plane = Field(default_factory=dict, validate_default=True, description="where the plane lies")
     colors: EscapeColors = Field(
         default_factory=dict, validate_default=True, description="colours by escape counts"
     )
-    opacity: Fraction = Field(0.8, description="of the rectangle; 0: not shown")
+    opacity: Fraction = Field(0.8, description="opacity of the rectangle; 0: only the face of a cut is shown")
     inside_opacity: Fraction | None = Field(
-        None, description="of the rectangle where the plane is in the set; opacity if null"
+        None, description="opacity where the rectangle is in the set; null: as `opacity`"
     )
     cut: bool = Field(False, description="whether the object in front of the plane is removed")
     iterations: Iterations | None = Field(
-        None, description="most applications of the formula on the plane; formula.iterations if null"
+        None, description="maximum number of iterations on the plane; null: formula.iterations"
     )
-    count: int = Field(1, ge=1, le=256, description="parallel planes")
-    spacing: Coordinate = Field(0.1, description="from one to the next along the normal, scene units")
+    count: int = Field(1, ge=1, le=256, description="number of parallel planes")
+    spacing: Coordinate = Field(
+        0.1, description="distance between neighbouring planes along the normal, scene units"
+    )
 
 
 CutPlanes = Annotated[tuple[CutPlane, ...], Field(strict=False, max_length=64)]

@@ -19,15 +19,17 @@ class _Source(Section):
     name: Source | None = Field(None, description="a formula of the library")
     file: Source | None = Field(None, description="a formula file, in the scene's folder or below")
     inline: dict[str, Any] | None = Field(None, description="a formula, written here")
-    parameters: dict[str, Number] = Field({}, description="values of its parameters")
-    live: Live = Field((), description="names of parameters that may move without building the program anew")
-    julia: Julia | None = Field(None, description="the added constant: a number for each variable")
+    parameters: dict[str, Number] = Field({}, description="values of the formula's parameters")
+    live: Live = Field((), description="names of parameters whose values may change without compiling again")
+    julia: Julia | None = Field(
+        None, description="the constant to add instead of the point: one number for each variable"
+    )
 
 
 class ChainLink(_Source):
     """One member of a chain: a formula and how many times it is applied before the next one's turn."""
 
-    count: int = Field(1, ge=1, le=1000, description="applications in a row")
+    count: int = Field(1, ge=1, le=1000, description="number of applications before the next formula's turn")
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -41,9 +43,15 @@ class FormulaSpec(_Source):
     chain: (
         Annotated[tuple[ChainLink, ...], Field(strict=False, min_length=1, max_length=MAX_LINKS)] | None
     ) = Field(None, description="formulas applied in turn")
-    iterations: int = Field(30, ge=1, le=1_000_000, description="most applications of the formula")
-    bailout: Bailout | None = Field(None, description="escape radius of counts and inside tests")
-    distance_bailout: Bailout | None = Field(None, description="escape radius of distances")
+    iterations: int = Field(
+        30, ge=1, le=1_000_000, description="maximum number of applications of the formula"
+    )
+    bailout: Bailout | None = Field(
+        None, description="escape radius for counts and inside tests; null: the formula's own"
+    )
+    distance_bailout: Bailout | None = Field(
+        None, description="escape radius for distances; null: the formula's own, or 1000"
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
@@ -72,4 +80,4 @@ def _check_source(spec: Section, keys: tuple[str, ...]) -> None:
     if not given:
         raise problem(f"needs one of {listing}")
     if len(given) > 1:
-        raise problem(f"cannot stand beside {given[0]}: give one of {listing}", given[1])
+        raise problem(f"cannot be combined with {given[0]}: give one of {listing}", given[1])

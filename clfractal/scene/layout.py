@@ -30,18 +30,20 @@ class LayoutView(Section):
 
     area: Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)] | None = Field(
         None,
-        description="left, top, width and height as parts of the picture; the next cell of the grid if null",
+        description="left, top, width, height as fractions of the picture; null: the next cell of the grid",
     )
-    camera: Camera | None = Field(None, description="in place of the scene's own; that if null")
-    renderer: Renderer | None = Field(None, description="in place of the scene's own; that if null")
-    lights: Lights | None = Field(None, description="in place of the scene's own; that if null")
-    material: Material | None = Field(None, description="in place of the scene's own; that if null")
-    coloring: Coloring | None = Field(None, description="in place of the scene's own; that if null")
-    background: Background | None = Field(None, description="in place of the scene's own; that if null")
-    environment: Environment | None = Field(None, description="in place of the scene's own; that if null")
-    fog: Fog | None = Field(None, description="in place of the scene's own; that if null")
+    camera: Camera | None = Field(None, description="replaces the scene's camera; null: keeps it")
+    renderer: Renderer | None = Field(None, description="replaces the scene's renderer; null: keeps it")
+    lights: Lights | None = Field(None, description="replaces the scene's lights; null: keeps them")
+    material: Material | None = Field(None, description="replaces the scene's material; null: keeps it")
+    coloring: Coloring | None = Field(None, description="replaces the scene's coloring; null: keeps it")
+    background: Background | None = Field(None, description="replaces the scene's background; null: keeps it")
+    environment: Environment | None = Field(
+        None, description="replaces the scene's environment; null: keeps it"
+    )
+    fog: Fog | None = Field(None, description="replaces the scene's fog; null: keeps it")
     cut_planes: CutPlanes | None = Field(
-        None, description="in place of the scene's own; that if null, and none for a cut_plane renderer"
+        None, description="replaces the scene's cut planes; null: keeps them, except for a cut_plane renderer"
     )
 
     @model_validator(mode="after")
@@ -62,13 +64,13 @@ class Layout(Section):
     """Views in a grid, from left to right and from top to bottom, or wherever their `area` says."""
 
     views: Annotated[tuple[LayoutView, ...], Field(strict=False, min_length=1, max_length=MAX_VIEWS)] = Field(
-        description="what each has of its own; all else is the scene's"
+        description="what each view replaces; the scene gives everything else"
     )
     columns: Annotated[int, Field(strict=True, ge=1, le=MAX_VIEWS)] | None = Field(
-        None, description="cells of a row; one row if null"
+        None, description="cells per row; null: all views in one row"
     )
-    gap: int = Field(0, ge=0, le=1024, description="between cells, pixels")
-    background: Color = Field((0.0, 0.0, 0.0), description="of gaps, linear Rec. 709")
+    gap: int = Field(0, ge=0, le=1024, description="space between cells, pixels")
+    background: Color = Field((0.0, 0.0, 0.0), description="colour of the gaps, linear Rec. 709")
 
     def places(self, width: int, height: int) -> list[Place]:
         """Where each view lies in a picture of `width` x `height` pixels; a place may be empty."""

@@ -14,12 +14,15 @@ class LightBase(Section):
 
     color: Color = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
     intensity: Amount = Field(1.0, description="factor on the colour")
-    shadow: bool = Field(True, description="whether it is blocked by the set")
+    shadow: bool = Field(True, description="whether the set blocks this light")
     angular_size: float = Field(
-        0.0, ge=0, le=170, description="its diameter as the surface sees it, degrees; 0 makes hard shadows"
+        0.0,
+        ge=0,
+        le=170,
+        description="diameter of the light as seen from the surface, degrees; 0: hard shadows",
     )
     rays: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
-        None, description="rays of a soft shadow, for each sample, 8 if null; a hard one takes one"
+        None, description="shadow rays per sample for a soft shadow; null: 8. A hard shadow takes one"
     )
 
     @property
@@ -35,7 +38,7 @@ class DirectionalLight(LightBase):
 
     tag = "directional"
     type: Literal["directional"] = "directional"
-    direction: Position = Field((-1.0, 1.0, -1.0), description="where the light travels to")
+    direction: Position = Field((-1.0, 1.0, -1.0), description="direction in which the light travels")
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
@@ -50,7 +53,9 @@ class PointLight(LightBase):
     tag = "point"
     type: Literal["point"] = "point"
     position: Position = Field(description="scene units")
-    falloff: Literal["none", "inverse_square"] = Field("none", description="how it weakens with distance")
+    falloff: Literal["none", "inverse_square"] = Field(
+        "none", description="how the light weakens with distance"
+    )
 
 
 Light = Annotated[
@@ -65,15 +70,19 @@ MapName = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
 class Environment(Section):
     """A picture of everything around, infinitely far away: it lights the set, is mirrored by it and seen past it."""
 
-    name: MapName | None = Field(None, description="a map that travels with the program")
+    name: MapName | None = Field(None, description="an environment map that comes with the program")
     file: MapName | None = Field(
         None, description="a latitude-longitude EXR picture, in the scene's folder or below"
     )
-    intensity: Amount = Field(1.0, description="factor on its light")
-    rotation: float = Field(0.0, ge=-360, le=360, description="turns it about the z axis, degrees")
-    background: bool = Field(True, description="whether it is seen past the set; else the background is")
+    intensity: Amount = Field(1.0, description="factor on the environment's light")
+    rotation: float = Field(
+        0.0, ge=-360, le=360, description="rotation of the environment about the z axis, degrees"
+    )
+    background: bool = Field(
+        True, description="true: visible behind the set; false: `background` is visible there"
+    )
     rays: int = Field(
-        8, ge=0, le=1024, description="rays for its light, for each sample; 0: it lights nothing"
+        8, ge=0, le=1024, description="rays per sample for the environment's light; 0: it lights nothing"
     )
 
     @model_validator(mode="after")
@@ -81,7 +90,7 @@ class Environment(Section):
         if self.name is None and self.file is None:
             raise problem("needs one of name or file")
         if self.name is not None and self.file is not None:
-            raise problem("cannot stand beside name: give one of name or file", "file")
+            raise problem("cannot be combined with name: give one of name or file", "file")
         return self
 
 
@@ -90,6 +99,6 @@ class Fog(Section):
 
     color: Color = Field((0.5, 0.55, 0.6), description="linear Rec. 709")
     density: float = Field(
-        0.1, ge=0, le=1e6, description="per scene unit: exp(-density * distance) of the light comes through"
+        0.1, ge=0, le=1e6, description="per scene unit; the fraction exp(-density * distance) of light passes"
     )
-    background: bool = Field(True, description="whether it covers what is seen past the set")
+    background: bool = Field(True, description="whether the fog also covers the background")

@@ -52,9 +52,11 @@ class Scene(Section):
     background: Background = Field(default_factory=dict, validate_default=True)
     environment: Environment | None = None
     fog: Fog | None = None
-    cut_planes: CutPlanes = Field((), description="planes that stand in the picture, or cut the object open")
-    layout: Layout | None = Field(None, description="several views in one picture; one if null")
-    stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; one picture if null")
+    cut_planes: CutPlanes = Field(
+        (), description="planes that are shown in the picture or cut the object open"
+    )
+    layout: Layout | None = Field(None, description="several views in one picture; null: one view")
+    stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; null: one picture")
     output: Output = Field(default_factory=dict, validate_default=True)
 
     # Beside the fields: no part of what a scene says, and not compared.
@@ -164,7 +166,7 @@ class Scene(Section):
         for number, (view, place) in enumerate(zip(self.layout.views, places, strict=True)):
             if place.width < 1 or place.height < 1:
                 raise SceneError(
-                    f"there is no room for it in a picture of {self.image.width} x {self.image.height} pixels",
+                    f"does not fit into a picture of {self.image.width} x {self.image.height} pixels",
                     Where(path=f"layout.views.{number}"),
                 )
             own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}

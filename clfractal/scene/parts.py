@@ -72,16 +72,17 @@ class PerspectiveCamera(CameraBase):
     projection: Literal["perspective"] = "perspective"
     fov: float = Field(45.0, ge=1e-6, lt=180, description="vertical angle of view, degrees")
     f_number: Annotated[float, Field(strict=True, ge=0.01, le=1e6)] | None = Field(
-        None, description="focal length over the lens's diameter; a pinhole, everything sharp, if null"
+        None, description="focal length divided by the lens's diameter; null: a pinhole, all is sharp"
     )
     # Its lower bound is checked below, to say what is wrong with a negative one.
     focus_distance: (
         Annotated[float, Field(strict=True, le=1e6, json_schema_extra={"exclusiveMinimum": 0})] | None
     ) = Field(
-        None, description="what is sharp, measured along the view axis, scene units; the target's if null"
+        None, description="distance that is sharp, along the view axis, scene units; null: the target's"
     )
     sensor_height: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
-        0.024, description="height of the sensor behind the lens, scene units (24 mm if they are metres)"
+        0.024,
+        description="height of the sensor behind the lens, scene units; by default 24 mm if they are metres",
     )
 
     @model_validator(mode="after")
@@ -128,9 +129,9 @@ class Material(Section):
     color: Reflectance = Field(
         (0.8, 0.7, 0.6), description="linear Rec. 709; replaced by a coloring other than solid"
     )
-    ambient: Amount = Field(0.1, description="part of each light that reaches everywhere")
-    diffuse: Amount = Field(0.9, description="part that is scattered")
-    specular: Amount = Field(0.3, description="part that is mirrored")
+    ambient: Amount = Field(0.1, description="part of each light that reaches everywhere, shadows too")
+    diffuse: Amount = Field(0.9, description="part of the light that is scattered")
+    specular: Amount = Field(0.3, description="part of the light that is mirrored as a highlight")
     shininess: float = Field(30.0, ge=0.1, le=1e5, description="exponent of the highlight")
     reflection: Fraction = Field(0.0, description="part of the surroundings that is mirrored sharply")
 
@@ -163,12 +164,13 @@ class Output(Section):
         0.0, ge=-100, le=100, description="stops: PNG colours are multiplied by 2**exposure"
     )
     channels: Annotated[tuple[ChannelName, ...], Field(strict=False, min_length=1, max_length=64)] = Field(
-        DEFAULT_CHANNELS, description="channels of an EXR"
+        DEFAULT_CHANNELS, description="names of the channels of an EXR"
     )
     precision: dict[ChannelName, Literal["half", "float"]] = Field(
-        default_factory=dict, description="an EXR's numbers, by channel, where not as usual for the channel"
+        default_factory=dict,
+        description="half or float for those channels of an EXR that are not stored as by default",
     )
-    png_bits: Literal[8, 16] = Field(8, description="bits of a PNG's channel")
+    png_bits: Literal[8, 16] = Field(8, description="bits per channel of a PNG")
 
     @model_validator(mode="after")
     def _different(self) -> Self:

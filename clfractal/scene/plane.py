@@ -21,40 +21,42 @@ LARGEST, SMALLEST = 1e6, 1e-18
 class Transform(Section):
     """One step of moving a plane about: exactly one of its keys."""
 
-    scale: Factor | None = Field(None, description="factor on width and height, about the centre")
-    move_normal: Coordinate | None = Field(None, description="along the normal, scene units")
-    move_side: Coordinate | None = Field(None, description="to the plane's right, scene units")
-    move_up: Coordinate | None = Field(None, description="to the plane's top, scene units")
-    rotate_normal: Angle | None = Field(None, description="about the plane's own normal, degrees")
-    rotate_side: Angle | None = Field(None, description="about the plane's own side, degrees")
-    rotate_up: Angle | None = Field(None, description="about the plane's own up, degrees")
-    rotate_x: Angle | None = Field(None, description="about the x axis of space, degrees")
-    rotate_y: Angle | None = Field(None, description="about the y axis of space, degrees")
-    rotate_z: Angle | None = Field(None, description="about the z axis of space, degrees")
+    scale: Factor | None = Field(None, description="factor on width and height; the centre stays")
+    move_normal: Coordinate | None = Field(None, description="shift along the normal, scene units")
+    move_side: Coordinate | None = Field(None, description="shift to the plane's right, scene units")
+    move_up: Coordinate | None = Field(None, description="shift towards the plane's top, scene units")
+    rotate_normal: Angle | None = Field(None, description="rotation about the plane's normal, degrees")
+    rotate_side: Angle | None = Field(
+        None, description="rotation about the plane's axis to its right, degrees"
+    )
+    rotate_up: Angle | None = Field(None, description="rotation about the plane's axis to its top, degrees")
+    rotate_x: Angle | None = Field(None, description="rotation about the x axis of space, degrees")
+    rotate_y: Angle | None = Field(None, description="rotation about the y axis of space, degrees")
+    rotate_z: Angle | None = Field(None, description="rotation about the z axis of space, degrees")
 
     @model_validator(mode="after")
     def _one(self) -> Self:
         given = [name for name in (*MOVES, *TURNS) if getattr(self, name) is not None]
         if len(given) != 1:
-            raise problem(f"must have one key of {', '.join((*MOVES, *TURNS))}, got {len(given)}")
+            raise problem(f"must have exactly one key of {', '.join((*MOVES, *TURNS))}, got {len(given)}")
         return self
 
 
 class Plane(Section):
     """A rectangle that faces its normal; `side` = up x normal is its right."""
 
-    center: Position = Field((0.0, 0.0, 0.0), description="its middle, scene units")
-    normal: Position = Field((0.0, 0.0, 1.0), description="towards the viewer")
+    center: Position = Field((0.0, 0.0, 0.0), description="the plane's middle, scene units")
+    normal: Position = Field((0.0, 0.0, 1.0), description="direction towards the viewer")
     up: Position | None = Field(
-        None, description="towards its top; y, or z where the normal leaves little of y, if null"
+        None, description="direction towards the plane's top; null: y, or z where the normal is nearly y"
     )
     width: Length = Field(4.0, description="scene units")
     height: Length = Field(4.0, description="scene units")
     corners: Annotated[tuple[Position, Position, Position], Field(strict=False)] | None = Field(
-        None, description="in place of all these: its lower left, lower right and upper left corner"
+        None, description="lower left, lower right and upper left corner, instead of all keys above"
     )
     transform: Annotated[tuple[Transform, ...], Field(strict=False, max_length=256)] = Field(
-        (), description="steps that move it about, one after the other"
+        (), description="steps that scale, move or rotate the plane, one after the other"
     )
 
     @model_validator(mode="after")
@@ -63,7 +65,7 @@ class Plane(Section):
             fields = type(self).model_fields
             for name in ("center", "normal", "up", "width", "height"):
                 if getattr(self, name) != fields[name].default:
-                    raise problem(f"corners already say it; remove {name} or corners", name)
+                    raise problem(f"is already given by corners; remove {name} or corners", name)
             low, right, high = self.corners
             # Nearer to each other than the number type can tell, corners are one corner.
             least = 1e-15 * max(abs(x) for corner in self.corners for x in corner)
@@ -72,7 +74,7 @@ class Plane(Section):
             if min(width, height) <= least or length(cross(side, up)) <= 1e-6 * width * height:
                 raise problem("must not lie on one line", "corners")
             if abs(_dot(side, up)) > 1e-4 * width * height:
-                raise problem("must make a right angle at the first, the lower left", "corners")
+                raise problem("must have a right angle at the first corner, the lower left one", "corners")
             return self
         if length(self.normal) < 1e-12:
             raise problem("must not be zero", "normal")

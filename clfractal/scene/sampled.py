@@ -13,22 +13,23 @@ USUAL_MIN_SAMPLES = 16
 class Sampled(Section):
     """Samples, their filter, and the number type."""
 
-    samples: int = Field(
-        1, ge=1, le=65_536, description="rays per pixel; the most of them if `noise` is given"
-    )
+    samples: int = Field(1, ge=1, le=65_536, description="rays per pixel; with `noise` their maximum number")
     noise: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
-        None, description="a pixel gets no more samples once its standard error is below this; all if null"
+        None,
+        description="a pixel gets no more samples once its standard error is below this; null: it gets all",
     )
     min_samples: Annotated[int, Field(strict=True, ge=4, le=65_536)] | None = Field(
-        None, description="samples before the noise of a pixel is judged; 16, or all if fewer, if null"
+        None, description="samples before the noise of a pixel is judged; null: 16, or all if fewer"
     )
     filter: Literal["box", "tent", "blackman_harris"] = Field(
-        "box", description="how samples around a pixel are weighted"
+        "box", description="how samples are spread around a pixel's middle"
     )
     filter_width: Annotated[float, Field(strict=True, ge=0.1, le=16)] | None = Field(
-        None, description="the filter's width, pixels; box 1, tent 2, blackman_harris 3 if null"
+        None, description="the filter's width, pixels; null: box 1, tent 2, blackman_harris 3"
     )
-    seed: int = Field(0, ge=0, le=2**32 - 1, description="chooses the places of samples, points and rays")
+    seed: int = Field(
+        0, ge=0, le=2**32 - 1, description="number that selects the random places of samples, points and rays"
+    )
     precision: Literal["auto", "float32", "float64"] = Field(
         "auto", description="number type; auto: float64 where pixels are too fine for float32"
     )

@@ -58,12 +58,12 @@ MIDDLE = Eye()
 class StereoPlane(Section):
     """The rectangle in space that lies on the screen."""
 
-    center: Position = Field((0.0, 0.0, 0.0), description="its middle, scene units")
-    normal: Position = Field((0.0, -1.0, 0.0), description="towards the viewer")
-    up: Position = Field((0.0, 0.0, 1.0), description="towards its top")
+    center: Position = Field((0.0, 0.0, 0.0), description="the plane's middle, scene units")
+    normal: Position = Field((0.0, -1.0, 0.0), description="direction towards the viewer")
+    up: Position = Field((0.0, 0.0, 1.0), description="direction towards the plane's top")
     width: Annotated[float, Field(strict=True, ge=1e-18, le=1e6)] = Field(4.0, description="scene units")
     height: Annotated[float, Field(strict=True, ge=1e-18, le=1e6)] | None = Field(
-        None, description="scene units; as the picture's pixels are square if null"
+        None, description="scene units; null: the height that makes pixels square on the screen"
     )
 
     @model_validator(mode="after")
@@ -84,34 +84,41 @@ class Stereo(Section):
     """
 
     mode: Mode = Field("split", description="how the pair is shown")
-    screen_width: Positive = Field(0.52, description="of the picture on the real screen")
-    screen_distance: Positive = Field(0.6, description="from the viewer's eyes to the screen")
-    interpupillary_distance: Positive = Field(0.063, description="between the viewer's pupils")
-    swap: bool = Field(False, description="the right eye takes the left one's place in the picture")
+    screen_width: Positive = Field(
+        0.52, description="width of the picture on the real screen, in any unit of length"
+    )
+    screen_distance: Positive = Field(
+        0.6, description="distance from the viewer's eyes to the screen, in the same unit"
+    )
+    interpupillary_distance: Positive = Field(
+        0.063, description="distance between the viewer's pupils, in the same unit"
+    )
+    swap: bool = Field(False, description="exchange the places of the two eyes in the picture")
     plane: StereoPlane | None = Field(
-        None, description="what lies on the screen; the plane through the camera's target if null"
+        None, description="the plane that lies on the screen; null: the plane through the camera's target"
     )
     convergence: Literal["off_axis", "parallel", "toe_in"] = Field(
-        "off_axis", description="off_axis is right for a screen; the others are for comparison"
+        "off_axis",
+        description="how the eyes are aimed: off_axis is right for a screen, the others are for comparison",
     )
     separation: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False)] = Field(
-        1.0, description="distance between the eyes that look, in the viewer's own"
+        1.0, description="distance between the viewpoints; 1 is the viewer's interpupillary distance"
     )
     fit: Literal["auto"] | None = Field(
         None, description="auto: plane and separation are chosen so that the depth fits the budget"
     )
     budget: Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)] = Field(
-        1.0, description="most parallax that `fit` allows, degrees"
+        1.0, description="largest parallax that `fit` allows, degrees"
     )
     method: Literal["color", "half_color", "gray", "dubois"] = Field(
-        "dubois", description="of anaglyph: how the two pictures' colours are mixed"
+        "dubois", description="for mode anaglyph: how the two pictures' colours are mixed"
     )
     glasses: Literal["red_cyan", "green_magenta", "amber_blue"] = Field(
-        "red_cyan", description="of anaglyph: the filters before the left and the right eye"
+        "red_cyan", description="for mode anaglyph: the colours of the left and the right filter"
     )
     colors: Annotated[tuple[Reflectance, Reflectance], Field(strict=False)] = Field(
         ((1.0, 0.0, 0.0), (0.0, 1.0, 1.0)),
-        description="of anaglyph_chessboard: the left and the right eye's filter, linear Rec. 709",
+        description="for mode anaglyph_chessboard: the left and the right filter, linear Rec. 709",
     )
 
     @model_validator(mode="after")

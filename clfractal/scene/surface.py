@@ -25,10 +25,8 @@ class Ball(Section):
 class Points(Section):
     """The points of a pixel that share one march; each finds the surface on its own ray."""
 
-    pattern: Literal["grid", "stochastic"] = Field(
-        "grid", description="a square grid, or places spread by chance"
-    )
-    count: int = Field(9, ge=1, le=MAX_POINTS, description="points of a pixel")
+    pattern: Literal["grid", "stochastic"] = Field("grid", description="a square grid, or random places")
+    count: int = Field(9, ge=1, le=MAX_POINTS, description="number of points per pixel")
 
     @model_validator(mode="after")
     def _countable(self) -> Self:
@@ -43,9 +41,9 @@ class Points(Section):
 class AmbientOcclusion(Section):
     """How much of the surroundings a point of the surface sees."""
 
-    rays: int = Field(8, ge=1, le=1024, description="rays into the hemisphere, for each sample")
+    rays: int = Field(8, ge=1, le=1024, description="rays into the hemisphere per sample")
     distance: Length | None = Field(
-        None, description="how far an obstacle counts, scene units; half the radius of the bounds if null"
+        None, description="distance up to which obstacles count, scene units; null: half the bounds' radius"
     )
 
 
@@ -55,13 +53,14 @@ class SurfaceRenderer(Sampled):
     tag = "surface"
     type: Literal["surface"] = "surface"
     search: Literal["distance", "steps"] = Field(
-        "distance", description="march by a bound of the distance, or by fixed steps and an inside test alone"
+        "distance",
+        description="find the surface by estimated distances, or by fixed steps and inside tests alone",
     )
     step: Length | None = Field(
-        None, description="step of the search `steps`, scene units; 1/100 of the bounds' radius if null"
+        None, description="step for `search: steps`, scene units; null: 1/100 of the bounds' radius"
     )
     points: Points | None = Field(
-        None, description="points of a pixel; one in its middle if null, 3 x 3 where the normal needs them"
+        None, description="points of a pixel; null: one in its middle, or 3 x 3 where `normal` needs them"
     )
     normal: Literal[
         "gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares"
@@ -69,23 +68,25 @@ class SurfaceRenderer(Sampled):
     detail: float = Field(
         1.0, ge=0.01, le=100, description="distance that counts as a hit, in pixel footprints"
     )
-    max_steps: int = Field(1000, ge=1, le=100_000, description="most distance evaluations along a ray")
+    max_steps: int = Field(
+        1000, ge=1, le=100_000, description="maximum number of distance evaluations along a ray"
+    )
     over_relaxation: float = Field(
-        1.3, ge=1, lt=2, description="factor on steps, taken back where it is unsafe"
+        1.3, ge=1, lt=2, description="factor on steps; a step is taken back where it was unsafe"
     )
     step_scale: Annotated[float, Field(strict=True, gt=0, le=2)] | None = Field(
-        None, description="factor on distances; the formula's own if null"
+        None, description="factor on estimated distances; null: the formula's own"
     )
-    bounds: Ball | None = Field(None, description="where to look; the formula's own if null")
-    bounces: int = Field(
-        3, ge=0, le=16, description="most mirror reflections of a ray, where the material reflects"
+    bounds: Ball | None = Field(
+        None, description="the ball that holds the visible part of the set; null: the formula's own"
     )
+    bounces: int = Field(3, ge=0, le=16, description="maximum number of mirror reflections of a ray")
     ambient_occlusion: AmbientOcclusion | None = Field(
-        None, description="darkens what sees little of its surroundings; none if null"
+        None, description="darkens hollows, which little light reaches; null: none"
     )
     firefly_limit: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
         10.0,
-        description="most light that one sample's mirror or environment rays may bring, after exposure; no limit if null",
+        description="most light that one sample's mirrored or environment rays may add; null: no limit",
     )
 
     @model_validator(mode="after")

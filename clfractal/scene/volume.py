@@ -28,7 +28,7 @@ class Box(Section):
     """A box in space, its sides along the axes."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="scene units")
-    size: Size = Field(4.0, description="its sides, scene units; one number for a cube")
+    size: Size = Field(4.0, description="lengths of the sides, scene units; one number for a cube")
 
     @property
     def sides(self) -> Vector:
@@ -39,23 +39,23 @@ class Box(Section):
 class Zoom(Section):
     """A smaller box within the one before."""
 
-    center: Position = Field(description="of the smaller box, scene units")
+    center: Position = Field(description="middle of the smaller box, scene units")
     scale: Annotated[float, Field(strict=True, ge=1, le=1e15, allow_inf_nan=False)] = Field(
-        description="how many times its sides go into those of the box before"
+        description="length of the sides of the box before, divided by this box's"
     )
 
 
 class OpacityStop(Section):
     """An opacity at a value of a voxel; between two stops it is mixed."""
 
-    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel")
-    opacity: Fraction = Field(description="of the length of a voxel's side, 0 to 1")
+    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel at this stop")
+    opacity: Fraction = Field(description="opacity over the length of a voxel's side, 0 to 1")
 
 
 class ColorStop(Section):
     """A colour at a value of a voxel; between two stops colours are mixed in linear light."""
 
-    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel")
+    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel at this stop")
     color: Color = Field(description="linear Rec. 709")
 
 
@@ -63,10 +63,10 @@ class Transfer(Section):
     """What the values of voxels look like."""
 
     opacity: Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = (
-        Field(None, description="stops in order of `at`; a surface at the renderer's level if null")
+        Field(None, description="stops in order of `at`; null: a surface at the renderer's level")
     )
     color: Annotated[tuple[ColorStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = Field(
-        None, description="stops in order of `at`; the material's colour if null"
+        None, description="stops in order of `at`; null: the material's colour"
     )
 
     @model_validator(mode="after")
@@ -76,7 +76,7 @@ class Transfer(Section):
             for index in range(1, len(stops)):
                 if stops[index].at < stops[index - 1].at:
                     raise problem(
-                        f"must be at least {stops[index - 1].at:g}, that of the stop before,"
+                        f"must be at least {stops[index - 1].at:g}, the value at the stop before,"
                         f" got {stops[index].at:g}",
                         f"{name}.{index}.at",
                     )
@@ -88,48 +88,52 @@ class VolumeRenderer(Sampled):
 
     tag = "volume"
     type: Literal["volume"] = "volume"
-    box: Box | None = Field(None, description="what is filled; a cube around the formula's bounds if null")
+    box: Box | None = Field(
+        None, description="the box that is filled; null: a cube around the formula's bounds"
+    )
     zoom: Annotated[tuple[Zoom, ...], Field(strict=False, max_length=64)] = Field(
-        (), description="smaller boxes, each within the one before; shown as large as the first"
+        (), description="smaller boxes, each within the one before; the last is shown as large as the first"
     )
     resolution: Resolution = Field(512, description="voxels along the longest side, or along x, y and z")
     file: str | None = Field(
         None,
         min_length=1,
-        description="a grid to show in place of the formula: NRRD or NPY, beside the scene",
+        description="a grid to show instead of the formula: a NRRD or NPY file beside the scene",
     )
     value: Literal["inside", "coverage", "iterations"] = Field(
         "inside",
-        description="of a voxel: whether its middle is inside, which part of it is, or its smooth count",
+        description="what a voxel holds: is its middle inside, which part is inside, or its smooth count",
     )
     sub_points: int = Field(3, ge=1, le=16, description="points along each side of a voxel for `coverage`")
-    store: Literal["byte", "float"] = Field("byte", description="how values are kept: in 8 bits or in 32")
+    store: Literal["byte", "float"] = Field("byte", description="how values are stored: in 8 bits or in 32")
     fill: Literal["octree", "brute"] = Field(
-        "octree", description="skip what the distance says is outside, or evaluate every voxel"
+        "octree", description="skip regions that distances show to be empty, or evaluate every voxel"
     )
     normals: Literal["gradient", "least_squares", "exact"] = Field(
         "gradient",
-        description="central differences, a plane through the surface in a voxel, or the Jacobian",
+        description="normals by central differences, by a plane fitted in a voxel, or by the Jacobian",
     )
     normal_radius: int = Field(
-        1, ge=0, le=4, description="of the low-pass filter before `gradient`, voxels; 0: none"
+        1, ge=0, le=4, description="radius of the low-pass filter before `gradient`, voxels; 0: none"
     )
     interpolation: Literal["trilinear", "nearest"] = Field(
-        "trilinear", description="values between the middles of voxels"
+        "trilinear", description="how values between the middles of voxels are found"
     )
     step: Annotated[float, Field(strict=True, ge=0.01, le=4)] = Field(
-        0.5, description="along the ray, in sides of a voxel"
+        0.5, description="step along a ray, in sides of a voxel"
     )
     level: Annotated[float, Field(strict=True, ge=-1e12, le=1e12)] | None = Field(
-        None, description="value of the surface; the middle of the grid's values if null"
+        None, description="value at the surface; null: the middle of the range of values"
     )
     opacity_limit: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
-        0.99, description="a ray ends once it is that opaque"
+        0.99, description="opacity at which a ray ends"
     )
     transfer: Transfer = Field(
-        default_factory=dict, validate_default=True, description="what the values of voxels look like"
+        default_factory=dict, validate_default=True, description="opacity and colour of the voxels' values"
     )
-    shadows: bool = Field(False, description="whether lights with a shadow send rays through the grid")
+    shadows: bool = Field(
+        False, description="whether lights with `shadow: true` cast shadows inside the grid"
+    )
 
     def value_range(self, iterations: int) -> tuple[float, float]:
         """The least and the largest value of a grid that is filled, with a formula of at most `iterations`."""

@@ -172,13 +172,13 @@ def test_progress_and_the_rest_of_a_film(device: Device) -> None:
             [{}, {}, {}],
             {"gap": 20},
             (41, 8),
-            "layout.views.0: there is no room for it in a picture of 41 x 8 pixels",
+            "layout.views.0: does not fit into a picture of 41 x 8 pixels",
         ),
         (
             [{"area": [0, 0, 1e-3, 1]}, {}],
             {},
             (64, 8),
-            "layout.views.0: there is no room for it in a picture of 64 x 8 pixels",
+            "layout.views.0: does not fit into a picture of 64 x 8 pixels",
         ),
         (
             [{"area": [0.5, 0, 0.6, 1]}],

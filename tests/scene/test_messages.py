@@ -86,7 +86,7 @@ CASES = [
     ("coloring: {palette: §7}", "coloring.palette: must be text or a list, got 7"),
     (
         "coloring: {palette: [{at: 1, color: [0, 0, 0]}, {at: §0.5, color: [0, 0, 0]}]}",
-        "coloring.palette.1.at: must be at least 1, that of the stop before, got 0.5",
+        "coloring.palette.1.at: must be at least 1, the value at the stop before, got 0.5",
     ),
     (
         "coloring: {palette: §[{at: 0, color: [0, 0, 0]}]}",
@@ -105,7 +105,7 @@ CASES = [
     ("coloring: {step: §100}", "coloring.step: must be at most the diameter of the bounds, 2.208, got 100"),
     (
         "coloring: {by: §residual}",
-        "coloring.by: residual needs at least 4 points of a pixel (renderer.points), got 1",
+        "coloring.by: residual needs at least 4 points per pixel (renderer.points), got 1",
     ),
     (
         "coloring: {trap: {shape: §cube}}",
@@ -183,7 +183,7 @@ CASES = [
     ("environment: §{intensity: 2}", "environment: needs one of name or file"),
     (
         "environment: {name: a, file: §b.exr}",
-        "environment.file: cannot stand beside name: give one of name or file",
+        "environment.file: cannot be combined with name: give one of name or file",
     ),
     ("environment: §sky", "environment: must be a mapping, got 'sky'"),
     (
@@ -244,7 +244,7 @@ def test_a_missing_key_is_reported_after_what_is_wrong_in_the_text() -> None:
         ("§{}", "formula: needs one of name, file, inline or chain"),
         ("§mandelbulb", "formula: must be a mapping, got 'mandelbulb'"),
         ("{name: §mandelbul}", "formula.name: unknown formula 'mandelbul'; did you mean 'mandelbulb'?"),
-        ("{name: hast, inline: §{}}", "formula.inline: cannot stand beside name"),
+        ("{name: hast, inline: §{}}", "formula.inline: cannot be combined with name"),
         ("{name: hast, iterations: §0}", "formula.iterations: must be at least 1, got 0"),
         ("{name: hast, iterations: §2000000}", "formula.iterations: must be at most 1000000, got 2000000"),
         ("{name: hast, parameters: {§powr: 2}}", "formula.parameters.powr: unknown parameter 'powr'"),

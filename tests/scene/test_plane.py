@@ -214,16 +214,16 @@ REFUSED = {
     "{corners: [[0, 0, 0], [0, 0, 0], [0, 1, 0]]}": "renderer.plane.corners: must not lie on one line",
     "{corners: [[1, 0, 0], [1, 0, 1e-17], [1, 1, 0]]}": "renderer.plane.corners: must not lie on one line",
     "{corners: [[0, 0, 0], [1, 0, 0], [1, 1, 0]]}": (
-        "renderer.plane.corners: must make a right angle at the first, the lower left"
+        "renderer.plane.corners: must have a right angle at the first corner, the lower left one"
     ),
     "{corners: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], width: 2}": (
-        "renderer.plane.width: corners already say it; remove width or corners"
+        "renderer.plane.width: is already given by corners; remove width or corners"
     ),
     "{corners: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], center: [0, 0, 0], up: [0, 0, 1]}": (
-        "renderer.plane.up: corners already say it; remove up or corners"
+        "renderer.plane.up: is already given by corners; remove up or corners"
     ),
-    "{transform: [{scale: 2, move_up: 1}]}": "renderer.plane.transform.0: must have one key of scale,",
-    "{transform: [{}]}": "renderer.plane.transform.0: must have one key of scale,",
+    "{transform: [{scale: 2, move_up: 1}]}": "renderer.plane.transform.0: must have exactly one key of scale,",
+    "{transform: [{}]}": "renderer.plane.transform.0: must have exactly one key of scale,",
     "{transform: [{scale: 0}]}": "renderer.plane.transform.0.scale: must be above 0, got 0",
     "{transform: [{rotate: 1}]}": "renderer.plane.transform.0: unknown key 'rotate'",
     "{transform: [{move_up: 1e6}, {move_up: 1e6}]}": (
@@ -270,6 +270,6 @@ class TestPalettes:
         stops = "[{at: 0.5, color: [0, 0, 0]}, {at: 0.2, color: [1, 1, 1]}]"
         with pytest.raises(SceneError) as caught:
             load_scene(scene_text("{}", f"{{palette: {stops}}}"))
-        assert "renderer.colors.palette.1.at: must be at least 0.5, that of the stop before, got 0.2" in str(
+        assert "renderer.colors.palette.1.at: must be at least 0.5, the value at the stop before, got 0.2" in str(
             caught.value
         )

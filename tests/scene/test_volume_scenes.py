@@ -56,12 +56,12 @@ CASES = [
     # What values look like.
     (
         VOLUME + "transfer: {opacity: [{at: 1, opacity: 0}, {at: §0.5, opacity: 1}]}}",
-        "renderer.transfer.opacity.1.at: must be at least 1, that of the stop before, got 0.5",
+        "renderer.transfer.opacity.1.at: must be at least 1, the value at the stop before, got 0.5",
     ),
     (
         VOLUME + "transfer: {color: [{at: 3, color: [0, 0, 0]}, {at: 4, color: [1, 1, 1]},"
         " {at: §-1, color: [0, 0, 0]}]}}",
-        "renderer.transfer.color.2.at: must be at least 4, that of the stop before, got -1",
+        "renderer.transfer.color.2.at: must be at least 4, the value at the stop before, got -1",
     ),
     (
         VOLUME + "transfer: {opacity: [{at: 0, opacity: §1.5}]}}",
@@ -87,7 +87,7 @@ CASES = [
     ),
     (
         VOLUME + "level: §0.5, transfer: {opacity: [{at: 0, opacity: 0}]}}",
-        "renderer.level: is of a surface, and transfer.opacity shows all values; remove one of them",
+        "renderer.level: applies to a surface, but transfer.opacity shows all values; remove one of them",
     ),
     (VOLUME + "level: §.nan}", "renderer.level: must be a finite number, got .nan"),
     # Cut planes.
@@ -95,7 +95,7 @@ CASES = [
         PLANE + "colors: {palette: §magmaa}}]",
         "cut_planes.0.colors.palette: unknown palette 'magmaa'; did you mean 'magma'?",
     ),
-    ("cut_planes: §[{count: 60}, {count: 5}]", "cut_planes: must be at most 64 planes together, got 65"),
+    ("cut_planes: §[{count: 60}, {count: 5}]", "cut_planes: must be at most 64 planes in total, got 65"),
     ("cut_planes: §[" + "{}, " * 65 + "]", "cut_planes: must have at most 64 entries, got 65"),
     (
         "renderer: {type: cut_plane}\ncut_planes: §[{}]",
@@ -109,7 +109,7 @@ CASES = [
     ),
     (
         PLANE + "colors: {palette: [{at: 1, color: [0, 0, 0]}, {at: §0, color: [0, 0, 0]}]}}]",
-        "cut_planes.0.colors.palette.1.at: must be at least 1, that of the stop before, got 0",
+        "cut_planes.0.colors.palette.1.at: must be at least 1, the value at the stop before, got 0",
     ),
     # Files.
     (VOLUME + "file: §''}", "renderer.file: must not be empty, got ''"),
@@ -173,7 +173,7 @@ def test_a_level_beyond_a_files_values(folder: Path) -> None:
 
 def test_a_file_is_not_zoomed(folder: Path) -> None:
     text, place = marked(f"{HEAD}{VOLUME}file: good.nrrd, zoom: §[{{center: [0, 0, 0], scale: 2}}]}}\n")
-    expected = f"{place}: renderer.zoom: a file's grid has no more to zoom to; remove zoom or file"
+    expected = f"{place}: renderer.zoom: is not possible in a grid from a file; remove zoom or file"
     assert error_of(text, folder=folder) == expected
 
 
