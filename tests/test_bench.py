@@ -142,7 +142,7 @@ def test_only_the_wanted_rows_are_measured(tmp_path: Path, monkeypatch: pytest.M
         bench.run(device=None, json_file=report, shell=shell, wanted=wanted)
         found = [one["name"] for one in json.loads(report.read_text())["rows"]]
         assert found == [name for name in bench.row_names() if name in wanted or not wanted]
-    with pytest.raises(ClfractalError, match="--row: there is no 'hast3', only mandelbulb8-shadow"):
+    with pytest.raises(ClfractalError, match="--row: unknown row 'hast3'; known: mandelbulb8-shadow"):
         bench.run(device=None, json_file=None, shell=shell, wanted=("hast3",))
 
 

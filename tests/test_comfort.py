@@ -252,7 +252,7 @@ class TestTold:
 
     def test_a_sentence_and_a_warning(self) -> None:
         found = Comfort(-0.01, 0.005, -0.9999, 0.5)
-        assert found.sentence() == ("parallax -0.01 to +0.005 of the screen's units, -1.00 to +0.50 degrees")
+        assert found.sentence() == ("parallax -0.01 to +0.005 in the screen's unit, -1.00 to +0.50 degrees")
         assert found.worst_degrees == 0.9999
         assert found.warning() == ""
         assert (

@@ -135,7 +135,7 @@ def test_other_colors(shell: InProcess) -> None:
     assert np.abs(load("ball.ply").visual.vertex_colors[:, :3] / 255 - color).max() < 1 / 500
     ended = shell(*common, "--set", "coloring.by=trap")
     assert works(ended)
-    assert "coloring.by: trap is not known of vertices; they get the material's colour\n" in ended.err
+    assert "coloring.by: trap cannot be computed for vertices; they get the material's colour\n" in ended.err
     assert np.abs(load("ball.ply").visual.vertex_colors[:, :3] / 255 - color).max() < 1 / 500
     # A palette over smooth counts, of which a sphere around a ball has one: all vertices get nearly the same.
     ends = "{at: 0, color: [0, 0, 0]}, {at: 1, color: [1, 0, 0]}"
@@ -192,7 +192,9 @@ def test_a_scene_that_shows_a_volume_of_others(shell: InProcess) -> None:
     assert works(shell("mesh", "theirs.yaml", "-o", "large.ply", "--level", "0", *twice, "-q"))
     assert load("large.ply").volume == pytest.approx(8 * 4 / 3 * np.pi, rel=0.02)
     told = shell("voxelize", "theirs.yaml", "-o", "no.nrrd", "--resolution", "20")
-    assert told.is_one_line(2, "--resolution: is for grids that are filled; the scene shows a file")
+    assert told.is_one_line(
+        2, "--resolution: applies only to grids filled from a formula; the scene shows a file"
+    )
     told = shell("mesh", "theirs.yaml", "-o", "no.ply", "--level", "5000", "-q")
     assert told.is_one_line(2, "theirs.yaml: has no surface at the level 5000: its values are from ")
 
@@ -321,7 +323,7 @@ def test_a_scene_in_a_volume_that_does_not_load(shell: InProcess) -> None:
     write_volume("odd.nrrd", Volume(values, texts={SCENE_KEY: "version: 7\n"}))
     ended = shell("mesh", "odd.nrrd", "-o", "odd.ply")
     assert works(ended)
-    assert "odd.nrrd: its scene is of no use, normals are those of the values: " in ended.err
+    assert "odd.nrrd: its scene cannot be used, so normals come from the values: " in ended.err
     assert load("odd.ply").is_watertight
 
 

@@ -163,7 +163,9 @@ def test_without_resume_all_begin_anew_and_say_so(here: Path, shell: InProcess) 
     expected = finished(shell)
     interrupted(shell, 14)
     ended = shell("render", "scene.yaml", "-o", "out.exr")
-    dropped = [line.partition(":")[0] for line in ended.err.splitlines() if "earlier work is dropped" in line]
+    dropped = [
+        line.partition(":")[0] for line in ended.err.splitlines() if "earlier work is discarded" in line
+    ]
     assert dropped == NAMES
     assert planes(here / "out.exr") == expected
 
@@ -176,7 +178,9 @@ def test_a_picture_of_one_view_leaves_nothing_of_the_others(here: Path, shell: I
         (here / name).write_text("something else")
     ended = shell("render", "scene.yaml", "-o", "out.exr", "--set", "layout=null")
     assert ended.status == 0
-    dropped = [line.partition(":")[0] for line in ended.err.splitlines() if "earlier work is dropped" in line]
+    dropped = [
+        line.partition(":")[0] for line in ended.err.splitlines() if "earlier work is discarded" in line
+    ]
     assert sorted(dropped) == NAMES
     assert partials() == sorted(others)
 

@@ -151,7 +151,7 @@ def test_without_resume_it_starts_anew_and_says_so(tmp_path: Path) -> None:
     interrupted(tmp_path)
     ended = process(["render", "scene.yaml", "-o", "a.png"], tmp_path)
     assert ended.status == 0
-    assert ended.err.splitlines()[0].startswith("a.png.partial: earlier work is dropped")
+    assert ended.err.splitlines()[0].startswith("a.png.partial: earlier work is discarded")
     assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "a.png"}
 
 

@@ -83,7 +83,7 @@ REFUSED = {
     ("--start", "11"): "--start: must be from 1 to the count, 10, got 11",
     ("--spacing", "0"): "--spacing: must be a number above 0, got 0",
     ("--spacing", "nan"): "--spacing: must be a number above 0, got nan",
-    ("--spacing", "1e6"): "--spacing: leads slice 1 beyond all coordinates",
+    ("--spacing", "1e6"): "--spacing: puts slice 1 outside the range of coordinates",
     ("-o", "s.gif"): "s_0001.gif: unknown extension '.gif'",
     ("-o", "none/s.png"): "none/s_0001.png: cannot be written: there is no folder",
     ("--set", "renderer={}"): "scene.yaml: renderer.type: must be cut_plane for slices, got surface",
@@ -103,6 +103,6 @@ def test_a_slice_does_not_replace_the_scene_that_it_shows(clf: InProcess) -> Non
     before = Path("slice_0002.png").read_bytes()
     ended = clf("slices", "slice_0002.png", "--count", "2")
     assert ended.is_one_line(
-        2, "slice_0002.png: would be replaced by its own slice; name another output with -o"
+        2, "slice_0002.png: would be overwritten by its own slice; name another output with -o"
     )
     assert Path("slice_0002.png").read_bytes() == before

@@ -131,7 +131,7 @@ def test_without_resume_both_begin_anew_and_say_so(tmp_path: Path, undisturbed: 
     stopped(tmp_path, signal.SIGKILL, RIGHT)
     ended = render(tmp_path)
     assert ended.status == 0
-    dropped = [line for line in ended.err.splitlines() if "earlier work is dropped" in line]
+    dropped = [line for line in ended.err.splitlines() if "earlier work is discarded" in line]
     assert [line.partition(":")[0] for line in dropped] == [LEFT, RIGHT]
     assert planes(tmp_path / "out.exr") == undisturbed
     assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "out.exr"}
@@ -148,5 +148,5 @@ def test_one_eye_alone_leaves_nothing_of_the_other(
     assert ended.status == 0
     assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "out.exr", RIGHT}
     ended = InProcess(capsys)("render", "scene.yaml", "-o", "out.exr")
-    assert ended.err.splitlines()[0] == f"{RIGHT}: earlier work is dropped"
+    assert ended.err.splitlines()[0] == f"{RIGHT}: earlier work is discarded"
     assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "out.exr"}

@@ -262,11 +262,11 @@ def test_a_warning_past_one_degree(here: Path, shell: InProcess) -> None:
     ended = shell("render", "scene.yaml", "-o", "a.png", "--set", "stereo.separation=1")
     assert ended.status == 0
     assert ended.err.splitlines()[-1].startswith("scene.yaml: parallax reaches 3.")
-    assert "beyond 1 eyes tire" in ended.err
+    assert "eyes tire beyond 1" in ended.err
     assert "tire" not in shell("render", "scene.yaml", "-o", "a.png").err
     assert shell("render", "scene.yaml", "-o", "a.png", "--set", "stereo.separation=1", "--quiet").err == ""
     told = shell("render", "scene.yaml", "-o", "a.png", "--verbose").err
-    assert "of the screen's units" in told
+    assert "in the screen's unit" in told
     checked = shell("check", "scene.yaml", "--parallax", "--set", "stereo.separation=1")
     assert checked.err.startswith("scene.yaml: parallax reaches 3.")
 
@@ -284,8 +284,8 @@ class TestCheck:
         assert told == [
             "# stereo: the camera is at [0, -4, 0], moved from [0, -3, 0]; the left eye at [-0.25, -4, 0], "
             "the right at [0.25, -4, 0]",
-            "# stereo: on the screen lies the plane around [0, 0, 0], 6 x 6 scene units; "
-            "one unit of the screen's is 1 of them",
+            "# stereo: this plane lies on the screen: center [0, 0, 0], 6 x 6 scene units; "
+            "one unit of the screen is 1 scene units",
         ]
         # What is printed is a scene file still.
         (here / "printed.yaml").write_text(ended.out)
@@ -324,7 +324,7 @@ class TestCheck:
 
     def test_nothing_to_see(self, here: Path, shell: InProcess) -> None:
         away = ("--set", "camera={position: [0, -3, 0], target: [0, -6, 0]}")
-        assert "# parallax: nothing is seen\n" in shell("check", "scene.yaml", "--parallax", *away).out
+        assert "# parallax: the picture is empty\n" in shell("check", "scene.yaml", "--parallax", *away).out
         for command in ("check", "render"):
             options = ("--parallax",) if command == "check" else ("-o", "a.png")
             ended = shell(command, "scene.yaml", *options, *away, "--set", "stereo.fit=auto")
@@ -337,7 +337,7 @@ class TestCheck:
         within = ("--set", "camera={position: [0, -0.2, 0], target: [0, 0, 0]}")
         ended = shell("check", "scene.yaml", "--parallax", *within)
         assert ended.status == 0
-        assert "# parallax: nothing is seen\n" in ended.out
+        assert "# parallax: the picture is empty\n" in ended.out
         rendered(shell, "scene.yaml", "a.png", "--stats", "s.json", *within)
         assert json.loads((here / "s.json").read_text())["stereo"]["parallax"] is None
 
@@ -349,7 +349,7 @@ class TestFlat:
         plane = ("--set", "renderer={type: cut_plane}")
         told = shell("check", "scene.yaml", "--parallax", *plane).out
         assert "# stereo: a cut plane by itself is flat; both eyes see it on the screen\n" in told
-        assert "# parallax +0 to +0 of the screen's units" in told
+        assert "# parallax +0 to +0 in the screen's unit" in told
         rendered(shell, "scene.yaml", "a.exr", "--stats", "s.json", *plane)
         planes = read_exr(here / "a.exr")[0]
         np.testing.assert_array_equal(planes["R"][:, :40], planes["R"][:, 40:])

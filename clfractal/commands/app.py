@@ -28,7 +28,9 @@ Scene = Annotated[
 ]
 Overrides = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Replace a value: camera.fov=30. Repeatable."),
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Replace a value of the scene, such as camera.fov=30; repeatable."
+    ),
 ]
 DeviceOption = Annotated[
     str | None,
@@ -39,15 +41,16 @@ Resolution = Annotated[
     typer.Option(
         "--resolution",
         metavar="N",
-        help="Voxels along the longest side; or NX,NY,NZ.  [default: the scene's, 512]",
+        help="Voxels along the longest side, or NX,NY,NZ.  [default: as in the scene, else 512]",
     ),
 ]
 Precision = Annotated[
-    str | None, typer.Option("--precision", help="auto, float32 or float64.  [default: the scene's, auto]")
+    str | None,
+    typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Verbose = Annotated[
-    bool, typer.Option("--verbose", "-v", help="Show excerpts, causes and drivers' messages.")
+    bool, typer.Option("--verbose", "-v", help="Show more: statistics, causes of errors, drivers' messages.")
 ]
 
 
@@ -106,21 +109,26 @@ def render(
     output: Annotated[
         list[Path] | None,
         typer.Option(
-            "-o", "--output", help="An .exr or .png file; repeatable.  [default: SCENE's name, .png]"
+            "-o", "--output", help="An .exr or .png file; repeatable.  [default: the scene's name with .png]"
         ),
     ] = None,
     device: DeviceOption = None,
     precision: Annotated[
         str | None,
-        typer.Option("--precision", help="auto, float32 or float64.  [default: the scene's, auto]"),
+        typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
     ] = None,
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="Pixels; the camera stays.")
+        str | None,
+        typer.Option("--size", metavar="WxH", help="Size in pixels; the camera stays where it is."),
     ] = None,
     overrides: Overrides = None,
     region: Annotated[
         str | None,
-        typer.Option("--region", metavar="X,Y,W,H", help="Only this part of the picture, in pixels."),
+        typer.Option(
+            "--region",
+            metavar="X,Y,W,H",
+            help="Render only this part of the picture; pixels from the top left.",
+        ),
     ] = None,
     samples: Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")] = None,
     resume: Annotated[
@@ -160,24 +168,26 @@ def slices(
         typer.Option(
             "-o",
             "--output",
-            help="slice.png becomes slice_0001.png, ...; .png or .exr; repeatable.  [default: slice.png]",
+            help="A .png or .exr file; slice.png becomes slice_0001.png, ...; repeatable.  [default: slice.png]",
         ),
     ] = None,
     count: Annotated[int, typer.Option("--count", help="Number of slices.")] = 10,
     spacing: Annotated[
         float | None,
         typer.Option(
-            "--spacing", help="Scene units between two slices.  [default: through the formula's bounds]"
+            "--spacing", help="Scene units between two slices.  [default: slices fill the formula's bounds]"
         ),
     ] = None,
-    start: Annotated[int, typer.Option("--start", metavar="N", help="First slice to make.")] = 1,
+    start: Annotated[
+        int, typer.Option("--start", metavar="N", help="Number of the first slice to render.")
+    ] = 1,
     device: DeviceOption = None,
     precision: Annotated[
         str | None,
-        typer.Option("--precision", help="auto, float32 or float64.  [default: the scene's, auto]"),
+        typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
     ] = None,
     size: Annotated[
-        str | None, typer.Option("--size", metavar="WxH", help="Pixels; the plane stays.")
+        str | None, typer.Option("--size", metavar="WxH", help="Size in pixels; the plane stays where it is.")
     ] = None,
     overrides: Overrides = None,
     samples: Annotated[int | None, typer.Option("--samples", help="Samples per pixel, in total.")] = None,
@@ -211,7 +221,7 @@ def voxelize(
     device: DeviceOption = None,
     precision: Precision = None,
     overrides: Overrides = None,
-    compress: Annotated[bool, typer.Option("--gzip", help="Compress; NRRD only.")] = False,
+    compress: Annotated[bool, typer.Option("--gzip", help="Compress the values; NRRD only.")] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Work:
@@ -234,7 +244,9 @@ def mesh(
     resolution: Resolution = None,
     level: Annotated[
         float | None,
-        typer.Option("--level", help="Value at the surface.  [default: renderer.level, or half way]"),
+        typer.Option(
+            "--level", help="Value at the surface.  [default: renderer.level, else the middle of the range]"
+        ),
     ] = None,
     no_close: Annotated[
         bool, typer.Option("--no-close", help="Leave the surface open where the box cuts it.")
@@ -262,7 +274,7 @@ def check(
     parallax: Annotated[
         bool,
         typer.Option(
-            "--parallax", help="Of a stereo scene: look at its depth and tell how much the eyes turn."
+            "--parallax", help="Measure the depth of a stereo scene and print its range of parallax."
         ),
     ] = False,
     device: DeviceOption = None,
@@ -277,7 +289,7 @@ def check(
 
 @app.command()
 def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = False) -> Work:
-    """List every OpenCL device and how fast it is; measured once, then remembered."""
+    """List every OpenCL device and its speed, which is measured once and then remembered."""
     from clfractal.commands.devices import list_devices
 
     shell = _shell(context, quiet=quiet, verbose=verbose)
@@ -286,9 +298,10 @@ def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = Fal
 
 @app.command()
 def formulas(
-    context: typer.Context, name: Annotated[str | None, typer.Argument(help="One of the library.")] = None
+    context: typer.Context,
+    name: Annotated[str | None, typer.Argument(help="Name of a formula in the library.")] = None,
 ) -> Work:
-    """List the library of formulas, or tell about one."""
+    """List the library of formulas, or describe one."""
     from clfractal.commands.formulas import list_formulas, tell_formula
 
     shell = _shell(context)
@@ -311,11 +324,11 @@ def bench(
     context: typer.Context,
     device: DeviceOption = None,
     json_file: Annotated[
-        Path | None, typer.Option("--json", metavar="FILE.json", help="Write the table as JSON, too.")
+        Path | None, typer.Option("--json", metavar="FILE.json", help="Also write the table as JSON.")
     ] = None,
     rows: Annotated[
         list[str] | None,
-        typer.Option("--row", metavar="NAME", help="Measure only this row; repeat it for more."),
+        typer.Option("--row", metavar="NAME", help="Measure only this row; repeatable."),
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,

@@ -126,7 +126,7 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
     """
     for name in wanted:
         if name not in row_names():
-            raise ClfractalError(f"there is no {name!r}, only {', '.join(row_names())}", Where("--row"))
+            raise ClfractalError(f"unknown row {name!r}; known: {', '.join(row_names())}", Where("--row"))
     names = [name for name in row_names() if name in wanted or not wanted]
     chosen = choose(device)
     shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")

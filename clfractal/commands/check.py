@@ -51,7 +51,7 @@ def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, st
     found = fitted(scene, look)
     comfort = measured(found, look)
     if comfort is None:
-        return found, "parallax: nothing is seen", ""
+        return found, "parallax: the picture is empty", ""
     return found, comfort.sentence(), comfort.warning()
 
 
@@ -74,8 +74,8 @@ def _eyes(scene: Scene) -> list[str]:
         lines += [
             f"{name}stereo: the camera is at {_point(middle.origin)}{moved}; the left eye at {_point(left.origin)}, "
             f"the right at {_point(right.origin)}",
-            f"{name}stereo: on the screen lies the plane around {_point(middle.center)}, {middle.width:.6g} x "
-            f"{middle.height:.6g} scene units; one unit of the screen's is {relation(view.stereo, middle):.6g} of them",
+            f"{name}stereo: this plane lies on the screen: center {_point(middle.center)}, {middle.width:.6g} x "
+            f"{middle.height:.6g} scene units; one unit of the screen is {relation(view.stereo, middle):.6g} scene units",
         ]
     return lines
 

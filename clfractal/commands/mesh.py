@@ -148,7 +148,7 @@ def _of_file(order: GridOrder, level: float | None, shell: Shell) -> _Found:
     """
     for option, value in (("--set", order.overrides), ("--resolution", order.resolution)):
         if value:
-            raise SceneError("is for scenes; the source is a volume", Where(option))
+            raise SceneError("applies to scenes only; the source is a volume", Where(option))
     from clfractal.voxels.mesh import value_range
 
     volume = read_volume(order.source)
@@ -186,7 +186,7 @@ def _made(order: GridOrder, volume: Volume, shell: Shell) -> _Made | None:
         own = volume.texts.get(COLORING_KEY, "{}")
         coloring = load_coloring(read, overrides=["renderer={type: surface}", f"coloring={own}"])
     except ClfractalError as error:
-        shell.say(f"{order.source}: its scene is of no use, normals are those of the values: {error}")
+        shell.say(f"{order.source}: its scene cannot be used, so normals come from the values: {error}")
         return None
     if not isinstance(scene.renderer, VolumeRenderer) or scene.renderer.file is not None:
         return None
@@ -221,7 +221,8 @@ def _nothing(order: GridOrder, found: _Found, close: bool) -> ClfractalError:
     z, y, x = found.volume.values.shape
     if not close and bool((np.asarray(found.volume.values[0, 0, 0]) >= found.level).all()):
         return SceneError(
-            "the whole box is inside; its faces are the surface without --no-close", Where(order.source)
+            "has no surface: the whole box is inside; without --no-close its faces would be the surface",
+            Where(order.source),
         )
     if found.is_file:
         from clfractal.voxels.mesh import value_range
@@ -245,7 +246,7 @@ def _dressed(mesh: Mesh, made: _Made, volume: Volume, stages: StageProgress, she
     job, by = made.job, made.coloring.by
     plan = job.views[0].plan
     if by not in COLORED_BY:
-        shell.say(f"coloring.by: {by} is not known of vertices; they get the material's colour")
+        shell.say(f"coloring.by: {by} cannot be computed for vertices; they get the material's colour")
     spacing = np.diag(volume.directions)
     z, y, x = volume.values.shape
     return dress(

@@ -119,7 +119,9 @@ def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
     source = Path(order.scene)
     outputs = order.outputs or (Path(source.with_suffix(".png").name),)
     if not order.outputs and os.path.realpath(outputs[0]) == os.path.realpath(source):
-        raise FileError("would be replaced by its own picture; name an output with -o", Where(order.scene))
+        raise FileError(
+            "would be overwritten by its own picture; name another output with -o", Where(order.scene)
+        )
     from clfractal.pictures.outputs import check_output as check_picture
     from clfractal.pictures.outputs import output_files
 

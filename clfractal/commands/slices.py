@@ -97,7 +97,9 @@ def slice_scene(scene: Scene, stack: Stack, number: int) -> Scene:
     try:
         plane = moved(scene.renderer.plane, normal=offset)
     except ValidationError as error:
-        raise SceneError(f"leads slice {number} beyond all coordinates", Where("--spacing")) from error
+        raise SceneError(
+            f"puts slice {number} outside the range of coordinates", Where("--spacing")
+        ) from error
     return scene.model_copy(update={"renderer": scene.renderer.model_copy(update={"plane": plane})})
 
 
@@ -127,7 +129,7 @@ def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> N
         for path in paths:
             if os.path.realpath(path) == source:
                 raise FileError(
-                    "would be replaced by its own slice; name another output with -o", Where(order.scene)
+                    "would be overwritten by its own slice; name another output with -o", Where(order.scene)
                 )
             if path.exists():
                 check_output(path)

@@ -37,7 +37,7 @@ class Unfinished:
         try:
             for number, (view, path) in enumerate(zip(job.views, self.paths, strict=True)):
                 if path.exists() and not resume:
-                    shell.say(f"{path}: earlier work is dropped; --resume would continue it")
+                    shell.say(f"{path}: earlier work is discarded; --resume would have continued it")
                 self.films.append(
                     JournalFilm(
                         path,
@@ -84,7 +84,7 @@ class Unfinished:
         """Removes what an earlier render to the same output left of views that this one does not have."""
         for stale in output.parent.glob(f"{_escaped(output.name)}.*{PARTIAL}"):
             if stale not in self.paths and _names_a_view(stale.name[len(output.name) : -len(PARTIAL)]):
-                shell.say(f"{stale}: earlier work is dropped")
+                shell.say(f"{stale}: earlier work is discarded")
                 stale.unlink(missing_ok=True)
 
 

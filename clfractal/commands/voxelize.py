@@ -79,7 +79,9 @@ def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
     check_output(order.output, EXTENSIONS)
     if order.output.suffix.lower() == ".npy":
         if compress:
-            raise FileError("is not compressed: NPY has no way for it; .nrrd has", Where(str(order.output)))
+            raise FileError(
+                "cannot be compressed: NPY has no compression; use .nrrd", Where(str(order.output))
+            )
         check_output(f"{order.output}{BESIDE}", (BESIDE,))
     scene, coloring = load_order(order)
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
@@ -196,7 +198,9 @@ def given_volume(order: GridOrder, scene: Scene) -> Volume | None:
     if given is None:
         return None
     if order.resolution is not None:
-        raise SceneError("is for grids that are filled; the scene shows a file", Where("--resolution"))
+        raise SceneError(
+            "applies only to grids filled from a formula; the scene shows a file", Where("--resolution")
+        )
     spacing = np.array(given.spacing)
     return Volume(given.values, np.array(given.corner) + spacing / 2, np.diag(spacing))
 

@@ -154,7 +154,7 @@ class Children:
                 if stopped is not None and stopped():
                     raise Stopped
                 if lease.failure is not None:
-                    raise DeviceError(f"a process that compiles cannot be started: {lease.failure}")
+                    raise DeviceError(f"the process for compiling cannot be started: {lease.failure}")
                 self._drop_useless(environment)
                 if lease not in self._leases and len(self._leases) < self._most:
                     self._leases.add(lease)

@@ -27,7 +27,7 @@ SPEEDS = "speeds"  # section of the cache: rays per second or the like, by `Devi
 Kind = Literal["cpu", "gpu", "accelerator"]
 
 _INSTALL_HINT = (
-    "no OpenCL device; install one that runs on the processor with `pip install pocl-binary-distribution`, "
+    "no OpenCL device; install a driver for the CPU with `pip install pocl-binary-distribution`, "
     "or your GPU's OpenCL driver"
 )
 
@@ -145,7 +145,7 @@ class Device:
                 wanted = f"{_size(need)} are needed, " if need is not None else ""
                 raise DeviceError(
                     f"{name}: out of device memory while {doing}: "
-                    f"{wanted}{_size(self.info.memory)} are there",
+                    f"{wanted}{_size(self.info.memory)} are available",
                     details=str(error),
                     status=STATUS_BAD_INPUT,
                 ) from error
@@ -193,7 +193,7 @@ def by_key(index: str, key: str) -> Device:
     """
     alike = [device for device in _find() if device.info.key == key]
     if not alike:
-        raise DeviceError(f"the device {index} has gone or changed")
+        raise DeviceError(f"the device {index} was removed or has changed")
     return next((device for device in alike if device.info.index == index), alike[0])
 
 
@@ -366,15 +366,15 @@ def _nothing_fits(found: list[Device], spec: str) -> DeviceError:
     there = "; ".join(f"{device.info.index} {device.info.name} ({device.info.platform})" for device in found)
     if not spec:
         return DeviceError(
-            f"{_INSTALL_HINT}; only a simulator is there: {there}", status=STATUS_DEVICE_FAILED
+            f"{_INSTALL_HINT}; only a simulator was found: {there}", status=STATUS_DEVICE_FAILED
         )
     if re.fullmatch(r"\d+:\d+", spec) or spec.casefold() in ("cpu", "gpu", "accelerator"):
-        return DeviceError(f"no device {spec!r}; there are: {there}", status=STATUS_BAD_INPUT)
+        return DeviceError(f"no device {spec!r}; available: {there}", status=STATUS_BAD_INPUT)
     words = {word for device in found for word in _names(device.info).split()}
     guess = unknown_name("device", spec, words)
     if "did you mean" in guess:
         return DeviceError(f"{guess.rstrip('?')}, in {there}?", status=STATUS_BAD_INPUT)
-    return DeviceError(f"unknown device {spec[:60]!r}; there are: {there}", status=STATUS_BAD_INPUT)
+    return DeviceError(f"unknown device {spec[:60]!r}; available: {there}", status=STATUS_BAD_INPUT)
 
 
 def _score(info: DeviceInfo, speeds: dict[str, Any]) -> tuple[Any, ...]:

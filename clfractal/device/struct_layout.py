@@ -43,7 +43,7 @@ def verify(device: Device, structs: Iterable[Struct], precision: Precision, *, i
         cl.enqueue_copy(device.queue, found, buffer)
     if not np.array_equal(found, expected):
         raise DeviceError(
-            f"{device.info.name}: the driver lays out structs in another way than C",
+            f"{device.info.name}: the driver lays out structs differently from C",
             details=f"expected sizes and offsets {expected.tolist()}, found {found.tolist()}",
         )
     cache.remember(_SECTION, key, True)

@@ -65,7 +65,7 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
     window = header.values().get("dataWindow")
     envmap = header.attributes.get("envmap")
     if not isinstance(window, tuple) or len(window) != 4 or not header.channels:
-        raise file_error(path, "is damaged: its header lacks what every picture has", "")
+        raise file_error(path, "is damaged: its header lacks required attributes", "")
     width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
     if envmap is not None and envmap.data == _CUBE:
         raise file_error(path, "is a cube map; an environment is a latitude-longitude map", "")
@@ -93,7 +93,7 @@ def _check_numbers(path: str | Path, pixels: Floats) -> None:
         return
     for what, wrong in (
         ("of NaN", np.isnan(pixels)),
-        ("of infinite light", np.isinf(pixels)),
+        ("of infinite brightness", np.isinf(pixels)),
         (f"brighter than {BRIGHTEST:g}", pixels > BRIGHTEST),
     ):
         found = wrong.any(axis=-1)

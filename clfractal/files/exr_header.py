@@ -176,7 +176,7 @@ def _parse(stream: BinaryIO) -> ExrHeader:
         kind = _name(stream)
         (length,) = struct.unpack("<i", _exactly(stream, 4))
         if not 0 <= length <= _LARGEST_ATTRIBUTE or len(attributes) >= _MOST_ATTRIBUTES:
-            raise _DamagedError("is damaged: its header is not one")
+            raise _DamagedError("is damaged: its header is not valid")
         attributes[name] = Attribute(kind, _exactly(stream, length), offset)
 
 
@@ -193,7 +193,7 @@ def _channel_bytes(data: bytes) -> int:
         total += _PIXEL_BYTES[kind]
         data = rest[16:]
     if data != b"\0" or not total:
-        raise _DamagedError("is damaged: its list of channels is not one")
+        raise _DamagedError("is damaged: its list of channels is not valid")
     return total
 
 
@@ -204,7 +204,7 @@ def _check_whole(stream: BinaryIO, header: ExrHeader) -> None:
         (left, top, right, bottom), compression = values["dataWindow"], values["compression"]
         pixel_bytes = _channel_bytes(header.attributes["channels"].data)
     except (KeyError, TypeError, ValueError):
-        raise _DamagedError("is damaged: its header lacks what every picture has") from None
+        raise _DamagedError("is damaged: its header lacks required attributes") from None
     width, height = right - left + 1, bottom - top + 1
     if width < 1 or height < 1 or compression not in _ROWS_PER_CHUNK:
         raise _DamagedError("is damaged: its size or compression is impossible")

@@ -200,7 +200,7 @@ class _Parser:
             self.texts[line[:pair]] = _unescaped(line[pair + 2 :])
             return
         if plain < 1:
-            raise FileError("is no line of a NRRD header", Where(self.path, number))
+            raise FileError("is not a line of a NRRD header", Where(self.path, number))
         name = line[:plain].strip().lower()
         name = _SAME.get(name, name)
         if name not in _USED and name not in _IGNORED:

@@ -348,7 +348,7 @@ def _read_npy(path: str | Path, stream: BinaryIO, limit: int | None) -> Volume:
     version = stream.read(2)
     width = {b"\1\0": 2, b"\2\0": 4, b"\3\0": 4}.get(version)
     if width is None:
-        raise file_error(path, "is no NPY file of version 1 to 3", "")
+        raise file_error(path, "is not an NPY file of version 1 to 3", "")
     length = int.from_bytes(stream.read(width), "little")
     if length > _LARGEST_NPY_HEADER:
         raise file_error(path, f"is damaged: a header of {length:,} bytes", "")
@@ -395,7 +395,7 @@ def _notes(path: str | Path, shape: tuple[int, ...]) -> tuple[Doubles, Doubles, 
         raise
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
         raise file_error(
-            beside, "does not tell where the voxels are: needs shape, origin, directions", ""
+            beside, "does not say where the voxels are: needs shape, origin, directions", ""
         ) from error
     if sides != shape:
         raise file_error(beside, f"is for another array: {sides!r:.60}, not {shape!r}", "")
@@ -404,5 +404,5 @@ def _notes(path: str | Path, shape: tuple[int, ...]) -> tuple[Doubles, Doubles, 
     if not fits or not np.isfinite(numbers).all() or np.abs(numbers).max() > nrrd.LARGEST_NUMBER:
         raise file_error(beside, "must have an origin of 3 numbers and directions of 3 x 3", "")
     if not nrrd.independent(directions):
-        raise file_error(beside, "must have directions that are not zero and differ", "")
+        raise file_error(beside, "must have directions that are not zero and not equal", "")
     return origin, directions, texts

@@ -66,7 +66,7 @@ class _Builder:
         check_keys(self.data, _KEYS, self.where)
         for key in _REQUIRED:
             if key not in self.data:
-                raise FormulaError(f"the formula lacks its key {key!r}", self.where)
+                raise FormulaError(f"the formula lacks the key {key!r}", self.where)
         self.variables = self._variables()
         self.parameters = self._parameters()
         known = tuple(p.name for p in self.parameters)
@@ -108,7 +108,7 @@ class _Builder:
     def _text(self, key: str, default: str) -> str:
         value = self.data.get(key, default)
         if not isinstance(value, str) or len(value) > 10_000:
-            raise FormulaError("must be a text", inside(self.where, key))
+            raise FormulaError("must be text", inside(self.where, key))
         return " ".join(value.split())
 
     def _variables(self) -> tuple[str, ...]:
@@ -203,7 +203,7 @@ class _Builder:
             return None
         where = inside(self.where, "julia")
         if add != "constant":
-            raise FormulaError("only a formula with `add: constant` has a julia of its own", where)
+            raise FormulaError("only a formula with `add: constant` may have the key julia", where)
         return check_constant(self.data["julia"], len(self.variables), where)
 
     def _check_static_exponents(self, let: tuple[tuple[str, Node], ...], maps: tuple[Node, ...]) -> None:
@@ -233,7 +233,7 @@ def bounds_from_mapping(
     mapping = _mapping(data, where, "bounds")
     check_keys(mapping, ("center", "radius"), where)
     if "radius" not in mapping:
-        raise FormulaError("lacks its key 'radius'", where)
+        raise FormulaError("lacks the key 'radius'", where)
     names = (*parameters, "julia")
     center = mapping.get("center", (0, 0, 0))
     here = inside(where, "center")
@@ -262,7 +262,7 @@ def check_name(name: object, taken: Collection[object], where: Where) -> None:
             f"a name is a letter followed by at most 39 letters, digits or '_', got {shown!r}", where
         )
     if name in _RESERVED or keyword.iskeyword(name) or name.startswith("point_"):
-        raise FormulaError(f"the name {name!r} has a meaning of its own", where)
+        raise FormulaError(f"the name {name!r} is reserved", where)
     if name in taken:
         raise FormulaError(f"the name {name!r} is used twice", where)
 
@@ -292,7 +292,7 @@ def _parameter(name: str, value: object, where: Where) -> Parameter:
     if kind not in ("int", "real"):
         raise FormulaError(unknown_name("type", str(kind), ("int", "real")), inside(where, "type"))
     if "default" not in data:
-        raise FormulaError("lacks its key 'default'", where)
+        raise FormulaError("lacks the key 'default'", where)
     plain = Parameter(name, kind, 0.0)
     number = {
         key: plain.check(data[key], inside(where, key)) if key in data else None
@@ -309,7 +309,7 @@ def _parameter(name: str, value: object, where: Where) -> Parameter:
         choices = tuple(plain.check(choice, inside(here, str(i))) for i, choice in enumerate(choices))
     description = data.get("description", "")
     if not isinstance(description, str):
-        raise FormulaError("must be a text", inside(where, "description"))
+        raise FormulaError("must be text", inside(where, "description"))
     default = number["default"] or 0.0
     parameter = Parameter(
         name, kind, default, number["minimum"], number["maximum"], choices, baked, description

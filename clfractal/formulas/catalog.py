@@ -137,7 +137,7 @@ class _Resolver:
                 raise FormulaError("must be a mapping, a formula's keys", here)
             return value, here, {"inline": value}
         if not isinstance(value, str):
-            raise FormulaError("must be a text", here)
+            raise FormulaError("must be text", here)
         if key == "name":
             try:
                 return description(value), Where(f"{value}.yaml"), {"name": value}
@@ -146,7 +146,7 @@ class _Resolver:
                     raise FormulaError(error.message, here) from None
                 raise
         if self.base_folder is None:
-            raise FormulaError("a formula's file needs a scene file beside it", here)
+            raise FormulaError("a formula file needs a scene file, in whose folder it is looked for", here)
         data, _ = _read(safe_path(value, self.base_folder, here), value)
         return data, Where(value), {"inline": data}
 

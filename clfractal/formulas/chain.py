@@ -64,7 +64,7 @@ class Chain:
         """Refuses values of live parameters that only another text could show."""
         first = self.first
         if first.live and first.add == "point" and not first.formula.point_map and first.start is None:
-            raise FormulaError(f"f(0) is no finite number with {_live_values(first)}", Where())
+            raise FormulaError(f"f(0) is not a finite number with {_live_values(first)}", Where())
         for link in self.links:
             if link.bound.depends_on_live(link.bound.formula.degree) and self.degree <= 1:
                 raise FormulaError(

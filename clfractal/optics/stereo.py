@@ -58,7 +58,7 @@ def frustum(view: View, *, front: float, back: float) -> Frustum:
     near = max(distance - front, NEAREST * distance)
     far = distance + back
     if not far > near:
-        raise SceneError(f"must leave something between near {near:g} and far {far:g}", Where(path="back"))
+        raise SceneError(f"must leave some space between near {near:g} and far {far:g}", Where(path="back"))
     assert view.eye is not None
     # Where the plane's middle lies as the eye sees it; what is on the plane is scaled to the near plane.
     to_center = view.center - view.eye
@@ -102,7 +102,9 @@ def eye_distance(view: View) -> float:
         )
     distance = float((view.center - view.eye) @ view.axis)
     if not distance > 0:
-        raise SceneError(f"the eye must be before the view plane, got a distance of {distance:g}", Where())
+        raise SceneError(
+            f"the eye must be in front of the view plane, got a distance of {distance:g}", Where()
+        )
     return distance
 
 

@@ -103,7 +103,7 @@ def compose(
     """
     mode = stereo.mode
     if mode in APART:
-        raise ValueError(f"{mode} keeps both eyes' pictures")
+        raise ValueError(f"{mode} keeps the two eyes' pictures apart")
     if mode in ("left", "right"):
         return dict(left if mode == "left" else right)
     first, second = (right, left) if _swapped(stereo) else (left, right)
@@ -141,7 +141,7 @@ class Composed:
         header: Mapping[str, Any] | None = None,
     ) -> None:
         if stereo.mode in APART:
-            raise ValueError(f"{stereo.mode} keeps both eyes' pictures")
+            raise ValueError(f"{stereo.mode} keeps the two eyes' pictures apart")
         self.stereo = stereo
         self.display = picture_size(stereo, image)
         self.region = region or Region(0, 0, *self.display)

@@ -32,9 +32,9 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
     """
     device = grid.device
     built = build_all(device, [blocks_recipe(grid.kind)], on_compile)[0]
-    blocks = device.buffer(BLOCK_BYTES * grid.parts.slots, "what is seen of bricks")
+    blocks = device.buffer(BLOCK_BYTES * grid.parts.slots, "the table of visible blocks")
     for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
-        with device.failures("looking at bricks"):
+        with device.failures("checking the grid's bricks"):
             built.kernel.set_args(
                 blocks, values, np.int32(0), np.int32(after - first), np.int32(first), np.float32(unseen)
             )
@@ -43,7 +43,7 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
             built.kernel,
             2,
             after - first,
-            doing="looking at bricks",
+            doing="checking the grid's bricks",
             group=built.group,
             first_part=4096,
         )

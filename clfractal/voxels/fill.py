@@ -220,14 +220,14 @@ class _Filler:
         """Classes of nodes, a byte of each, on the device."""
         device, kernel = self.device, classify_nodes.kernel
         flags = device.buffer(packets * self.lanes, "nodes")
-        with device.failures("looking at nodes"):
+        with device.failures("checking the octree's nodes"):
             kernel.set_args(flags, nodes, *map(np.int32, (0, packets, cells)), *self.constants)
         milliseconds = run_in_parts(
             device,
             kernel,
             2,
             packets,
-            doing="looking at nodes",
+            doing="checking the octree's nodes",
             group=classify_nodes.group,
             first_part=8 * self.first_part,
             token=self.token,

@@ -81,7 +81,7 @@ def store(
     classes = np.full(count, MIXED, np.uint8)
     if classify is not None and count:
         found = device.buffer(count, "classes of bricks")
-        with device.failures("looking at bricks"):
+        with device.failures("checking the grid's bricks"):
             classify.kernel.set_args(
                 found,
                 evaluated.bricks,
@@ -96,12 +96,12 @@ def store(
             classify.kernel,
             2,
             count,
-            doing="looking at bricks",
+            doing="checking the grid's bricks",
             group=classify.group,
             first_part=4096,
             token=token,
         )
-        with device.failures("looking at bricks"):
+        with device.failures("checking the grid's bricks"):
             cl.enqueue_copy(device.queue, classes, found)
     solid_slot = 0 if classify is not None else None
     outside_slot = 1 if classify is not None and show_outside else None

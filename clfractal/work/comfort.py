@@ -74,7 +74,7 @@ class Comfort:
     def sentence(self) -> str:
         """The range as one line."""
         return (
-            f"parallax {self.nearest:+.4g} to {self.farthest:+.4g} of the screen's units, "
+            f"parallax {self.nearest:+.4g} to {self.farthest:+.4g} in the screen's unit, "
             f"{self.nearest_degrees:+.2f} to {self.farthest_degrees:+.2f} degrees"
         )
 
@@ -83,7 +83,7 @@ class Comfort:
         if self.worst_degrees <= LIMIT_DEGREES:
             return ""
         return (
-            f"parallax reaches {self.worst_degrees:.2f} degrees, and beyond {LIMIT_DEGREES:g} eyes tire; "
+            f"parallax reaches {self.worst_degrees:.2f} degrees, but eyes tire beyond {LIMIT_DEGREES:g}; "
             "stereo.fit: auto, a smaller separation or a plane nearer to the object helps"
         )
 

@@ -134,7 +134,7 @@ class Engine:
             if job.stays_apart:
                 assert job.scene.stereo is not None
                 raise SceneError(
-                    f"{job.scene.stereo.mode} keeps both eyes' pictures; use render_pair, or another mode",
+                    f"{job.scene.stereo.mode} keeps the two eyes' pictures apart; use render_pair, or another mode",
                     Where(path="stereo.mode"),
                 )
             films = JobFilms(job)
@@ -200,7 +200,7 @@ class Engine:
             raise ClfractalError("this engine is closed")
         if not self._busy.acquire(blocking=False):
             raise ClfractalError(
-                "this engine is at work already; give each thread an engine of its own, or finish the refinement first"
+                "this engine is already in use; give each thread its own engine, or finish the refinement first"
             )
         try:
             yield

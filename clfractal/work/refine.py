@@ -95,7 +95,7 @@ def _fits(job: Job, executor: LocalExecutor) -> bool:
         executor.check_room(job)
     except DeviceError as error:
         if executor.tell is not None:
-            executor.tell(f"{error.message}; the samples are made in one pass")
+            executor.tell(f"{error.message}; so all samples are made in one pass")
         return False
     return True
 

@@ -176,7 +176,7 @@ def test_a_child_that_ended_by_itself_is_cleared_away(device: Device, pool: Chil
 def test_no_process_can_be_started(device: Device, pool: Children, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/nowhere/python")
     for _ in range(3):
-        with pytest.raises(DeviceError, match=r"a process that compiles cannot be started: .*No such file"):
+        with pytest.raises(DeviceError, match=r"the process for compiling cannot be started: .*No such file"):
             _run(device, "echo_job", number=1)
     monkeypatch.undo()
 

@@ -138,10 +138,10 @@ def test_the_environment_variable_counts_less_than_the_flag(there: pytest.Monkey
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("quantum", r"^unknown device 'quantum'; there are: 0:0 pthread-Some Processor \(Portable"),
+        ("quantum", r"^unknown device 'quantum'; available: 0:0 pthread-Some Processor \(Portable"),
         ("NVIDA", r"^unknown device 'NVIDA'; did you mean 'NVIDIA', in 0:0 pthread-Some"),
-        ("7:0", r"^no device '7:0'; there are: 0:0 pthread"),
-        ("accelerator", r"^no device 'accelerator'; there are: 0:0 pthread"),
+        ("7:0", r"^no device '7:0'; available: 0:0 pthread"),
+        ("accelerator", r"^no device 'accelerator'; available: 0:0 pthread"),
     ],
 )
 def test_what_does_not_exist_is_told(there: pytest.MonkeyPatch, spec: str, message: str) -> None:

@@ -66,7 +66,7 @@ def test_another_layout_is_refused(
 ) -> None:
     packed = np.dtype([("a", "float32"), ("b", "int32", (2,)), ("hidden", "int32")])
     monkeypatch.setattr(Struct, "dtype", lambda self, precision: packed)
-    with pytest.raises(DeviceError, match="lays out structs in another way than C") as caught:
+    with pytest.raises(DeviceError, match="lays out structs differently from C") as caught:
         layout.verify(device, [_PLAIN], "float32", isolated=False)
     assert caught.value.status == 3
     assert caught.value.details.endswith("expected sizes and offsets [16, 0, 4, 12], found [12, 0, 4, 0]")

@@ -146,8 +146,8 @@ def test_the_channels(tmp_path: Path) -> None:
     ("value", "what"),
     [
         (np.nan, "of NaN"),
-        (np.inf, "of infinite light"),
-        (-np.inf, "of infinite light"),
+        (np.inf, "of infinite brightness"),
+        (-np.inf, "of infinite brightness"),
         (2e9, "brighter than 1e+09"),
     ],
 )

@@ -170,7 +170,7 @@ def test_a_header_without_an_end(tmp_path: Path) -> None:
     rewrite(path, header(sizes="2 3 4\nsizes: 2 3 4") + DATA)
     assert "5: sizes: is given twice" in message(path)
     rewrite(path, header(sizes="2 3 4\nwhat is this") + DATA)
-    assert ":5: is no line of a NRRD header" in message(path)
+    assert ":5: is not a line of a NRRD header" in message(path)
 
 
 def test_what_is_no_volume(tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def npy(
         (npy(descr="'<c8'"), "unsupported type '<c8'"),
         (npy(descr="[('a', '<i2')]"), "its header is not understood"),
         (npy(order="__import__('os')"), "its header is not understood"),
-        (npy(version=b"\7\0"), "is no NPY file of version 1 to 3"),
+        (npy(version=b"\7\0"), "is not an NPY file of version 1 to 3"),
         (b"\x93NUMPY\2\0\xff\xff\xff\x7f", "is damaged: a header of 2,147,483,647 bytes"),
         (npy()[:-9], "its header is not understood"),
     ],
@@ -215,10 +215,10 @@ def test_a_wrong_npy_in_one_line(content: bytes, part: str, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("notes", "part"),
     [
-        ("", "does not tell where the voxels are"),
-        ("[" * 100_000, "does not tell"),
-        ("[]", "does not tell"),
-        (json.dumps({"shape": [2, 3, 4]}), "does not tell"),
+        ("", "does not say where the voxels are"),
+        ("[" * 100_000, "does not say"),
+        ("[]", "does not say"),
+        (json.dumps({"shape": [2, 3, 4]}), "does not say"),
         (
             '{"shape": [2, 3, 4], "origin": [1e999, 0, 0], "directions": 3}',
             "must have an origin of 3 numbers",
@@ -226,7 +226,7 @@ def test_a_wrong_npy_in_one_line(content: bytes, part: str, tmp_path: Path) -> N
         ('{"shape": [2, 3, 5], "origin": [0, 0, 0], "directions": []}', "is for another array: (2, 3, 5)"),
         (
             '{"shape": [2, 3, 4], "origin": [0, 0, 0], "directions": [[1, 0, 0], [1, 0, 0], [0, 0, 1]]}',
-            "must have directions that are not zero and differ",
+            "must have directions that are not zero and not equal",
         ),
     ],
 )

@@ -246,7 +246,7 @@ def test_stores_that_do_not_fit_are_mistakes() -> None:
     with pytest.raises(ValueError, match="same channels"):
         Composed(scene, image, left, Film(("R",), image))
     for mode in ("pair", "multi_view"):
-        with pytest.raises(ValueError, match="keeps both eyes' pictures"):
+        with pytest.raises(ValueError, match="keeps the two eyes' pictures apart"):
             Composed(stereo(mode), image, left, right)
-        with pytest.raises(ValueError, match="keeps both eyes' pictures"):
+        with pytest.raises(ValueError, match="keeps the two eyes' pictures apart"):
             compose(stereo(mode), {}, {})

@@ -258,11 +258,13 @@ class TestOffAxis:
             place = view.center + beyond * view.axis
             behind = View(view.center, view.side, view.up, view.axis, view.width, view.height, place, place)
             for function in (lambda v: frustum(v, front=1, back=1), attitude):
-                with pytest.raises(SceneError, match="the eye must be before the view plane, got a distance"):
+                with pytest.raises(
+                    SceneError, match="the eye must be in front of the view plane, got a distance"
+                ):
                     function(behind)
         with pytest.raises(SceneError, match=r"camera\.projection: stereo needs an eye"):
             frustum(camera_view(scene_of(BALL, ORTHOGRAPHIC).camera, 8, 8), front=1, back=1)
-        with pytest.raises(SceneError, match="back: must leave something between near"):
+        with pytest.raises(SceneError, match="back: must leave some space between near"):
             frustum(view, front=0, back=-1)
 
 

@@ -270,6 +270,7 @@ class TestPalettes:
         stops = "[{at: 0.5, color: [0, 0, 0]}, {at: 0.2, color: [1, 1, 1]}]"
         with pytest.raises(SceneError) as caught:
             load_scene(scene_text("{}", f"{{palette: {stops}}}"))
-        assert "renderer.colors.palette.1.at: must be at least 0.5, the value at the stop before, got 0.2" in str(
-            caught.value
+        assert (
+            "renderer.colors.palette.1.at: must be at least 0.5, the value at the stop before, got 0.2"
+            in str(caught.value)
         )

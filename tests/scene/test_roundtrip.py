@@ -296,7 +296,7 @@ def test_live_parameters_are_part_of_a_scene() -> None:
         assert scene.chain.first.live == set(first.live)
     plain = load_scene({"version": 1, "formula": {"name": "mandelbulb", "live": []}, "camera": {}})
     assert "live" not in dump_scene(plain)
-    assert "may move" in json.dumps(schema())
+    assert "without compiling again" in json.dumps(schema())
 
 
 def test_a_live_parameter_that_is_none_is_told_with_its_place() -> None:

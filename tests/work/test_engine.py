@@ -147,7 +147,7 @@ def test_one_thread_at_a_time(device: Device) -> None:
         film = engine.render(changed(BULB), wait)
         assert film.done.all()
         assert told == [
-            "this engine is at work already; give each thread an engine of its own, or finish the refinement first"
+            "this engine is already in use; give each thread its own engine, or finish the refinement first"
         ]
         # And from one thread after the other as one likes.
         found: list[Film] = []
@@ -231,7 +231,7 @@ class TestRefinement:
         with Engine(device) as engine:
             refinement = engine.refine(changed(BULB, "renderer.samples=64"))
             next(refinement)
-            with pytest.raises(ClfractalError, match="at work already"):
+            with pytest.raises(ClfractalError, match="already in use"):
                 engine.render(changed(BULB))
             refinement.close()
             engine.render(changed(BULB))
@@ -249,7 +249,7 @@ class TestRefinement:
         assert [film.stage for film in films[3:]] == [""]
         assert len(told) == 1
         assert told[0].startswith("a picture in passes needs ")
-        assert told[0].endswith("; the samples are made in one pass")
+        assert told[0].endswith("; so all samples are made in one pass")
 
     def test_a_notebook_redraws_it(self, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
         import sys
