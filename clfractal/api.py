@@ -31,7 +31,7 @@ def render(
     region: tuple[int, int, int, int] | None = None,
     channels: Sequence[str] | None = None,
 ) -> Film:
-    """Renders a scene into memory; of a stereo scene what its mode makes of the two pictures (see `render_pair`).
+    """Renders a scene into memory; a stereo scene's two pictures are combined by its mode (see `render_pair`).
 
     Args:
         scene: a Scene, or what `load_scene` takes: a path, YAML text, or plain data.
@@ -69,12 +69,12 @@ def render_pair(
     samples: int | None = None,
     channels: Sequence[str] | None = None,
 ) -> tuple[Film, Film]:
-    """Renders both eyes' pictures of a stereo scene into memory, whatever its `stereo.mode` makes of them.
+    """Renders both eyes' pictures of a stereo scene into memory, for any `stereo.mode`.
 
     Arguments and errors as for `render`.
 
     Returns:
-        The left eye's film and the right one's, of `image`'s size (of half of it in the squeezed modes).
+        The films of the left and the right eye, of the size of `image` (half of it in the squeezed modes).
     """
     from clfractal.work.engine import Engine
 
@@ -92,20 +92,20 @@ def escape(
     precision: str = "float32",
     device: str | None = None,
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
-    """How many applications of a formula it takes for points to escape.
+    """Counts the applications of a formula until points escape.
 
     Args:
         formula: a name of the library, the path of a formula file, or a mapping: a formula, or a scene's
             `formula` section (which may have `julia` and `chain`).
         points: shape (n, 3), scene units.
-        iterations: the most applications.
+        iterations: the maximum number of applications.
         bailout: |z| beyond which a point has escaped; None: the formula's.
-        parameters: values of the formula's parameters, where not the defaults.
+        parameters: values of the formula's parameters that differ from the defaults.
         precision: `float32` or `float64`.
         device: as for `render`.
 
     Returns:
-        (iterations, inside): integer and boolean arrays of shape (n,). The first counts applications until
+        (iterations, inside): integer and boolean arrays of shape (n,). The first array counts applications until
         |z| > bailout, at most `iterations`; a point that has not escaped by then is inside.
 
     Raises:

@@ -1,7 +1,7 @@
 """The command `clfractal`: arguments in, an exit status out, one line for whatever goes wrong.
 
-Imports next to nothing: Ctrl-C has to be answered from the first moment on, and what a command needs is its
-own affair.
+Imports almost nothing, because Ctrl-C has to work from the first moment on; each command imports
+what it needs.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ INTERRUPTED = 130
 def main() -> None:
     """Runs the program and ends the process.
 
-    The process is ended at once, without a driver's cleaning up, which may take long, hang or crash.
+    The process ends at once: a driver's clean-up is skipped, because it may take long, hang or crash.
     """
     from clfractal.commands import interrupt
 

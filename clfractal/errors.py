@@ -1,4 +1,4 @@
-"""Errors a user can act on: each is one line, knows where it happened, and carries the exit status of the shell."""
+"""Errors a user can act on: each has a message of one line, the place of the mistake, and the shell's exit status."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Where:
 
 
 class Stopped(Exception):  # noqa: N818
-    """The work was cancelled, by its token or by whoever waited for it. No error: nothing is told to the user."""
+    """The work was cancelled, by its token or by the caller that waited. This is not an error, so nothing is printed."""
 
 
 class ClfractalError(Exception):
@@ -57,7 +57,7 @@ class SceneError(ClfractalError):
 
 @contextmanager
 def speaking_of(file: str) -> Iterator[None]:
-    """What is found wrong with a scene only while it is worked on is told with the name of its file."""
+    """Adds the scene file's name to errors that are found only while the scene is rendered."""
     try:
         yield
     except SceneError as error:
@@ -87,7 +87,7 @@ class KernelBuildError(ClfractalError):
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known name that `word` was probably meant to be, or None."""
+    """The known name that is most similar to `word`, or None."""
     import difflib  # only for mistakes: every start of the program would pay for it
 
     candidates = sorted(set(known))

@@ -1,4 +1,4 @@
-"""Finds the data that travels with the program: kernels, scenes and the formula library."""
+"""Finds the data that is installed with the program: kernels, scenes and the formula library."""
 
 from __future__ import annotations
 

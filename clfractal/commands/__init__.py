@@ -1,1 +1,1 @@
-"""The commands of the shell, one file each; what a command does not need is not imported for it."""
+"""The commands of the shell, one file each; each command imports only what it needs."""

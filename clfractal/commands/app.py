@@ -57,7 +57,7 @@ Verbose = Annotated[
 def call(arguments: Sequence[str], shell: Shell) -> int:
     """Runs the command that the arguments name; gives the exit status.
 
-    Typer only reads the arguments and gives the work to do: what happens in it is none of Typer's business.
+    Typer only reads the arguments and returns the work as a function, which runs outside Typer.
 
     Raises:
         ClfractalError: and whatever else a command raises.

@@ -1,4 +1,4 @@
-"""The speed table of a device: the rows of the project's promise, measured as medians in one session."""
+"""The speed table of a device: medians, measured in one session."""
 
 from __future__ import annotations
 
@@ -97,8 +97,8 @@ GRID_ROW, SHELL_ROW = "hast2-grid512", "shell-to-png"
 class Row:
     """One line of the table. Times in milliseconds, medians; `ms` is the device's own time where there is one.
 
-    Rays are those of the picture: one for each sample of a pixel. Its steps and iterations count everything that it
-    leads to: points, rays to the lights and into the hemisphere.
+    Rays are camera rays: one for each sample of a pixel. Steps and iterations also include the rays that follow from
+    these: points, rays to the lights and into the hemisphere.
     """
 
     name: str
@@ -182,7 +182,7 @@ def _cell(value: float | None, width: int, digits: int, factor: float = 1.0, uni
 
 
 def _render_row(name: str, scene: Scene, device: Device, peak: float, repetitions: int) -> Row:
-    """One scene, rendered into memory again and again; the first time builds the program and does not count."""
+    """One scene, rendered into memory repeatedly; the first render builds the program and does not count."""
     engine = Engine(device)
     job = engine.prepare(scene, precision="float32")
     _once(job, engine)
@@ -224,7 +224,7 @@ def _grid_row(device: Device) -> Row:
 
 
 def _shell_row(device: Device) -> Row:
-    """From the shell's command to the finished PNG of row 1, caches warm: a new process each time."""
+    """The time of the shell command for row 1's PNG, with warm caches: a new process each time."""
     environment = {**os.environ, "CLFRACTAL_DEVICE": device.info.index}
     with tempfile.TemporaryDirectory(prefix="clfractal-bench-") as folder:
         scene, picture = Path(folder, "scene.yaml"), Path(folder, "picture.png")

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 def check_scene(
     source: str, overrides: tuple[str, ...], shell: Shell, *, parallax: bool, device: str | None
 ) -> None:
-    """Prints a scene as it was understood; what is told of its stereo comes first, as comments, so that it still loads.
+    """Prints a scene with all defaults; remarks about stereo come first, as comments, so that the output is a scene.
 
     Args:
-        parallax: of a stereo scene, whether to look at its depth (which needs a device) and tell the range of parallax.
+        parallax: whether to measure a stereo scene's depth (which needs a device) and print the range of parallax.
 
     Raises:
         ClfractalError: the scene is wrong; or `parallax` of a scene without stereo, or without a device.
@@ -43,7 +43,7 @@ def check_scene(
 
 
 def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, str, str]:
-    """The scene as it is rendered, the range of its parallax, and a warning or nothing."""
+    """The scene as it is rendered, a line with the range of its parallax, and a warning (or an empty text)."""
     from clfractal.work.comfort import fitted, measured
     from clfractal.work.engine import Engine
 
@@ -56,7 +56,7 @@ def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, st
 
 
 def _eyes(scene: Scene) -> list[str]:
-    """Where the viewer's eyes are in the scene, which moves the camera, and what lies on the screen."""
+    """Remarks: where the viewer's eyes are in the scene, the camera's new position, and the plane on the screen."""
     from clfractal.optics.stereo import eye_views, relation
     from clfractal.optics.view import shown_views
     from clfractal.scene.cut_plane import CutPlaneRenderer

@@ -14,7 +14,7 @@ _HEAD = ("", "index", "name", "platform", "memory", "float64", "GL", "lanes", "s
 
 
 def list_devices(shell: Shell) -> None:
-    """Prints a table of all devices; `*` marks the one that is taken unless another is named.
+    """Prints a table of all devices; `*` marks the one that is used unless another is named.
 
     Raises:
         DeviceError: there is none.

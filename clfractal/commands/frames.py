@@ -1,4 +1,4 @@
-"""Rows of the speed table that are films: what a frame costs in an engine that stays, beside its kernel."""
+"""Rows of the speed table for films: the cost of a frame in a kept engine, compared with its kernel."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ ROWS: Mapping[str, tuple[str, Callable[[Scene, float], Scene]]] = {
 
 
 def frame_times(name: str, device: Device) -> tuple[float, float]:
-    """Milliseconds of a frame on the device and for the caller, medians; what comes before the first does not count."""
+    """Medians of a frame's milliseconds on the device and for the caller, without preparations before the first."""
     text, change = ROWS[name]
     scene = load_scene(text)
     frames = [change(scene, number / FRAMES) for number in range(FRAMES)]

@@ -1,8 +1,8 @@
-"""Ctrl-C: answered within half a second, in the middle of a kernel or a compilation too.
+"""Ctrl-C: ends the program within half a second, even in the middle of a kernel or a compilation.
 
-Python tells the main thread of a signal only between two of its own instructions, and a call into a driver
-may last. So there are two answers. The first is KeyboardInterrupt, which lets every `finally` do its work.
-The second is a thread of its own, woken by the signal itself: if the process is still there after a while it
+Python handles a signal only in the main thread and between two of its own instructions, but a call into a driver
+may last long. So there are two reactions. The first is KeyboardInterrupt, which lets every `finally` do its work.
+The second is a separate thread, woken by the signal itself: if the process is still running after a while, this thread
 ends it.
 """
 
@@ -22,8 +22,8 @@ GRACE_SECONDS = 0.35
 def watch(last_words: Callable[[], None], status: int) -> None:
     """From now on Ctrl-C raises KeyboardInterrupt once, and ends the process with `status` soon after.
 
-    `last_words` is called before the process is ended by force. An interrupt that whoever started us chose
-    to ignore (`nohup`, a shell's `&`) stays ignored.
+    `last_words` is called before the process is ended by force. If the process was started with
+    interrupts ignored (`nohup`, a shell's `&`), they stay ignored.
     """
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         return
@@ -40,7 +40,7 @@ def _raise_once(_number: int, _frame: FrameType | None) -> None:
 
 
 def _ignore(_number: int, _frame: FrameType | None) -> None:
-    """A second Ctrl-C must not stop the cleaning up after the first (children would inherit SIG_IGN)."""
+    """A second Ctrl-C must not stop the clean-up after the first one (SIG_IGN would be inherited by child processes)."""
 
 
 def _end_by_force(reading: int, last_words: Callable[[], None], status: int) -> None:

@@ -43,7 +43,7 @@ _NPY = b"\x93NUMPY"
 
 @dataclass(frozen=True, slots=True)
 class _Made:
-    """What a grid comes from, and what its surface is to look like."""
+    """The origin of a grid, and the look of its surface."""
 
     job: Job
     device: Device
@@ -52,7 +52,7 @@ class _Made:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """A grid to take the surface of, and what made it: None for volumes of others."""
+    """A grid whose surface is extracted, and its origin: None for volumes from other programs."""
 
     volume: Volume
     level: float
@@ -64,7 +64,7 @@ def make_mesh(order: GridOrder, shell: Shell, *, level: float | None = None, clo
     """Extracts the surface of a scene's grid or of a volume file, and writes it.
 
     Raises:
-        ClfractalError: anything wrong with the input, the files or the device; an earlier file stays as it was.
+        ClfractalError: anything wrong with the input, the files or the device; an existing file stays unchanged.
     """
     start = time.perf_counter()
     shell.mute_drivers()
@@ -108,7 +108,7 @@ def _check_library() -> None:
 
 
 def _of_scene(order: GridOrder, level: float | None, shell: Shell) -> _Found:
-    """The scene's grid, filled; a level is in the value's own numbers, and the scene's if not given."""
+    """The scene's grid, filled; a level is in the unit of the scene's values, by default the scene's level."""
     scene, coloring = load_order(order)
     volume = given_volume(order, scene)
     if volume is not None:
@@ -119,7 +119,7 @@ def _of_scene(order: GridOrder, level: float | None, shell: Shell) -> _Found:
 
 
 def _of_given(order: GridOrder, scene: Scene, volume: Volume, level: float | None, shell: Shell) -> _Found:
-    """The grid of others that a scene shows; a level is in its numbers, and the scene's if not given."""
+    """The grid from a file that a scene shows; a level is in the file's numbers, by default the scene's level."""
     assert isinstance(scene.renderer, VolumeRenderer)
     assert scene.given is not None
     wanted = scene.renderer.used_level(scene.given.low, scene.given.high) if level is None else level
@@ -144,7 +144,7 @@ def _stored(level: float | None, volume: Volume, scene: Scene) -> float:
 def _of_file(order: GridOrder, level: float | None, shell: Shell) -> _Found:
     """A volume of a file; a level is in the file's numbers.
 
-    If not given it is that of the scene that made the volume, or half way from the least to the largest.
+    The default is the level of the scene that made the volume, or half way between the least and the largest value.
     """
     for option, value in (("--set", order.overrides), ("--resolution", order.resolution)):
         if value:
@@ -172,7 +172,7 @@ def _has_level(scene: Scene) -> bool:
 
 
 def _made(order: GridOrder, volume: Volume, shell: Shell) -> _Made | None:
-    """The scene that made a volume, if it says so: it knows normals and colours."""
+    """The scene that made a volume, if the volume names it: it gives exact normals and colours."""
     text = volume.texts.get(SCENE_KEY)
     if not text or not ("\n" in text or text.startswith("{")):  # else it would be the name of a file
         return None
@@ -197,7 +197,7 @@ def _made(order: GridOrder, volume: Volume, shell: Shell) -> _Made | None:
 
 
 def _text(made: _Made) -> str:
-    """What is kept of the scene in a mesh."""
+    """The text about the scene that a mesh file contains."""
     resolved = made.job.resolved()
     del resolved["coloring"]
     coloring = write_document({"coloring": made.coloring.model_dump(mode="json")})
@@ -209,7 +209,7 @@ def _is_along_axes(volume: Volume) -> bool:
 
 
 def _check_fine(order: GridOrder, volume: Volume) -> None:
-    """Before the work, not after it."""
+    """Refuses a mesh that is too fine for its format before the work, not after it."""
     shape = np.array(volume.values.shape[::-1])
     reach = float(np.abs([volume.origin, volume.origin + (shape - 1) @ volume.directions]).max())
     if order.output.suffix.lower() in SINGLE_PRECISION and is_too_fine(float(volume.spacing.min()), reach):
@@ -217,7 +217,7 @@ def _check_fine(order: GridOrder, volume: Volume) -> None:
 
 
 def _nothing(order: GridOrder, found: _Found, close: bool) -> ClfractalError:
-    """Why there is no triangle."""
+    """The error for a surface without triangles, with the reason."""
     z, y, x = found.volume.values.shape
     if not close and bool((np.asarray(found.volume.values[0, 0, 0]) >= found.level).all()):
         return SceneError(
@@ -240,7 +240,7 @@ def _nothing(order: GridOrder, found: _Found, close: bool) -> ClfractalError:
 
 
 def _dressed(mesh: Mesh, made: _Made, volume: Volume, stages: StageProgress, shell: Shell) -> Mesh:
-    """With the formula's normals and the scene's colours."""
+    """The mesh with the formula's normals and the scene's colours."""
     from clfractal.renderers.vertices import COLORED_BY, dress, on_faces
 
     job, by = made.job, made.coloring.by

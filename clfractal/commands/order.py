@@ -1,4 +1,4 @@
-"""What a render is asked for on the command line."""
+"""The options of a render on the command line."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PARTIAL = ".partial"
-"""What is added to the first output's name for the file that keeps unfinished work."""
+"""Suffix of the file for unfinished work, added to the first output's name."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""How far a render is, on standard error: a bar on a terminal, plain lines now and then elsewhere."""
+"""Progress of a render, on standard error: a bar on a terminal, otherwise a line now and then."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from clfractal.work.run import Progress
 
 BAR_AFTER_SECONDS = 0.5
-"""Quick renders show no bar: the library that draws it takes longer to load than they take."""
+"""Quick renders show no bar: loading the library that draws it takes longer than the render."""
 BAR_EVERY_SECONDS = 0.1
 LINE_EVERY_SECONDS = 2.0
 
@@ -41,13 +41,13 @@ class Reporter:
             self._shell.say(f"rendering: {share:4.0%}, {rate(state)}, {_left(state)}")
 
     def close(self) -> None:
-        """Takes the bar away."""
+        """Removes the bar."""
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
 
     def summary(self, state: Progress, seconds: float) -> str:
-        """What was done, for the last line."""
+        """The text of the last line: the time and the speed."""
         return (
             f"{seconds:.2f} s, {rate(state)}"
             if state.rays

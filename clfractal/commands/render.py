@@ -1,4 +1,4 @@
-"""`clfractal render`: from a scene file to finished pictures, resumable after any kind of end."""
+"""`clfractal render`: from a scene file to finished pictures, resumable after any interruption."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def render_scene(order: Order, shell: Shell) -> None:
     """Renders a scene to all outputs of an order.
 
     Raises:
-        ClfractalError: anything wrong with the input, the files or the device. Work that was done stays in
-            the first output's `.partial` file, and in those beside it where a picture has several views.
+        ClfractalError: anything wrong with the input, the files or the device. Finished work stays in
+            the first output's `.partial` file, or in several such files if the picture has several views.
     """
     start = time.perf_counter()
     region = _region(order.region)

@@ -1,7 +1,7 @@
-"""How commands speak: results on standard output, one line at a time on standard error, and no other word.
+"""Output of commands: results on standard output, messages of one line on standard error, and nothing else.
 
-Drivers write to standard error as they please. While a command runs, what they write goes into a file of its
-own, which `--verbose` shows when something failed.
+Drivers may also write to standard error. While a command runs, their output goes into a separate file,
+which `--verbose` shows when something failed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class Shell:
     """
 
     def __init__(self, *, owns_process: bool) -> None:
-        """`owns_process`: whether standard error may be taken away from drivers."""
+        """`owns_process`: whether the drivers' standard error may be redirected."""
         self.verbose = False
         self.quiet = False
         self._owns_process = owns_process
@@ -32,11 +32,11 @@ class Shell:
         self._noise: int | None = None
         self._interrupted = False
         self.state: Callable[[], str] = lambda: "clfractal: interrupted"
-        """What to say of an interrupt."""
+        """The message for an interrupt."""
 
     @property
     def terminal(self) -> bool:
-        """Whether somebody watches standard error."""
+        """Whether standard error is a terminal."""
         return self._errors.isatty()
 
     @property
@@ -45,7 +45,7 @@ class Shell:
         return self._errors
 
     def mute_drivers(self) -> None:
-        """From now on only our lines reach standard error; not with `--verbose`."""
+        """From now on drivers' output does not reach standard error, except with `--verbose`."""
         if not self._owns_process or self.verbose or self._noise is not None:
             return
         with suppress(OSError, ValueError):
@@ -84,7 +84,7 @@ class Shell:
         self._write(" ".join(line.split()))
 
     def fail(self, error: BaseException) -> int:
-        """Tells what went wrong in one line, with `--verbose` also how; gives the exit status."""
+        """Prints an error in one line, with `--verbose` also its details; returns the exit status."""
         details = ""
         if isinstance(error, ClfractalError):
             line, status, details = str(error), int(error.status), error.details
@@ -106,7 +106,7 @@ class Shell:
         return status
 
     def interrupted(self) -> None:
-        """Tells of an interrupt, once."""
+        """Prints that the program was interrupted, once."""
         if not self._interrupted:
             self._interrupted = True
             self._write(self.state())

@@ -33,7 +33,7 @@ _LINE_SECONDS = 2.0
 class Stack:
     """Which planes to show: `count` of them, `spacing` scene units apart, the scene's own in the middle.
 
-    `spacing` None: so that they reach through the formula's bounds. `start` is the number of the first one to make, from 1.
+    `spacing` None: the planes span the formula's bounds. `start` is the number of the first slice to render, from 1.
     """
 
     count: int = 10
@@ -45,7 +45,7 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     """Renders the planes of a scene's stack, each to its own files.
 
     The planes follow each other along the normal, towards the viewer; `slice.png` becomes slice_0001.png, slice_0002.png
-    and so on. A slice's files appear whole or not at all, and those that are there stay, whatever happens to a later one.
+    and so on. A slice's files appear complete or not at all; finished slices stay even if a later one fails.
 
     Raises:
         ClfractalError: anything wrong with the input, the files or the device.
@@ -89,7 +89,7 @@ def slice_scene(scene: Scene, stack: Stack, number: int) -> Scene:
     """The scene of one plane of a stack, `number` from 1; it renders that slice alone.
 
     Raises:
-        SceneError: the plane is too far off.
+        SceneError: the plane is too far away.
     """
     assert isinstance(scene.renderer, CutPlaneRenderer)
     spacing = stack.spacing if stack.spacing is not None else 2 * scene.chain.radius / stack.count
@@ -119,7 +119,7 @@ def _numbered(outputs: tuple[Path, ...], number: int, count: int) -> tuple[Path,
 
 
 def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> None:
-    """All files, before anything is rendered."""
+    """Checks all files before anything is rendered."""
     from clfractal.pictures.outputs import check_output
 
     source = os.path.realpath(order.scene)
@@ -136,7 +136,7 @@ def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> N
 
 
 def _precision(scenes: list[Scene], device: Device) -> str:
-    """One number type for the whole stack: the finest that any of its ends needs."""
+    """One number type for the whole stack: the more precise of those that its two ends need."""
     from clfractal.device.select import has_float64
     from clfractal.renderers.plan import choose_precision
 
@@ -147,7 +147,7 @@ def _precision(scenes: list[Scene], device: Device) -> str:
 
 
 def _rendered(job: Job, engine: Engine, paths: tuple[Path, ...], shell: Shell) -> int:
-    """One slice, written to its files; gives the number of its samples."""
+    """Renders one slice and writes its files; returns the number of its samples."""
     from clfractal.commands.unfinished import Unfinished
     from clfractal.work.films import JobFilms
     from clfractal.work.run import run

@@ -1,4 +1,4 @@
-"""What `--stats` and `--verbose` tell of a render."""
+"""The statistics that `--stats` and `--verbose` show."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) ->
 
     `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the command's start
     to its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray`
-    counts shadow rays' steps too.
+    includes the steps of shadow rays.
     """
     info, region = job.device, job.region
     return {
@@ -54,7 +54,7 @@ def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) ->
 
 
 def of_stereo(job: Job, comfort: Comfort | None) -> dict[str, Any]:
-    """How a pair was looked at, as plain data; parallax is None where nothing is seen."""
+    """The stereo view of a pair, as plain data; parallax is None for an empty picture."""
     middle, stereo = scene_view(job.scene), job.scene.stereo
     assert stereo is not None
     return {
@@ -86,6 +86,6 @@ def sentence(values: dict[str, Any]) -> str:
 
 
 def peak_memory_mb() -> float:
-    """The most memory that this process has held at a time, in MiB."""
+    """The largest amount of memory that this process has held at one time, in MiB."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak / (2**20 if sys.platform == "darwin" else 2**10)

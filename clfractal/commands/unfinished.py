@@ -15,14 +15,14 @@ from clfractal.work.job import Job
 
 
 class Unfinished:
-    """The journals of a job's views, open. Left by an exception they stay, for `--resume`; those without a tile go.
+    """The open journals of a job's views. After an exception they stay, for `--resume`; those without a tile are removed.
 
     Args:
         job: what is rendered.
-        header: what files tell about its whole picture.
+        header: the header of its whole picture's files.
         output: the first output, which they stand beside.
         resume: whether to continue earlier ones.
-        shell: is told of earlier work that is dropped.
+        shell: prints a message if earlier work is discarded.
 
     Raises:
         FileError: see `JournalFilm`.
@@ -81,7 +81,7 @@ class Unfinished:
                 film.discard()
 
     def _drop_others(self, output: Path, shell: Shell) -> None:
-        """Removes what an earlier render to the same output left of views that this one does not have."""
+        """Removes the journals of views that an earlier render to the same output had, but this one does not."""
         for stale in output.parent.glob(f"{_escaped(output.name)}.*{PARTIAL}"):
             if stale not in self.paths and _names_a_view(stale.name[len(output.name) : -len(PARTIAL)]):
                 shell.say(f"{stale}: earlier work is discarded")
@@ -89,7 +89,7 @@ class Unfinished:
 
 
 def partial_paths(job: Job, output: Path) -> list[Path]:
-    """Where the unfinished work of each view is kept: of the first one in OUTPUT.partial."""
+    """The file for the unfinished work of each view; for the first view it is OUTPUT.partial."""
     sides: list[Side] = [side for side in job.sides if side is not None]
     found = []
     for number, (view, side) in enumerate(zip(job.views, job.sides, strict=True)):

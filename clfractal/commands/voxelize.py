@@ -34,7 +34,7 @@ _AS_VOLUME, _AS_SURFACE, _PLAIN = (
     "coloring={by: solid}",
 )
 COLORING_KEY = "coloring"
-"""Under which of a volume's texts the scene's coloring stands: the renderer of volumes has fewer ways than a mesh."""
+"""Key of the volume's text with the scene's coloring: the volume renderer supports fewer colorings than a mesh."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +57,19 @@ class StageProgress:
         self._next = time.monotonic() + LINE_EVERY_SECONDS
 
     def say(self, stage: str, part: float) -> None:
-        """Print the part of the stage that is done, 0 to 1, unless a line was printed a moment ago."""
+        """Print the finished fraction of the stage, 0 to 1, unless a line was printed a moment ago."""
         now = time.monotonic()
         if now >= self._next and part < 1:
             self._next = now + LINE_EVERY_SECONDS
             self._shell.say(f"{stage}: {part:4.0%}")
 
     def of(self, stage: str) -> Callable[[float], None]:
-        """The same for one stage, as a function of the part that is done."""
+        """The same for one stage, as a function of the finished fraction."""
         return lambda part: self.say(stage, part)
 
 
 def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
-    """Fills the grid of a scene and writes it; one that shows a grid of others is converted.
+    """Fills the grid of a scene and writes it; a grid that the scene shows from a file is converted.
 
     Raises:
         ClfractalError: anything wrong with the input, the files or the device; an earlier file stays as it was.
@@ -99,8 +99,8 @@ def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
 def load_order(order: GridOrder) -> tuple[Scene, Coloring]:
     """The scene with the options folded in, and the coloring that a mesh of it gets. The file is read once.
 
-    The scene's renderer is the volume renderer, with defaults if it was another. That one cannot show every coloring, so
-    the scene has a plain one, and its own is checked apart, as that of a surface.
+    The scene gets the volume renderer, with default values if it had another one. As this renderer does not support every
+    coloring, the scene gets a plain coloring, and its own is checked separately, as for a surface.
 
     Raises:
         ClfractalError: errors name the option that was given.
@@ -144,7 +144,7 @@ def _resolution(text: str) -> str:
 
 
 def fill(order: GridOrder, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
-    """The scene's grid, its job and the device that it is on; the need of memory is told first.
+    """The scene's grid, its job and the device that it is on; the memory that it needs is printed first.
 
     Raises:
         ClfractalError: it does not fit; the device failed.
@@ -190,9 +190,9 @@ def fill(order: GridOrder, scene: Scene, shell: Shell) -> tuple[Grid, Job, Devic
 
 
 def given_volume(order: GridOrder, scene: Scene) -> Volume | None:
-    """The grid of others that a scene shows, where and as large as it shows it; None if it shows its formula.
+    """The grid from a file that a scene shows, with the scene's position and size; None if it shows its formula.
 
-    It has no texts: the formula, which the scene has to have, knows nothing of it.
+    It has no texts: the scene's formula did not make the grid.
     """
     given = scene.given
     if given is None:

@@ -110,7 +110,7 @@ class Device:
         """Allocate `nbytes` of device memory for `what` (used in the message).
 
         Raises:
-            DeviceError: status 2, with the memory needed and had, when it does not fit.
+            DeviceError: status 2, with the memory needed and available, when it does not fit.
         """
         self.check_memory(nbytes, what, largest=nbytes)
         flags = cl.mem_flags.READ_ONLY if read_only else cl.mem_flags.READ_WRITE
@@ -121,7 +121,7 @@ class Device:
         """Refuse work whose buffers, `total` bytes and the `largest` of them, cannot fit on the device.
 
         Raises:
-            DeviceError: status 2, with the memory needed and had.
+            DeviceError: status 2, with the memory needed and available.
         """
         for need, have, limit in (
             (total, self.info.memory, "memory"),

@@ -1,4 +1,4 @@
-"""Files appear whole or not at all: written beside their place, brought to the disk, then renamed.
+"""Files appear complete or not at all: written beside their place, brought to the disk, then renamed.
 
 Also the one place where opening and writing files turns the system's errors into one clear line.
 """
@@ -26,7 +26,7 @@ def file_error(path: str | Path, what: str, error: Exception | str) -> FileError
 
 
 def _target(path: str | Path) -> Path:
-    """The file that a name leads to: a symbolic link stays one and the file behind it is replaced."""
+    """The file that a name refers to: a symbolic link is kept, and the file it points to is replaced."""
     return Path(os.path.realpath(path))
 
 
@@ -77,7 +77,7 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
 
 @contextmanager
 def atomic_writer(path: str | Path) -> Iterator[Path]:
-    """Gives the path of an empty hidden file beside `path`; renames it to `path` if all went well.
+    """Yields the path of an empty hidden file beside `path`, and renames it to `path` on success.
 
     On any exception (also an interrupt) the hidden file is removed and an earlier file stays untouched.
 
@@ -105,7 +105,7 @@ def atomic_writer(path: str | Path) -> Iterator[Path]:
 
 
 def sync_folder(folder: Path) -> None:
-    """Brings a rename to the disk; file systems that cannot do this for folders are left alone."""
+    """Flushes a rename to the disk; on file systems that cannot do this for folders, it does nothing."""
     with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -115,7 +115,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def open_regular(path: str | Path) -> BinaryIO:
-    """Opens a regular file for reading; never waits for a pipe, never reads a device.
+    """Opens a regular file for reading; it does not wait for a pipe or read a device.
 
     Raises:
         FileError: there is none, or it cannot be read.

@@ -48,7 +48,7 @@ CHANNELS: dict[str, Channel] = {channel.name: channel for channel in _TABLE}
 """Every channel by name, in the order in which pictures list them."""
 
 DEFAULT_CHANNELS: tuple[str, ...] = ("R", "G", "B", "A", "Z")
-"""What a picture holds unless the scene's `output.channels` says otherwise."""
+"""The channels of a picture unless the scene's `output.channels` names others."""
 
 
 def check_channels(names: Iterable[str], where: Where | None = None) -> tuple[str, ...]:
@@ -74,7 +74,7 @@ VIEWS: tuple[str, ...] = ("left", "right")
 
 
 def in_view(name: str, view: str) -> str:
-    """What a channel of a view is called in a file of several: `R`, `N.left.X`; `right.R`, `N.right.X`.
+    """The name of a view's channel in a file of several views: `R`, `N.left.X`; `right.R`, `N.right.X`.
 
     The view stands before the last part of the name. Only in the default view is it left out, and only of a name of one
     part: "Storing Multi-View Images in OpenEXR Files", section "Channel Naming" (openexr.com).
@@ -84,6 +84,6 @@ def in_view(name: str, view: str) -> str:
 
 
 def without_view(name: str) -> str:
-    """The channel's own name, of one that `in_view` made or of any other."""
+    """The channel's name without its view; names that `in_view` did not make are unchanged."""
     parts = name.split(".")
     return ".".join(part for place, part in enumerate(parts) if place != len(parts) - 2 or part not in VIEWS)

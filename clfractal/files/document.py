@@ -1,8 +1,8 @@
-"""Reads YAML from anybody into plain data with its places, and writes it; the only file that knows yaml.
+"""Reads untrusted YAML into plain data with line and column, and writes YAML; the only file that uses the yaml library.
 
-A document is built from the parser's events rather than by a loader: nothing recurses, nothing is constructed
-but strings, numbers, booleans, lists and mappings, and an alias is counted for all that it expands to before
-it is used.
+A document is built from the parser's events rather than by a loader: there is no recursion, only
+strings, numbers, booleans, lists and mappings are constructed, and an alias is counted as all the values that it expands
+to before it is used.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def _short(value: Any) -> Any:
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes the strings that this file's reader would take for something else; writes no aliases."""
+    """Quotes the strings that this file's reader would not read as strings; writes no aliases."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True

@@ -39,8 +39,8 @@ def read_environment(path: str | Path) -> Floats:
 
     The channels are R, G and B, or Y alone for grey light; half or float, in any compression, by rows or by
     tiles. Where the file names other primaries, colours are turned into Rec. 709, adapted to its white.
-    Negative numbers become 0: light cannot be less than none, but resampling and colours outside of Rec. 709
-    leave some behind in maps that are as good as any.
+    Negative numbers become 0: light cannot be negative, but resampling and colours outside Rec. 709
+    cause negative numbers even in good maps.
 
     Raises:
         FileError: it cannot be read, is no OpenEXR file or a damaged one, or no such map.
@@ -61,7 +61,7 @@ def read_environment(path: str | Path) -> Floats:
 
 
 def _check_shape(path: str | Path, header: ExrHeader) -> None:
-    """Everything that the header tells, before any pixel is read."""
+    """Checks everything in the header before any pixel is read."""
     window = header.values().get("dataWindow")
     envmap = header.attributes.get("envmap")
     if not isinstance(window, tuple) or len(window) != 4 or not header.channels:
@@ -86,7 +86,7 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
 
 
 def _check_numbers(path: str | Path, pixels: Floats) -> None:
-    """Refuses what no light is: damage is better seen here than as spots in a picture."""
+    """Refuses numbers that cannot be light: an error here is better than spots in a picture."""
     # NaN wins in both.
     limits = pixels.min(initial=0.0), pixels.max(initial=0.0)
     if -np.inf < limits[0] and limits[1] <= BRIGHTEST:

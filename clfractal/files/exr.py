@@ -2,8 +2,8 @@
 
 The wheel has two ways to write. `OpenEXR.File` wants the whole picture in memory and knows every
 attribute; `OpenEXR.OutputFile` takes bands of rows but cannot write matrices (nor chromaticities: it
-leaves them 0). Large pictures need the bands, so such attributes are reserved as texts of the very same
-length and written over before the file gets its name.
+leaves them 0). Large pictures need the bands, so such attributes are first written as texts of exactly the same
+length, and overwritten before the file gets its name.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def write_exr(
     half: Collection[str],
     header: Mapping[str, Any] | None = None,
 ) -> None:
-    """Writes an OpenEXR file, ZIP compressed; it appears whole or not at all.
+    """Writes an OpenEXR file, ZIP compressed; it appears complete or not at all.
 
     Args:
         bands: from top to bottom; channel name -> float32 of shape (rows, width of the region).
@@ -90,10 +90,10 @@ def read_exr(path: str | Path, *, tiles: bool = False) -> tuple[dict[str, npt.ND
 
     With `tiles` the picture may be stored by tiles too; of several levels the largest is read.
 
-    Of a damaged file the library may write lines of its own to standard error, but it ends in one error here.
+    For a damaged file the library may write its own lines to standard error, but here it gives one error.
 
     Raises:
-        FileError: it cannot be read, is no such file, or is damaged or cut short.
+        FileError: it cannot be read, is not such a file, or is damaged or cut short.
     """
     header = read_header(path)
     if not (header.one_part_flat if tiles else header.one_part_scanlines):
@@ -121,7 +121,7 @@ def _plain_header(
     channels: Sequence[str],
     half: Collection[str],
 ) -> dict[str, Any]:
-    """What every file has, in the library's own types."""
+    """The header entries of every file, in the library's types."""
     pixel = Imath.PixelType
     x, y, width, height = region
     plain: dict[str, Any] = OpenEXR.Header(*display)
@@ -212,7 +212,7 @@ def _library(path: str | Path, call: Any, *arguments: Any) -> Any:
 def _replace_attributes(path: str | Path, beside: Path, attributes: Mapping[str, tuple[str, bytes]]) -> None:
     """Writes the attributes over their reservations, once it is sure that the library wrote everything.
 
-    The library does not tell when its last bytes found no room on the disk: reading the header back does.
+    The library does not report that its last bytes did not fit on the disk; reading the header back shows it.
     """
     try:
         header = read_header(beside)

@@ -1,7 +1,7 @@
 """Reads the header of an OpenEXR file without the OpenEXR library.
 
-The scene of a picture that somebody sent is read from here: a damaged or hostile file must end in one
-line, and a C++ library that is handed such a file may take the process with it. Layout: "OpenEXR File
+It reads the scenes of untrusted pictures: a damaged or hostile file must give an error of one
+line, but a C++ library that reads such a file may crash the process. Layout: "OpenEXR File
 Layout", sections "File Layout" and "Header" (openexr.com).
 """
 
@@ -107,7 +107,7 @@ class _DamagedError(Exception):
 
 
 def read_header(path: str | Path) -> ExrHeader:
-    """The header of an OpenEXR file; of one-part scanline files also the whole pixel data is made sure of.
+    """The header of an OpenEXR file; for one-part scanline files it also checks that the pixel data are complete.
 
     Raises:
         FileError: it cannot be read, is no OpenEXR file, or is damaged or cut short.

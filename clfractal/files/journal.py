@@ -9,7 +9,7 @@ Layout, little-endian:
     records   uint32 tile index, uint32 CRC-32 of index and payload, payload: float32 [channels, 32, 32]
 
 All records have one size, so a damaged one spoils no other, and the k-th one is found without an index.
-The header appears whole or not at all (by renaming); a record that was cut short by the writer's death is
+The header appears complete or not at all (by renaming); a record that was cut short by the writer's death is
 at the end of the file and is overwritten by the next one. Nothing is brought to the disk record by record:
 a killed process loses nothing that it wrote, and after a power failure the check sums tell which tiles to
 render again.

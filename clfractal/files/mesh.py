@@ -49,7 +49,7 @@ class Mesh:
 
 
 def write_mesh(path: str | Path, mesh: Mesh, *, text: str = "") -> None:
-    """Writes a mesh in the format of the path's extension; it appears whole or not at all.
+    """Writes a mesh in the format of the path's extension; it appears complete or not at all.
 
     PLY and OBJ have 64-bit coordinates where 32 bits are too few. Colours are sRGB in PLY (8 bits) and OBJ
     (after the coordinates, as most programs read them), linear in GLB (16 bits); STL has neither colours nor

@@ -54,7 +54,7 @@ def write_png(
     texts: Mapping[str, str] | None = None,
     origin: tuple[int, int] = (0, 0),
 ) -> None:
-    """Writes a PNG file; it appears whole or not at all.
+    """Writes a PNG file; it appears complete or not at all.
 
     Args:
         bands: arrays (rows, width, 3), or 4 with `alpha`, from top to bottom: linear Rec. 709, and with

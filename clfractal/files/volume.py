@@ -123,7 +123,7 @@ def write_slabs(
     *,
     compress: bool = False,
 ) -> None:
-    """Writes a volume slab by slab; it appears whole or not at all, little-endian.
+    """Writes a volume slab by slab; it appears complete or not at all, little-endian.
 
     Args:
         path: .nrrd, or .npy, beside which `.npy.json` keeps the geometry and the texts.

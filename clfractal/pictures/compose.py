@@ -1,6 +1,6 @@
-"""One picture of the two that a stereo scene has: beside each other, interlaced, or as an anaglyph.
+"""Combines the two pictures of a stereo scene: side by side, interlaced, or as an anaglyph.
 
-All in linear light and in picture coordinates of the finished picture: a region of it equals the same part of the whole.
+Everything is in linear light and in coordinates of the finished picture: a region equals the same part of the whole.
 A store of each eye's picture goes in, `Composed` comes out and is written like any other picture, a few rows at a time.
 """
 
@@ -35,7 +35,7 @@ def eye_size(stereo: Stereo, image: tuple[int, int]) -> tuple[int, int]:
     """Width and height of each eye's picture, pixels; `image` is the scene's `image`.
 
     Raises:
-        ValueError: an odd size that is to be halved; a scene is checked for it when it is loaded.
+        ValueError: a size to be halved is odd; scenes are checked for this when they are loaded.
     """
     (width, height), (wide, high) = image, stereo.squeeze
     if width % wide or height % high:

@@ -1,4 +1,4 @@
-"""The film: finished tiles become named channels, in memory; `store.py` has the one that lies on disk."""
+"""The film: finished tiles become named channels, in memory; `store.py` has the film on disk."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Film:
     `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, `exposure` (stops) and
     `transparent` (what PNG files and notebooks show), and `worldToCamera` and
     `worldToNDC`, 4 x 4 matrices for row vectors (point_camera = [x, y, z, 1] @ matrix: the translation is the
-    last row), as OpenEXR's standard attributes want them. A function that makes it is called when it is first needed.
+    last row), as in OpenEXR's standard attributes. A function that returns the header is called when it is first needed.
 
     Raises:
         SceneError: an unknown channel name.
@@ -54,14 +54,14 @@ class Film:
 
     @property
     def header(self) -> dict[str, Any]:
-        """What files tell about the picture; made when it is first asked for, if it was given as a function."""
+        """The header of picture files; made at first use if it was given as a function."""
         if self._header is None:
             assert self._make_header is not None
             self._header = {**self._make_header(), **self._told}
         return self._header
 
     def tell(self, key: str, value: Any) -> None:
-        """Adds an entry to the header, which need not be made for that."""
+        """Adds an entry to the header, even if the header has not been made yet."""
         (self._told if self._header is None else self._header)[key] = value
 
     @property
@@ -76,7 +76,7 @@ class Film:
 
     @property
     def done(self) -> npt.NDArray[np.bool_]:
-        """For each tile whether it is there."""
+        """For each tile, whether it is finished."""
         return self._done
 
     def __getitem__(self, name: str) -> Floats:
@@ -127,7 +127,7 @@ class Film:
         self._done[:] = True
 
     def take(self, other: Film) -> None:
-        """Stores what another film of the same region has."""
+        """Copies another film of the same region."""
         for name in self.channels:
             self._planes[name][:] = other[name]
         self._done[:] = other.done
@@ -165,7 +165,7 @@ class Film:
         return encode8(linear, origin=(self.region.x, self.region.y))
 
     def _repr_png_(self) -> bytes | None:
-        """What a notebook shows; None (the text form instead) if there are no colours."""
+        """The picture that a notebook shows; None (it then shows the text form) if there are no colours."""
         if not {"R", "G", "B"} <= set(self.channels):
             return None
         from clfractal.pictures.outputs import png_bytes
@@ -174,7 +174,7 @@ class Film:
 
 
 def in_memory(picture: Picture) -> Film:
-    """A whole picture as a film; itself if it is one."""
+    """A whole picture as a film; returned unchanged if it is a film."""
     if isinstance(picture, Film):
         return picture
     bands = [band for _, band in picture.bands()]

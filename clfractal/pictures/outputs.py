@@ -1,4 +1,4 @@
-"""The files that a film is written to, whatever kind of film it is."""
+"""Writes any kind of film to files."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def save_outputs(
     transparent: bool | None = None,
     exposure: float | None = None,
 ) -> None:
-    """Writes a film to files, the format of each told by its extension; each appears whole or not at all.
+    """Writes a film to files, in the formats of their extensions; each file appears complete or not at all.
 
     All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`.
 
@@ -59,10 +59,10 @@ def save_outputs(
         bits: 8 or 16, of a PNG.
         transparent: whether a PNG has an alpha channel (the film's colours are premultiplied); needs A.
         exposure: stops (powers of two) by which a PNG is lighter than the film; an EXR keeps scene values.
-            Both are what the header says if they are None.
+            If they are None, the header's values are used.
 
     Raises:
-        FileError: a file cannot be written; earlier ones of `paths` may be there by then.
+        FileError: a file cannot be written; earlier ones of `paths` may already be written.
     """
     chosen = [Path(path) for path in paths]
     for path in chosen:
@@ -118,7 +118,7 @@ def check_views(path: str | Path) -> None:
     """Makes sure, before anything is rendered, that a picture of both views can be written to `path`.
 
     Raises:
-        FileError: as of `check_output`, and for a PNG, which has room for one view.
+        FileError: as for `check_output`, and for a PNG, which can hold only one view.
     """
     check_output(path)
     if Path(path).suffix.lower() == ".png":

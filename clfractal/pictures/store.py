@@ -25,7 +25,7 @@ class JournalFilm:
         path: the journal, `OUT.partial` by custom.
         identity: JSON values that say what is rendered; a journal is resumed only if all are equal. The
             picture's size, region and channels are added.
-        resume: whether to continue an earlier journal (a missing one is begun anew).
+        resume: whether to continue an earlier journal (if there is none, a new one is begun).
 
     Raises:
         SceneError: an unknown channel name.
@@ -61,7 +61,7 @@ class JournalFilm:
 
     @property
     def done(self) -> npt.NDArray[np.bool_]:
-        """For each tile whether it is there."""
+        """For each tile, whether it is finished."""
         return self.journal.done
 
     def put(self, tile_index: int, array: Floats) -> None:

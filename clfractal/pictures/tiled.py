@@ -1,4 +1,4 @@
-"""What holds a picture: the engine writes tiles to one, files are made from one."""
+"""Interfaces of objects that hold a picture: the engine writes tiles to them, files are made from them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Bands = Iterator[tuple[int, dict[str, Floats]]]
 
 
 class Picture(Protocol):
-    """What files are made from."""
+    """A picture that can be written to files."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -31,7 +31,7 @@ class Picture(Protocol):
 
     @property
     def header(self) -> dict[str, Any]:
-        """What files tell about the picture; see `Film`."""
+        """The header of picture files; see `Film`."""
 
     def bands(self) -> Bands:
         """The picture from top to bottom, some rows at a time; one row of tiles of a store.
@@ -50,7 +50,7 @@ class TiledStore(Picture, Protocol):
 
     @property
     def done(self) -> npt.NDArray[np.bool_]:
-        """For each tile whether it is there; not to be written to."""
+        """For each tile, whether it is finished; not to be written to."""
 
     def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
         """Stores whole tiles: float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""

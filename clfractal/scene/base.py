@@ -24,7 +24,7 @@ Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)
 
 
 class Section(BaseModel):
-    """A mapping of the scene: unknown keys are errors, values keep their types, nothing ever changes.
+    """A mapping of the scene: unknown keys are errors, values are not converted, and it is immutable.
 
     `tag` is the word that chooses the class where several share a place.
     """
@@ -33,7 +33,7 @@ class Section(BaseModel):
     tag: ClassVar[str] = ""
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy; with `update` its values are checked, and nothing derived from the old ones is kept."""
+        """A copy; values in `update` are checked, and nothing that was derived from the old values is kept."""
         if not update:
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in type(self).model_fields}
@@ -41,7 +41,7 @@ class Section(BaseModel):
 
 
 def problem(message: str, at: str = "") -> PydanticCustomError:
-    """An error of ours inside a validator, at the key (or dotted path) `at` of the model that raises it."""
+    """Our own error inside a validator, at the key (or dotted path) `at` of the model that raises it."""
     return PydanticCustomError("clfractal", "{message}", {"message": message, "at": at})
 
 

@@ -1,4 +1,4 @@
-"""What the parts of a scene demand of each other, once the formula and its bounds are known."""
+"""Checks that concern several parts of a scene, made once the formula and its bounds are known."""
 
 from collections.abc import Sequence
 from math import dist
@@ -21,7 +21,7 @@ _MOST_APPLICATIONS = 2_000
 
 
 def check_parts(scene: Scene, *, whole: bool = True) -> None:
-    """Raises SceneError, at its dotted path, for what is wrong only together; a view of a layout is not `whole`."""
+    """Raises SceneError, with a dotted path, if values contradict each other; `whole` is false for a layout's view."""
     radius = used_bounds(scene)[1]
     _check_step(scene.coloring.step, radius, "coloring.step")
     if isinstance(scene.renderer, SurfaceRenderer):
@@ -42,7 +42,7 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
 
 
 def used_bounds(scene: Scene) -> tuple[Vector, float]:
-    """Centre and radius of the ball that is looked in, scene units: the renderer's, or the formula's own."""
+    """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
     bounds = scene.renderer.bounds if isinstance(scene.renderer, SurfaceRenderer) else None
     return (bounds.center, bounds.radius) if bounds else (scene.chain.center, scene.chain.radius)
 
@@ -92,7 +92,7 @@ def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:
 
 
 def _check_eyes(scene: Scene) -> None:
-    """A pair needs two eyes; a cut plane by itself is flat, and has none."""
+    """A pair needs a perspective camera, except for the flat picture of a cut_plane renderer."""
     flat = isinstance(scene.renderer, CutPlaneRenderer)
     if isinstance(scene.camera, OrthographicCamera) and not flat and scene.layout is None:
         raise SceneError(
@@ -103,7 +103,7 @@ def _check_eyes(scene: Scene) -> None:
 
 
 def _check_stereo(scene: Scene, stereo: Stereo) -> None:
-    """Squeezed pictures need a side that can be halved, anaglyphs colours, a fit one view with depth."""
+    """Squeezed pictures need an even side, anaglyphs need colours, and `fit` needs one view with depth."""
     squeezed = {"split_half": "width", "over_under_half": "height"}.get(stereo.mode)
     if squeezed is not None:
         side = getattr(scene.image, squeezed)
@@ -129,7 +129,7 @@ def _check_stereo(scene: Scene, stereo: Stereo) -> None:
 
 
 def _check_step(step: float | None, radius: float, path: str) -> None:
-    """A step goes neither past the whole object at once nor takes forever."""
+    """A step must not jump over the whole object, and must not be so small that a ray takes forever."""
     if step is None:
         return
     diameter = 2 * radius
@@ -146,7 +146,7 @@ def _check_step(step: float | None, radius: float, path: str) -> None:
 
 
 def _check_views(scene: Scene) -> None:
-    """Every view is a scene of its own, and wrong or right by itself."""
+    """Checks every view as a scene of its own."""
     for number, (view, _) in enumerate(scene.views):
         try:
             check_parts(view, whole=False)
@@ -157,7 +157,7 @@ def _check_views(scene: Scene) -> None:
 
 
 def _check_planes(scene: Scene) -> None:
-    """Every plane of a picture is evaluated for every pixel."""
+    """Limits the number of planes, because every plane is evaluated for every pixel."""
     count = sum(plane.count for plane in scene.cut_planes)
     if count > MAX_PLANES:
         raise SceneError(
@@ -168,7 +168,7 @@ def _check_planes(scene: Scene) -> None:
 
 
 def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
-    """Through fewer points than four a plane fits exactly."""
+    """Residuals need four points: a plane fits three points exactly."""
     count = renderer.used_points.count
     if scene.coloring.by == "residual" and count < 4:
         raise SceneError(

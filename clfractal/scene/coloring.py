@@ -19,14 +19,14 @@ from clfractal.scene.surface import Length
 
 
 class Stop(Section):
-    """A colour at a place of a palette; between two stops colours are mixed in linear light."""
+    """A colour at a position in a palette; between two stops colours are mixed in linear light."""
 
     at: Fraction = Field(description="place in the palette, 0 to 1")
     color: Color = Field(description="linear Rec. 709")
 
 
 def check_order(palette: str | Sequence[Stop]) -> None:
-    """For validators of what has a `palette`: its stops are in order."""
+    """For validators of sections with a `palette`: its stops must be in order."""
     if isinstance(palette, str):
         return
     for index in range(1, len(palette)):
@@ -39,7 +39,7 @@ def check_order(palette: str | Sequence[Stop]) -> None:
 
 
 class Trap(Section):
-    """A shape in the formula's space; the colour follows how near the orbit comes to it."""
+    """A shape in the formula's space; the colour follows the smallest distance of the orbit from it."""
 
     shape: Literal["point", "axis", "plane", "sphere"] = Field(
         "point", description="the shape to which the orbit's distance is measured"
@@ -58,13 +58,13 @@ class Trap(Section):
 
 
 class Coloring(Section):
-    """Where the material's colour comes from: the palette at scale * quantity + offset, or a colour at once.
+    """Where the material's colour comes from: the palette at scale * quantity + offset, or a fixed colour.
 
     `solid`: material.color. `normal`: the normal's x, y, z as red, green, blue, from -1..1 to 0..1.
-    The quantities: `iterations`, the smooth escape count; `residual`, how far the pixel's points are from their
-    plane, in footprints; `thickness`, from where `along` enters the set to where it leaves it, scene units;
-    `layer_distance`, from the surface to that of `layer` iterations, scene units; `trap`, how near the orbit comes
-    to a shape.
+    The quantities: `iterations`, the smooth escape count; `residual`, how far the pixel's points are from the
+    plane fitted to them, in footprints; `thickness`, from where `along` enters the set to where it leaves it, scene units;
+    `layer_distance`, from the surface to the surface after `layer` iterations, scene units; `trap`, the smallest
+    distance of the orbit from a shape.
     """
 
     by: Literal["solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap"] = Field(

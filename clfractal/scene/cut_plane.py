@@ -1,4 +1,4 @@
-"""The cut-plane renderer's settings, and cut planes that stand in another renderer's picture."""
+"""The cut-plane renderer's settings, and cut planes in another renderer's picture."""
 
 from typing import Annotated, Literal, Self
 
@@ -22,7 +22,7 @@ Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 
 
 class EscapeColors(Section):
-    """Colours of a plane through the set: the palette at scale * curve(count / limit) + offset, and one for the inside."""
+    """Colours of a plane: the palette at scale * curve(count / limit) + offset, and a colour for points inside."""
 
     palette: Palette = "viridis"
     mode: Literal["smooth", "stepped"] = Field("smooth", description="smooth counts, or whole ones")
@@ -60,7 +60,7 @@ class CutPlaneRenderer(Sampled):
 
 
 class CutPlane(Section):
-    """A plane that stands in the picture of the object, coloured by escape counts."""
+    """A plane in the picture of the object, coloured by escape counts."""
 
     plane: Plane = Field(default_factory=dict, validate_default=True, description="where the plane lies")
     colors: EscapeColors = Field(

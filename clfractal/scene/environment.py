@@ -34,7 +34,7 @@ class EnvironmentMap:
 
 @cache
 def names() -> tuple[str, ...]:
-    """The maps that travel with the program, sorted."""
+    """The names of the maps that come with the program, sorted."""
     return tuple(sorted(path.stem for path in resources.folder("environments").glob("*.exr")))
 
 
@@ -69,7 +69,7 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
 
 @cache
 def _shipped(name: str) -> EnvironmentMap:
-    """A map that travels with the program: small, and read once."""
+    """A map that comes with the program; it is small and read only once."""
     from clfractal.files.environment import read_environment
 
     pixels = read_environment(resources.folder("environments") / f"{name}.exr")

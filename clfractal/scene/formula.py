@@ -1,4 +1,4 @@
-"""The scene's `formula`: which one is drawn, with which numbers."""
+"""The scene's `formula`: which formula is drawn, and the values of its parameters."""
 
 from typing import Annotated, Any, Self
 
@@ -63,7 +63,7 @@ class FormulaSpec(_Source):
         return self
 
     def mapping(self) -> dict[str, Any]:
-        """Plain data without what is not given; it loads back to an equal FormulaSpec."""
+        """Plain data with the given keys only; it loads back to an equal FormulaSpec."""
         plain: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
         return _without_empty(plain)
 

@@ -1,4 +1,4 @@
-"""A grid of others that a volume scene shows: read from its file, turned along the axes, kept with the scene."""
+"""A grid from a file that a volume scene shows: it is read, turned along the axes, and kept with the scene."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class GivenGrid:
 def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
     """The grid of a scene that was loaded from `folder`, in the renderer's box if it has one, else in its own place.
 
-    A grid that stands askew is shown along its own axes.
+    A grid whose axes are tilted is shown as if they were the axes of space.
 
     Raises:
         FileError: at renderer.file, for a file out of the folder, or whatever is wrong with it.

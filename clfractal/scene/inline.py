@@ -1,4 +1,4 @@
-"""Puts the formula files that a scene names into the scene, so that one text tells all of it."""
+"""Puts the formula files that a scene names into the scene, so that one text contains everything."""
 
 from dataclasses import replace
 from pathlib import Path

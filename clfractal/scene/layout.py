@@ -1,4 +1,4 @@
-"""Several views in one picture, as the thesis's split window has them."""
+"""Several views in one picture, as in the thesis's split window."""
 
 from dataclasses import dataclass
 from typing import Annotated, Self
@@ -26,7 +26,7 @@ class Place:
 
 
 class LayoutView(Section):
-    """One view: what it has in the place of the scene's own."""
+    """One view: the sections that it replaces in the scene."""
 
     area: Annotated[tuple[Fraction, Fraction, Fraction, Fraction], Field(strict=False)] | None = Field(
         None,
@@ -55,7 +55,7 @@ class LayoutView(Section):
         return self
 
     def changes(self) -> dict[str, object]:
-        """The sections that the view has of its own."""
+        """The sections that the view replaces."""
         names = [name for name in type(self).model_fields if name != "area"]
         return {name: getattr(self, name) for name in names if getattr(self, name) is not None}
 

@@ -10,7 +10,7 @@ MAX_LIGHTS = 64
 
 
 class LightBase(Section):
-    """What every light has."""
+    """Keys that every light has."""
 
     color: Color = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
     intensity: Amount = Field(1.0, description="factor on the colour")
@@ -27,7 +27,7 @@ class LightBase(Section):
 
     @property
     def used_rays(self) -> int:
-        """Shadow rays for each sample: all of a hard shadow's would be the same."""
+        """Shadow rays per sample: one for a hard shadow, because further rays would be the same."""
         if self.angular_size == 0:
             return 1
         return self.rays if self.rays is not None else 8
@@ -68,7 +68,7 @@ MapName = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
 
 
 class Environment(Section):
-    """A picture of everything around, infinitely far away: it lights the set, is mirrored by it and seen past it."""
+    """A picture of everything around, infinitely far away; it lights the set, and is seen in mirrors and behind the set."""
 
     name: MapName | None = Field(None, description="an environment map that comes with the program")
     file: MapName | None = Field(
@@ -95,7 +95,7 @@ class Environment(Section):
 
 
 class Fog(Section):
-    """Light lost on the way to the eye, and the fog's own colour in its place: exponential with distance."""
+    """Fog absorbs light on its way to the eye and replaces it by its own colour, exponentially with distance."""
 
     color: Color = Field((0.5, 0.55, 0.6), description="linear Rec. 709")
     density: float = Field(

@@ -1,7 +1,7 @@
 """Reads a scene from a file, a text, a picture or plain data, with every error at its line and column.
 
 The data go one way: read, override, inline formula files, validate by the schema, check what the schema cannot see. The
-document keeps the places of all values until the end, so that an error of any step can be located.
+document keeps the places of all values until the end, so that errors of every step have a line and column.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -54,8 +54,8 @@ def load_scene(
         source: a path (of a scene file, or of a picture that holds one); YAML text (a str with a line break,
             or that begins with a brace); plain data; or what `read_scene` gave.
         overrides: `camera.fov=30`: a dotted key and a YAML value that replaces the file's.
-        folder: where the files that it names are looked for, formulas and an environment's map; the scene
-            file's folder, or the current one, if not given.
+        folder: where the files that the scene names are looked for; by default the scene file's folder,
+            or the current one.
 
     Raises:
         SceneError, FormulaError: something in the text is wrong.
@@ -139,7 +139,7 @@ def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple
 
 @contextmanager
 def _located(document: Document) -> Iterator[None]:
-    """Errors that name a path only get their place in the text."""
+    """Adds the place in the text to errors that have only a path."""
     try:
         yield
     except ClfractalError as error:
@@ -179,7 +179,7 @@ def _defaults() -> dict[str, Any]:
 
 
 def _check(scene: Scene) -> None:
-    """Raises ClfractalError, at a dotted path, for what the schema cannot see; what is read stays in the scene."""
+    """Raises ClfractalError, at a dotted path, for mistakes that the schema cannot find; files are kept with the scene."""
     _ = scene.chain
     check_parts(scene)
     _check_names(scene)
@@ -188,9 +188,9 @@ def _check(scene: Scene) -> None:
 
 
 def _check_names(scene: Scene) -> None:
-    """Raises SceneError or FileError for what a scene names and nobody has: palettes, environments, files.
+    """Raises SceneError or FileError if a palette, an environment or a file that the scene names does not exist.
 
-    What is read is kept in the scene, so that what is rendered is what was checked.
+    The data are kept in the scene, so that exactly the checked data are rendered.
     """
     _check_palettes(scene)
     if scene.environment is not None:
@@ -213,7 +213,7 @@ def _check_views(scene: Scene) -> None:
 
 
 def _check_palettes(scene: Scene) -> None:
-    """Raises SceneError for a palette that is used and that nobody knows."""
+    """Raises SceneError if a palette that is used does not exist."""
     used: list[tuple[str, Any]] = []
     if scene.coloring.uses_palette:
         used.append(("coloring.palette", scene.coloring.palette))

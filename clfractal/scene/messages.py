@@ -1,4 +1,4 @@
-"""Turns what the schema finds wrong into our one line: what is allowed, what was given, where it stands."""
+"""Turns errors of the schema into one line: what is allowed, what was given, and where."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ class Problem:
         return SceneError(self.message, where)
 
     def order(self, document: Document) -> tuple[int, int, int]:
-        """Sorts problems as one meets them in the text; those in options come last."""
+        """Sorts problems by their place in the text; problems in options come last."""
         place = document.where(self.path, key=self.key)
         if place.line is None or place.column is None:
             return (1, 0, 0)
@@ -100,7 +100,7 @@ def _options(annotation: Any) -> list[Any]:
 
 
 def _place(location: Sequence[str | int]) -> _Place:
-    """Follows a location through the schema; its words that choose a class are no keys."""
+    """Follows a location through the schema; words in it that choose a class are not keys."""
     place = _Place([], [Scene])
     for part in location:
         model = next((m for m in place.models if part in m.model_fields), None)
@@ -188,7 +188,7 @@ def _length(details: ErrorDetails) -> Problem | None:
 
 
 def _kind(details: ErrorDetails) -> Problem:
-    """A word that should choose a class and does not."""
+    """The message for a word that should choose a class but is unknown."""
     place = _place(details["loc"])
     key = "projection" if any("projection" in m.model_fields for m in place.models) else "type"
     given = details["input"].get(key)
@@ -209,7 +209,7 @@ def _word(details: ErrorDetails) -> Problem:
 
 
 def _nearest_word(given: Any, allowed: str) -> str:
-    """A guess at what was meant, where there is much to choose from."""
+    """A suggestion of a similar word, if there are many choices."""
     words = allowed.replace(" or ", ", ").split(", ")
     guess = nearest(given, words) if isinstance(given, str) and len(words) > 3 else None
     return f"; did you mean {guess!r}?" if guess else ""
@@ -228,7 +228,7 @@ _SPECIAL: Mapping[str, Callable[[ErrorDetails], Problem | None]] = {
 
 
 def shown_value(value: Any) -> str:
-    """A value as an error shows it: short, on one line."""
+    """A value as errors show it: short, on one line."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):

@@ -38,7 +38,7 @@ _SECTIONS = {
 
 
 class Scene(Section):
-    """A picture to be made: one formula, one camera, one way of looking."""
+    """A picture to be made: a formula, a camera, a renderer and everything else that determines the pixels."""
 
     version: Literal[1] = Field(description="version of this schema")
     formula: FormulaSpec
@@ -64,7 +64,7 @@ class Scene(Section):
     _read: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     def __eq__(self, other: object) -> bool:
-        """Whether both say the same, wherever they were loaded from."""
+        """Whether both have equal values, wherever they were loaded from."""
         fields = type(self).model_fields
         return type(other) is type(self) and all(getattr(self, key) == getattr(other, key) for key in fields)
 
@@ -81,9 +81,9 @@ class Scene(Section):
         return copied
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As of every section; the copy stays in the scene's folder.
+        """As for every section; the copy keeps the scene's folder.
 
-        What was read of a section that is not replaced is kept, so that it is what was checked, and is not read again.
+        Files of sections that are not replaced are not read again: the copy keeps the checked data.
         """
         copied = super().model_copy(update=update, deep=deep)
         copied._folder = self._folder
@@ -95,7 +95,7 @@ class Scene(Section):
         return copied
 
     def _once(self, name: str, read: Callable[[], T]) -> T:
-        """What was read under a name, or is read now."""
+        """The data kept under a name; they are read first if there are none."""
         if name not in self._read:
             self._read[name] = read()
         found: T = self._read[name]
@@ -117,7 +117,7 @@ class Scene(Section):
 
     @property
     def surroundings(self) -> "EnvironmentMap | None":
-        """The environment's map, None without one; of a loaded scene a map's file has been read and checked.
+        """The environment's map, or None; for a loaded scene the map's file has already been read and checked.
 
         Raises:
             SceneError, FileError: it is missing or wrong; the path says where.
@@ -131,7 +131,7 @@ class Scene(Section):
 
     @property
     def given(self) -> "GivenGrid | None":
-        """The grid that a volume scene shows in place of its formula; of a loaded scene it has been read and checked.
+        """The grid that a volume scene shows instead of its formula; in a loaded scene it has already been read and checked.
 
         Raises:
             FileError: its file is missing or wrong; the path says where.
@@ -153,7 +153,7 @@ class Scene(Section):
         """The views of the layout, each a scene of its own, and their places in the picture.
 
         Raises:
-            SceneError: there is no room for one.
+            SceneError: a view does not fit into the picture.
         """
         return self._once("views", self._find_views)
 
@@ -178,7 +178,7 @@ class Scene(Section):
 
     @property
     def surface(self) -> SurfaceRenderer:
-        """The surface renderer's settings, of a scene that has them."""
+        """The surface renderer's settings; the scene must have this renderer."""
         assert isinstance(self.renderer, SurfaceRenderer)
         return self.renderer
 

@@ -1,7 +1,7 @@
 """The parts of a scene around its formula: picture, camera, material, background and output.
 
-A camera, renderer or light with a `projection` or `type` is one class here and one entry in its union; a new
-kind is added by writing its class and naming it there.
+Each kind of camera, renderer or light (chosen by `projection` or `type`) is a class and an entry in a union; to add a
+kind, write its class and add it to the union.
 """
 
 from math import radians, tan
@@ -44,7 +44,7 @@ class Image(Section):
 
 
 class CameraBase(Section):
-    """What every camera has."""
+    """Keys that every camera has."""
 
     position: Position = Field((0.0, -3.0, 0.0), description="where the camera is, scene units")
     target: Position = Field(
@@ -95,7 +95,7 @@ class PerspectiveCamera(CameraBase):
 
     @property
     def used_focus_distance(self) -> float:
-        """What is sharp, measured along the view axis, scene units: the target's where it is not given."""
+        """The distance that is sharp, along the view axis, scene units; by default the target's."""
         if self.focus_distance is not None:
             return self.focus_distance
         return length(minus(self.target, self.position))
@@ -124,7 +124,7 @@ Camera = Annotated[
 
 
 class Material(Section):
-    """How the surface answers light: the thesis's Phong model (Eq. 5)."""
+    """How the surface reflects light: the thesis's Phong model (Eq. 5)."""
 
     color: Reflectance = Field(
         (0.8, 0.7, 0.6), description="linear Rec. 709; replaced by a coloring other than solid"
@@ -137,7 +137,7 @@ class Material(Section):
 
 
 class Gradient(Section):
-    """What is seen past the set, from the top of the picture to its bottom."""
+    """The background behind the set, from the top of the picture to its bottom."""
 
     tag = "gradient"
     top: Color = Field((0.25, 0.35, 0.5), description="linear Rec. 709")
@@ -158,7 +158,7 @@ ChannelName = Annotated[
 
 
 class Output(Section):
-    """What is written."""
+    """What the picture files contain."""
 
     exposure: float = Field(
         0.0, ge=-100, le=100, description="stops: PNG colours are multiplied by 2**exposure"

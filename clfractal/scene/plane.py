@@ -1,4 +1,4 @@
-"""A rectangle in space: where a cut plane lies, and how it is moved about."""
+"""A rectangle in space: where a cut plane lies, and how it is moved and rotated."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ LARGEST, SMALLEST = 1e6, 1e-18
 
 
 class Transform(Section):
-    """One step of moving a plane about: exactly one of its keys."""
+    """One step that scales, moves or rotates a plane; exactly one key is given."""
 
     scale: Factor | None = Field(None, description="factor on width and height; the centre stays")
     move_normal: Coordinate | None = Field(None, description="shift along the normal, scene units")
@@ -125,7 +125,7 @@ class Placed:
     height: float
 
     def at(self, x: float, y: float) -> Vector:
-        """The point of the plane at x of its width and y of its height, from (0, 0), its lower left, to (1, 1)."""
+        """The point at the fractions x of the plane's width and y of its height; (0, 0) is the lower left corner."""
         across, rise = (x - 0.5) * self.width, (y - 0.5) * self.height
         a, b, c = (m + across * s + rise * u for m, s, u in zip(self.center, self.side, self.up, strict=True))
         return (a, b, c)
@@ -153,7 +153,7 @@ def moved(plane: SomePlane, *, normal: float = 0.0, side: float = 0.0, up: float
 
 
 def rotated(plane: SomePlane, axis: Axis, degrees: float) -> SomePlane:
-    """The plane, turned by the right-hand rule: about its own middle for its own axes, about the origin for x, y and z."""
+    """The plane, rotated by the right-hand rule: for its own axes about its middle, for x, y and z about the origin."""
     placed = _place(plane)
     about: Vector = AXES[axis] if axis in AXES else getattr(placed, axis)
     return _like(
@@ -173,7 +173,7 @@ def _place(plane: Plane | Placed) -> Placed:
 
 
 def _like(plane: SomePlane, placed: Placed) -> SomePlane:
-    """What was done to a plane of a scene is a plane of a scene again, with no transformations left."""
+    """A placed plane as a scene's `Plane`, without transformations."""
     if isinstance(plane, Placed):
         return placed
     names = ("center", "normal", "up", "width", "height")
@@ -189,7 +189,7 @@ def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
 
 
 def _cos_sin(degrees: float) -> tuple[float, float]:
-    """Exact at quarter turns, so that a plane turned by one loses nothing."""
+    """Cosine and sine; exact at quarter turns, so that they cause no rounding."""
     reduced = fmod(degrees, 360.0)
     quarters = round(reduced / 90.0)
     rest = radians(reduced - 90.0 * quarters)

@@ -1,4 +1,4 @@
-"""The ways to look at a scene, chosen by `renderer.type`."""
+"""The kinds of renderer, chosen by `renderer.type`."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""What every renderer has: samples of a pixel, how they are put together, and the number type."""
+"""Keys that every renderer has: the samples of a pixel, how they are combined, and the number type."""
 
 from typing import Annotated, Literal, Self
 

@@ -1,4 +1,4 @@
-"""Stereo: a real screen, the viewer before it, and how the two pictures are shown."""
+"""Stereo: a real screen, the viewer in front of it, and how the two pictures are shown."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ APART: tuple[Mode, ...] = ("pair", "multi_view")
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """Whose picture a scene shows.
+    """The eye from which a scene is seen.
 
     Attributes:
         name: one of the two eyes, or the cyclopean one between them.
@@ -78,9 +78,9 @@ class StereoPlane(Section):
 
 
 class Stereo(Section):
-    """A pair of pictures for the two eyes of a viewer before a real screen.
+    """A pair of pictures for the two eyes of a viewer in front of a real screen.
 
-    Screen, distance and interpupillary distance are measured in the real world, in any one unit.
+    Screen, distance and interpupillary distance are measured in the real world, all in the same unit.
     """
 
     mode: Mode = Field("split", description="how the pair is shown")
@@ -151,7 +151,7 @@ class Stereo(Section):
         return self.mode in ("anaglyph", "anaglyph_chessboard")
 
     def check_channels(self, channels: Collection[str]) -> None:
-        """Raises SceneError, at `output.channels`, if colours that are to be mixed are not among the channels."""
+        """Raises SceneError, at `output.channels`, if a colour that the mode mixes is not among the channels."""
         missing = [name for name in "RGB" if name not in channels]
         if missing and self.mixes_colors:
             raise SceneError(

@@ -1,4 +1,4 @@
-"""The surface renderer's settings: how the surface is searched, how its normals are made, how pixels are put together."""
+"""The surface renderer's settings: the search for the surface, its normals, and the sampling of pixels."""
 
 from math import isqrt
 from typing import Annotated, Literal, Self
@@ -16,7 +16,7 @@ MAX_POINTS = 64
 
 
 class Ball(Section):
-    """A ball in space that holds everything to be seen."""
+    """A ball in space that contains everything visible."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="scene units")
     radius: Length = Field(description="scene units")
@@ -39,7 +39,7 @@ class Points(Section):
 
 
 class AmbientOcclusion(Section):
-    """How much of the surroundings a point of the surface sees."""
+    """How much of its surroundings a point of the surface sees."""
 
     rays: int = Field(8, ge=1, le=1024, description="rays into the hemisphere per sample")
     distance: Length | None = Field(
@@ -104,7 +104,7 @@ class SurfaceRenderer(Sampled):
 
     @property
     def used_points(self) -> Points:
-        """The points in use, where `points` leaves them to the normal."""
+        """The points that are used; if `points` is null, `normal` decides."""
         if self.points is not None:
             return self.points
         return Points(pattern="grid", count=1 if self.normal == "gradient" else 9)

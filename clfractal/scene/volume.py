@@ -1,4 +1,4 @@
-"""The volume renderer's settings: the box that is filled, what its voxels hold, and how rays go through."""
+"""The volume renderer's settings: the box that is filled, the values of its voxels, and how rays sample them."""
 
 from math import prod
 from typing import Annotated, Literal, Self
@@ -46,21 +46,21 @@ class Zoom(Section):
 
 
 class OpacityStop(Section):
-    """An opacity at a value of a voxel; between two stops it is mixed."""
+    """An opacity at a value of a voxel; between two stops it is interpolated."""
 
     at: float = Field(ge=-1e12, le=1e12, description="value of a voxel at this stop")
     opacity: Fraction = Field(description="opacity over the length of a voxel's side, 0 to 1")
 
 
 class ColorStop(Section):
-    """A colour at a value of a voxel; between two stops colours are mixed in linear light."""
+    """A colour at a value of a voxel; between two stops colours are interpolated in linear light."""
 
     at: float = Field(ge=-1e12, le=1e12, description="value of a voxel at this stop")
     color: Color = Field(description="linear Rec. 709")
 
 
 class Transfer(Section):
-    """What the values of voxels look like."""
+    """Opacity and colour of the voxels' values."""
 
     opacity: Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = (
         Field(None, description="stops in order of `at`; null: a surface at the renderer's level")
@@ -144,7 +144,7 @@ class VolumeRenderer(Sampled):
         return (low + high) / 2 if self.level is None else self.level
 
     def check_level(self, low: float, high: float) -> None:
-        """Raises SceneError for a level that a grid with values from `low` to `high` cannot have."""
+        """Raises SceneError if no surface at the level is possible in a grid with values from `low` to `high`."""
         if self.level is not None and not low < self.level <= high:
             raise SceneError(
                 f"must be above {low:g} and at most {high:g}, the ends of the grid's values, got {self.level:g}",
@@ -153,5 +153,5 @@ class VolumeRenderer(Sampled):
 
     @property
     def magnification(self) -> float:
-        """How many times the smallest box goes into the first."""
+        """How many times larger the first box is than the smallest."""
         return prod(zoom.scale for zoom in self.zoom)

@@ -87,7 +87,7 @@ def check_grid(lattice: Lattice, renderer: VolumeRenderer, device: Device) -> No
     """Refuses a grid that cannot fit, whatever is in it.
 
     Raises:
-        DeviceError: status 2, with the memory needed at least and had.
+        DeviceError: status 2, with the least memory needed and the memory available.
     """
     x, y, z = lattice.shape
     what = f"a grid of {x} x {y} x {z} voxels"

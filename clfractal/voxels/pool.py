@@ -41,7 +41,7 @@ def plan_pools(device: Device, slots: int, sample_bytes: tuple[int, ...], others
     """The parts of pools of `slots` bricks whose samples take `sample_bytes` each, beside `others` bytes.
 
     Raises:
-        DeviceError: status 2, with the memory needed and had, when they do not fit.
+        DeviceError: status 2, with the memory needed and available, when they do not fit.
     """
     slots = max(slots, 1)
     largest = BRICK_STRIDE * max(sample_bytes)

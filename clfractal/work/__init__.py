@@ -1,1 +1,1 @@
-"""How every picture is made: jobs of views, engines, executors."""
+"""How pictures are rendered: jobs of views, engines, executors."""

@@ -1,6 +1,6 @@
-"""How much depth a stereo picture asks of its viewer's eyes, and how it is made to ask less.
+"""How strongly a stereo picture's depth strains the viewer's eyes, and how to reduce that.
 
-Eyes that look at a screen stay focused on it while they turn towards what is before or behind it. Up to about one degree
+Eyes stay focused on a screen while they turn towards points in front of it or behind it. Up to about one degree
 of difference that is comfortable (M. Lambooij et al., "Visual discomfort and visual fatigue of stereoscopic displays: a
 review", Journal of Imaging Science and Technology 53, 2009).
 """
@@ -47,7 +47,7 @@ _NEARLY_RIGHT = np.radians(89.9)
 
 @dataclass(frozen=True, slots=True)
 class Comfort:
-    """The range of parallax in a picture: on the screen, in its units, and in degrees. Negative: before the screen."""
+    """The range of parallax in a picture: on the screen, in its unit, and in degrees. Negative: in front of the screen."""
 
     nearest: float
     farthest: float
@@ -68,7 +68,7 @@ class Comfort:
 
     @property
     def worst_degrees(self) -> float:
-        """The largest of either side, without its sign."""
+        """The largest absolute value of both ends."""
         return max(abs(self.nearest_degrees), abs(self.farthest_degrees))
 
     def sentence(self) -> str:
@@ -104,7 +104,7 @@ def comfort_of_depth(
     size: tuple[int, int],
     origin: tuple[int, int] = (0, 0),
 ) -> Comfort | None:
-    """The range of parallax of what one eye's picture shows, or some of its pixels; None where that is nothing.
+    """The range of parallax in one eye's picture, or in some of its pixels; None if they show nothing.
 
     Args:
         scene, eye: the stereo scene as that eye sees it.
@@ -150,7 +150,7 @@ class Look:
 
 
 def measured(scene: Scene, look: Look) -> Comfort | None:
-    """The range of parallax in a stereo scene's picture, by a quick look of either eye; None where nothing is seen.
+    """The range of parallax in a stereo scene's picture, by a quick look from each eye; None if the picture is empty.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.
@@ -168,9 +168,9 @@ def measured(scene: Scene, look: Look) -> Comfort | None:
 
 
 def comfort_of_job(job: Job, stores: Sequence[Picture], look: Look) -> Comfort | None:
-    """The range of parallax in a finished job: of all its pixels where their depth is at hand, else by quick looks.
+    """The range of parallax in a finished job: from all pixels if it has the depth channel, else by quick looks.
 
-    None without stereo, and where nothing is seen.
+    None without stereo, and for an empty picture.
 
     Args:
         stores: of the job's views.
@@ -221,14 +221,14 @@ def points_of_depth(
 
 
 def fitted(scene: Scene, look: Look) -> Scene:
-    """The scene with a plane and a separation that keep its depth within `stereo.budget`; as it is without `fit`.
+    """The scene with a plane and a separation that keep its depth within `stereo.budget`; unchanged without `fit`.
 
-    The eye between the two stays where it is, so what it sees does not change: the screen is placed between the nearest
-    and the farthest of it, where both have the same parallax in degrees. If that is still too much, the eyes come closer
-    to each other. A plane that the scene gives stays where it is.
+    The viewpoint between the two eyes stays, so its view does not change: the screen is placed so that the nearest and the
+    farthest visible point have the same parallax in degrees. If that is still too much, the eyes move closer
+    together. A plane that the scene gives stays where it is.
 
     Raises:
-        SceneError: nothing is seen.
+        SceneError: the picture is empty.
         DeviceError, KernelBuildError: as of a render.
     """
     stereo = scene.stereo

@@ -1,4 +1,4 @@
-"""One view on one device: its program, what that reads, and its launches. What is equal from view to view stays."""
+"""One view on one device: its program, the program's data, and its launches. Data stay while they do not change."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Span:
 
 
 class OutputBuffers:
-    """Where launches leave their results: two sets, so that the device does not wait for the host to read one."""
+    """Buffers for the results of launches: two sets, so that the device does not wait while the host reads one."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -69,7 +69,7 @@ class OutputBuffers:
         self.sets: list[tuple[cl.Buffer, cl.Buffer, cl.Buffer]] = []
 
     def fit(self, film: int, statistics: int, places: int) -> bool:
-        """Makes sure that each set has room for so many bytes; True if there are other buffers now."""
+        """Makes sure that each set has room for so many bytes; True if the buffers were replaced."""
         wanted = (film, statistics, places)
         if all(have >= want for have, want in zip(self.sizes, wanted, strict=True)):
             return False
@@ -105,7 +105,7 @@ class Drawing:
     def update(self, view: PlannedView, resources: Resources, *, tiles: int) -> None:
         """Takes a view, of which at most `tiles` tiles are rendered at a time.
 
-        What is equal to the view before stays; a program is built only if its text is another one.
+        Only data that differ from the view before are sent; a program is built only if its text has changed.
 
         Raises:
             DeviceError: too little memory (status 2), or the device failed.
@@ -148,14 +148,14 @@ class Drawing:
 
     @property
     def watched(self) -> list[Watched]:
-        """Arguments that make launches under way end early, where that can be."""
+        """Arguments that can make running launches end early, if the device allows it."""
         return list(self._watched.values())
 
     def keep(self, tiles: int) -> None:
-        """Makes room for what passes keep of so many tiles for each other.
+        """Makes room for the data of so many tiles that one pass keeps for the next.
 
         Raises:
-            DeviceError: status 2, with the memory needed and had, if it does not fit.
+            DeviceError: status 2, with the memory needed and available, if it does not fit.
         """
         needed = self.kept_bytes(tiles)
         if self._kept is None or self._kept.size < needed:
@@ -171,7 +171,7 @@ class Drawing:
         return tiles * self._kept_count * TILE_PIXELS * width
 
     def forget(self) -> None:
-        """Gives back what is kept between passes."""
+        """Frees the data kept between passes."""
         self._kept = None
 
     def start(self, span: Span) -> cl.Event:
@@ -185,12 +185,10 @@ class Drawing:
         kernel, (first, end) = self._kernels[span.slot], span.packets
         numbers = (first, end, *span.samples, span.mode)
         with self.device.failures("rendering"):
-            # In the kernels' own queue, and nobody waits: with every core at work PoCL would let a write wait for the launch
-            # before. The array has to live as long.
+            # Non-blocking, in the kernels' own queue: with all cores busy, PoCL would delay a blocking write until the
+            # launch before has ended. So the array must stay alive until the write is done.
             self._places[span.slot] = places
-            cl.enqueue_copy(
-                self.device.queue, self.outputs.sets[span.slot][2], places, is_blocking=False
-            )
+            cl.enqueue_copy(self.device.queue, self.outputs.sets[span.slot][2], places, is_blocking=False)
             for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
                 kernel.set_arg(index, np.int32(number))
             count = -(-(end - first) // self.group) * self.group
@@ -212,7 +210,7 @@ class Drawing:
         return film, statistics.sum(axis=0, dtype=np.uint64)
 
     def _begin_pace(self) -> None:
-        """One sample of a tile for each core: what that takes is not known yet."""
+        """One sample of a tile for each core, because the speed is not known yet."""
         self.pace = Pace(float(max(self.device.info.compute_units, 1) * self.packets))
 
     def _upload(self, arguments: list[KernelArgument]) -> None:

@@ -1,4 +1,4 @@
-"""The engine: a device, an executor that keeps what it made, and pictures one after the other."""
+"""The engine: one device and an executor that keeps its programs and data from picture to picture."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
 
 class Engine:
-    """Renders scenes on one device, and keeps from one to the next what stays equal: programs, buffers, grids, maps.
+    """Renders scenes on one device, and keeps unchanged data from one to the next: programs, buffers, grids, maps.
 
         with clfractal.Engine() as engine:
             for angle in range(60):
                 film = engine.render(turned(scene, angle))
 
-    One thread may use it at a time; a second one gets an error.
+    Only one thread may use it at a time; a second one gets an error.
 
     Args:
         device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; None: CLFRACTAL_DEVICE, else the best. Or a `Device`.
-        budget_seconds: how long launches under way may take together: what is cancelled ends after about that.
-        tell: told a line if something has to be compiled or measured first, or does not fit.
+        budget_seconds: limit of the work that is queued on the device: a cancelled render ends after about this time.
+        tell: called with a message if something has to be compiled or measured first, or does not fit.
 
     Raises:
         DeviceError: no device, or an unknown one.
@@ -71,7 +71,7 @@ class Engine:
         self.close()
 
     def close(self) -> None:
-        """Gives back the device's memory; the engine cannot be used any more."""
+        """Frees the device's memory; the engine cannot be used afterwards."""
         with self._alone():
             self.executor.close()
             self._looking.close()
@@ -91,7 +91,7 @@ class Engine:
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
     ) -> Job:
-        """The job of a scene's picture: see `prepare.prepare`; a stereo scene is fitted first if it asks for that.
+        """The job of a scene's picture: see `prepare.prepare`; a stereo scene with `fit` is fitted first.
 
         Raises:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
@@ -124,10 +124,10 @@ class Engine:
         channels: Sequence[str] | None = None,
         token: CancelToken | None = None,
     ) -> Film:
-        """The picture of a scene, in memory; arguments, result and errors as of `clfractal.render`.
+        """Renders a scene into memory; arguments, result and errors as for `clfractal.render`.
 
         Args:
-            token: ends the render when it is set, from any thread; it then raises `clfractal.Stopped`.
+            token: ends the render when any thread cancels it; `clfractal.Stopped` is then raised.
         """
         with self._alone():
             job = self.prepare(scene, precision=precision, samples=samples, region=region, channels=channels)
@@ -151,7 +151,7 @@ class Engine:
         channels: Sequence[str] | None = None,
         token: CancelToken | None = None,
     ) -> tuple[Film, Film]:
-        """Both eyes' pictures of a stereo scene; arguments, result and errors as of `clfractal.render_pair`."""
+        """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
         with self._alone():
             loaded = scene if isinstance(scene, Scene) else load_scene(scene)
             if loaded.stereo is None:
@@ -178,11 +178,11 @@ class Engine:
     ) -> Refinement:
         """Films of a scene from coarse to finished: every 8th, 4th and 2nd pixel, then all with more and more samples.
 
-        Each is a film of the whole size. The last has the bits of `render`. What passes hand on stays on the device, some
-        70 bytes a pixel (twice that in float64); where that does not fit, the samples are made in one pass. In a
-        notebook the result shows itself, and is redrawn with every pass.
+        Each film has the full size. The last one has the same bits as `render`. Between passes the device keeps some
+        70 bytes per pixel (twice that in float64); if they do not fit, all samples are made in one pass. In a
+        notebook the result is shown, and redrawn with every pass.
 
-        Arguments and errors as of `render`.
+        Arguments and errors as for `render`.
         """
 
         def films() -> Generator[Film]:

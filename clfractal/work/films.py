@@ -1,4 +1,4 @@
-"""A job's films in memory, and the picture that is made of them."""
+"""A job's films in memory, and the picture that is composed of them."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ class JobFilms:
 
     @cached_property
     def header(self) -> dict[str, Any]:
-        """What files tell about the whole picture."""
+        """The header of the whole picture's files."""
         return self.job.header()
 
     def picture(self) -> Film:
-        """The finished picture, or as far as it is finished. Not of a pair that stays apart."""
+        """The picture, as far as it is finished. Not for a pair whose pictures stay apart."""
         composed = len(self.films) != 1
         return in_memory(self.job.picture(self.films, self.header if composed else None))
 

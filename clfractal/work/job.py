@@ -1,7 +1,7 @@
-"""A job: everything that is decided of a picture before a device is touched, as plain data that can be sent anywhere.
+"""A job: all decisions about a picture, made before a device is used, as plain data that can be sent to another process.
 
-A job is a list of views and one composition that makes one picture of them. Its scene has everything folded in that shapes
-the pixels (number types and samples in use included), so that rendering the scene in a picture's header gives the same
+A job is a list of views and one composition that makes one picture of them. Its scene contains everything that determines
+the pixels (including the number types and samples in use), so that rendering the scene in a picture's header gives the same
 pixels again.
 """
 
@@ -84,7 +84,7 @@ class Job:
         views: what is rendered, each by itself.
         composition: how one picture is made of them.
         channels: those of the views.
-        device: what the decisions were made for.
+        device: the device for which the decisions were made.
         remark: a line for the user, or empty.
     """
 
@@ -123,7 +123,7 @@ class Job:
 
     @property
     def sides(self) -> tuple[Side | None, ...]:
-        """Of each view the eye that it belongs to; None in a picture without stereo."""
+        """The eye of each view; None in a picture without stereo."""
         made = self.composition
         if not isinstance(made, StereoPair):
             return (None,) * len(self.views)
@@ -133,7 +133,7 @@ class Job:
         return tuple(found[number] for number in range(len(self.views)))
 
     def resolved(self) -> dict[str, Any]:
-        """The scene as plain data, with what was decided in the place of what was wished."""
+        """The scene as plain data, with the decisions in place of `auto` and null."""
         plain = self.scene.resolved()
         if self.scene.layout is None:
             plain["renderer"] = _decided(plain["renderer"], self.views[0])
@@ -148,7 +148,7 @@ class Job:
         return plain
 
     def header(self) -> dict[str, Any]:
-        """What picture files tell about the whole picture (see `Film`); `seconds` is added when it is known."""
+        """The header of the whole picture's files (see `Film`); `seconds` is added when it is known."""
         scene = self.scene
         camera = scene_view(scene)
         return {
@@ -173,9 +173,9 @@ class Job:
         return {**whole, **cameras, "view": side}
 
     def identity(self, number: int) -> dict[str, Any]:
-        """What has to be the same for a tile of one view to have the same bits: kept with unfinished work.
+        """The values that must be equal for a tile of one view to have the same bits; stored with unfinished work.
 
-        How files are written, and how a pair is shown, is free to change; the channels are compared by the journal.
+        Settings for writing files and for showing a pair may change; the journal compares the channels.
         """
         view, side = self.views[number], self.sides[number]
         scene = self.resolved()
@@ -229,7 +229,7 @@ class Job:
 
     @property
     def stays_apart(self) -> bool:
-        """Whether both eyes' pictures are kept, and none is made of them."""
+        """Whether both eyes' pictures are kept apart instead of composed into one."""
         made = self.composition
         return isinstance(made, StereoPair) and made.stereo.mode in APART
 
@@ -250,7 +250,7 @@ class Job:
 
 
 def _decided(renderer: dict[str, Any], view: PlannedView) -> dict[str, Any]:
-    """A renderer's settings with the samples and the number type in use."""
+    """A renderer's settings with the chosen samples and number type."""
     found = {**renderer, "samples": view.plan.samples, "precision": view.plan.precision}
     if found["min_samples"] is not None:
         found["min_samples"] = min(found["min_samples"], view.plan.samples)

@@ -22,12 +22,12 @@ Tiles = npt.NDArray[np.int32]
 
 
 class LocalExecutor:
-    """Does work items on one device. Context, programs, buffers, grids and maps stay from one job to the next.
+    """Executes work items on one device. Context, programs, buffers, grids and maps stay from one job to the next.
 
     Args:
         device: where.
-        budget_seconds: how long the launches under way may take together: what is cancelled ends after about that.
-        tell: told a line if a program has to be compiled first, or if something does not fit.
+        budget_seconds: limit of the work that is queued on the device: cancelled work ends after about this time.
+        tell: called with a message if a program has to be compiled first, or if something does not fit.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class LocalExecutor:
         """Makes sure that a job can be rendered in passes.
 
         Raises:
-            DeviceError: status 2, with the memory needed and had, if what passes hand on does not fit.
+            DeviceError: status 2, with the memory needed and available, if the data kept between passes do not fit.
         """
         needs = [
             self._drawing(number, view, 1, None).kept_bytes(TileGrid(view.plan.region).count)
@@ -74,12 +74,12 @@ class LocalExecutor:
         self.device.check_memory(sum(needs), "a picture in passes", largest=max(needs))
 
     def forget(self) -> None:
-        """Gives back what is kept between the passes of a picture."""
+        """Frees the data kept between the passes of a picture."""
         for drawing in self._drawings.values():
             drawing.forget()
 
     def close(self) -> None:
-        """Gives back all memory; the executor can be used again."""
+        """Frees all memory; the executor can be used again."""
         self._drawings.clear()
         self._outputs = OutputBuffers(self.device)
         self.kept = Kept()
@@ -134,7 +134,7 @@ class _Cutter:
         self.sample = self.first
 
     def enqueue(self, size: float) -> Part[Span] | None:
-        """Starts the next launch, of at most `size` samples of packets if that can be."""
+        """Starts the next launch, of at most `size` samples of packets where possible."""
         span = self._next(size)
         if span is None:
             return None

@@ -1,4 +1,4 @@
-"""Deciding everything about a picture: one place for the shell, for Python, and for every kind of picture."""
+"""Makes all decisions about a picture, in one place for the shell, for Python, and for every kind of picture."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def prepare(
     channels: Sequence[str] | None = None,
     on_start: Callable[[str], None] | None = None,
 ) -> Job:
-    """The job of a scene's picture; what is None is the scene's, or that of each of its views.
+    """The job of a scene's picture; arguments that are None take the value of the scene, or of each of its views.
 
-    A stereo scene that shall be fitted (`stereo.fit`) is taken as it is; see `comfort.fitted`.
+    This does not apply `stereo.fit`; see `comfort.fitted`.
 
     Args:
         region: x, y, width, height of the part of the finished picture to make, pixels.
-        on_start: told a line if the device is measured first, which takes some seconds, once.
+        on_start: called with a message if the device is measured first, which takes some seconds, once.
 
     Raises:
         SceneError: the region is not inside the picture, an unknown precision or channel, a wrong number of

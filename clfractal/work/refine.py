@@ -27,7 +27,7 @@ a full one.
 
 
 class Refinement(Iterator[Film]):
-    """Films from coarse to finished: see `Engine.refine`. In a notebook it shows itself, redrawn with every pass."""
+    """Films from coarse to finished: see `Engine.refine`. A notebook shows it, and redraws it with every pass."""
 
     def __init__(self, films: Generator[Film]) -> None:
         self._films = films
@@ -36,7 +36,7 @@ class Refinement(Iterator[Film]):
         return next(self._films)
 
     def close(self) -> None:
-        """Ends the refinement before its last pass; the engine is free again."""
+        """Ends the refinement before its last pass; the engine can then be used again."""
         self._films.close()
 
     def _ipython_display_(self) -> None:
@@ -50,7 +50,7 @@ class Refinement(Iterator[Film]):
 
 
 def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None) -> Generator[Film]:
-    """The passes of a job, each as a film of the whole picture. The last has the bits of `run`.
+    """The passes of a job, each as a film of the whole picture. The last one has the same bits as `run`.
 
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
@@ -88,7 +88,7 @@ def _ranges(samples: int) -> list[tuple[int, int]]:
 
 
 def _fits(job: Job, executor: LocalExecutor) -> bool:
-    """Whether the device has room for what passes hand on; says so if it has not."""
+    """Whether the device has room for the data kept between passes; if not, a message is printed."""
     if job.samples == 1:
         return True
     try:
@@ -101,7 +101,7 @@ def _fits(job: Job, executor: LocalExecutor) -> bool:
 
 
 def _enlarge(small: Film, whole: Film, divider: int) -> None:
-    """Each pixel of a coarse film becomes those that it stands for."""
+    """Copies each pixel of a coarse film to all the pixels that it stands for."""
     region = whole.region
     rows = np.arange(region.y, region.bottom) // divider - small.region.y
     columns = np.arange(region.x, region.right) // divider - small.region.x

@@ -1,4 +1,4 @@
-"""Doing a job: its work is cut into items, an executor does them, and the tiles go into stores.
+"""Executes a job: its work is cut into items, an executor renders them, and the tiles go into stores.
 
 An executor is whatever does work items: this process (`local.py`), and later the window, several devices, or a cluster.
 """
@@ -23,10 +23,10 @@ Tiles = npt.NDArray[np.int32]
 
 @dataclass(frozen=True, slots=True)
 class WorkItem:
-    """A part of a job. It may be cut by tiles as one likes.
+    """A part of a job. It may be split by tiles in any way.
 
-    By samples it may be cut only in order, on one device: sums of floats keep their order, so each range of a tile's
-    samples goes on from what the one before left there.
+    By samples it may be split only in order, and on one device: float sums depend on their order, so each range of a
+    tile's samples continues the sums that the range before left on the device.
 
     Attributes:
         view: number of the view in the job.
@@ -41,7 +41,7 @@ class WorkItem:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """What work took: camera rays over all samples, distance evaluations and applications of all rays, times in ms."""
+    """Counts and times of work: camera rays (all samples), distance evaluations and applications of all rays, times in ms."""
 
     rays: int = 0
     steps: int = 0
@@ -62,7 +62,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """Finished tiles of a view, or of none, with what has been done since the result before.
+    """Finished tiles of a view (perhaps none), with the counts since the result before.
 
     Attributes:
         view: number of the view in the job.
@@ -83,9 +83,9 @@ class Executor(Protocol):
     def execute(
         self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
     ) -> Iterator[Result]:
-        """Does the items of a job and gives results as they come, tiles whole and each once, in any order.
+        """Executes the items of a job and yields results as they come: complete tiles, each once, in any order.
 
-        When the iterator is closed, or raises, nothing of the job is under way any more.
+        When the iterator is closed, or raises, no work of the job is running any more.
 
         Raises:
             DeviceError, KernelBuildError: a device failed, or a program does not compile.
@@ -95,7 +95,7 @@ class Executor(Protocol):
 
 @dataclass(slots=True)
 class Progress(Tally):
-    """How far a job is, and what it has taken; `remaining` is None until it can be told."""
+    """The progress of a job, its counts and times; `remaining` is None until it can be estimated."""
 
     tiles: int
     tiles_done: int = 0
@@ -104,7 +104,7 @@ class Progress(Tally):
 
     @property
     def seconds(self) -> float:
-        """Wall time since the job was begun, without what programs took to be built."""
+        """Wall time since the start of the job, without the time for building programs."""
         return max(time.perf_counter() - self.started - 1e-3 * self.build_ms, 0.0)
 
     @property
@@ -122,7 +122,7 @@ class Progress(Tally):
 
     @property
     def steps_per_ray(self) -> float:
-        """Distance evaluations per camera ray, shadow rays' included."""
+        """Distance evaluations per camera ray, including those of shadow rays."""
         return self.steps / max(self.rays, 1)
 
 
