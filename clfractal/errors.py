@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-# Exit statuses of the shell (sysexits are not used: scripts only need to tell "fix the input" from "fix the machine").
+# Exit statuses of the shell (not sysexits: scripts only need to distinguish "fix the input" from "fix the machine").
 STATUS_BAD_INPUT = 2
 STATUS_DEVICE_FAILED = 3
 STATUS_INTERRUPTED = 130

@@ -1,4 +1,4 @@
-// Rays of a packet's pixels that wait for a lane, and what they find. A pixel sends several rays for one purpose: to its
+// Rays of a packet's pixels that wait for a lane, and their results. A pixel sends several rays for one purpose: to its
 // points, to parts of a light, into the hemisphere. Were they marched turn by turn, all lanes would wait for the slowest pixel
 // of each turn (70 % of all lanes with 3 x 3 points); here a lane that is done takes the next ray, whichever pixel sent it.
 // What a ray finds depends on nothing but the ray, so the order is free. The steps of the search by steps are too cheap, and
@@ -10,7 +10,7 @@
 #endif
 
 #if BATCH_TURNS == 1
-// One ray of each pixel, in the pixel's own lane: nothing waits, and nothing need be written down.
+// One ray of each pixel, in the pixel's own lane: no ray waits, and nothing has to be stored.
 typedef struct {
     ray r;
     crossing found;
@@ -113,7 +113,7 @@ INLINE crossing crossing_load(const scalar *numbers, int stride) {
 
 INLINE void batch_clear(batch *b) { b->count = 0; }
 
-// Adds one ray of each pixel; those that are not wanted have met nothing.
+// Adds one ray of each pixel; unwanted rays count as having met nothing.
 INLINE void batch_add(batch *b, int turn, ray r, real strength, mask wanted) {
     lanes_store(strength, b->strength + turn * LANES);
     ray_store(r, b->rays[0] + turn * LANES, BATCH_RAYS);

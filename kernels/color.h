@@ -40,7 +40,7 @@ INLINE color palette_color(real place, int repeat, __global const float *palette
             high[i][lane] = palette[3 * second + i];
         }
     }
-    // In loops of their own, which compilers make one instruction of.
+    // In separate loops, each of which compilers turn into one instruction.
     scalar mixed[3][LANES];
     for (int i = 0; i < 3; ++i) {
         for (int lane = 0; lane < LANES; ++lane) mixed[i][lane] = mix(low[i][lane], high[i][lane], share[lane]);

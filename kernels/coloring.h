@@ -8,7 +8,7 @@
 #define WAY_GROWTH R(0.5)        // steps that grow: this part of the way so far
 #define WAY_START R(0.015625)    // the first of them on the way to a layer, in full steps
 #define WAY_TOLERANCE R(1e-4)    // part of a full step to which a crossing is narrowed down
-// In footprints: how far behind a point of the surface the set may begin, and the first place to look. A distance of one
+// In footprints: how far behind a point of the surface the set may begin, and the first place to test. A distance of one
 // footprint, which is a hit, is a lower bound; rough fractals have their solid at three (median) to ten.
 #define ENTRANCE_REACH R(16.0)
 #define ENTRANCE_START R(0.0625)
@@ -27,7 +27,7 @@ INLINE gate way_until(int inward, vec from, vec direction, real begin, real shor
                       __constant const scalar *k) {
     gate met = {active & ~active, begin, (real)(REAL_LARGEST)};
     real t = begin;
-    // No finer than the number type tells places apart.
+    // Not finer than the resolution of the number type.
     const real size = fmax(fmax(fabs(from.x), fabs(from.y)), fabs(from.z));
     const real coarse = (real)(material->coloring_step) * WAY_TOLERANCE;
     for (int i = 0; i < material->coloring_tests; ++i) {
@@ -62,7 +62,7 @@ INLINE real set_thickness(vec point, vec direction, real cone, mask active, __co
             active = met.found;
             entrance = middle;
             begin = pick(active, met.beyond, R(0.0));
-            // At full steps at once: growing ones would find every pore behind the surface.
+            // Full steps from the start: growing steps would find every pore behind the surface.
             shortest = step;
             longest = step;
             farthest = begin + limit;

@@ -5,7 +5,7 @@
 // function of it can be inlined: each minimum becomes a call, which costs as much as ten minima and spills all registers. Worse,
 // a vector of 16 floats is passed in another way than such a function expects. The operations here are instructions everywhere.
 //
-// Only for packets, and where the compiler generates code for the processor directly. Others (of GPUs, of Intel's runtime)
+// Only for packets, and where the compiler generates code for the processor directly. Other drivers (of GPUs, and Intel's)
 // inline their own built-ins, and Oclgrind (INTERPRETED) does not know the operations.
 #if LANES != 1 && defined(__clang__) && defined(__has_builtin) && (defined(__x86_64__) || defined(__aarch64__)) && !defined(INTERPRETED)
 #define DIRECT_BUILT_INS
@@ -16,7 +16,7 @@
 #pragma clang diagnostic ignored "-Wpsabi"
 #define DIRECT static inline __attribute__((always_inline, overloadable))
 
-// Memory: vectors are loaded and stored where single numbers may lie.
+// Memory: vectors are loaded and stored at addresses that are aligned for single numbers only.
 #define DIRECT_MEMORY(type, width)                                                                                          \
     typedef type##width loose_##type##width __attribute__((aligned(sizeof(type))));                                         \
     DIRECT type##width direct_load##width(const __private type *p) { return *(const __private loose_##type##width *)p; }     \
@@ -33,7 +33,7 @@
     DIRECT_ORDER(type)                                                   \
     DIRECT type direct_clamp(type a, type low, type high) { return direct_min(direct_max(a, low), high); }
 
-// Real numbers: of two, fmin and fmax take the one that is a number.
+// Real numbers: if one of two is NaN, fmin and fmax give the other.
 #if __has_builtin(__builtin_elementwise_max) && __has_builtin(__builtin_elementwise_min)
 #define DIRECT_FMIN(a, b) __builtin_elementwise_min(a, b)
 #define DIRECT_FMAX(a, b) __builtin_elementwise_max(a, b)

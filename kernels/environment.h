@@ -1,4 +1,4 @@
-// Light from all around, infinitely far away: a picture with one row for each latitude and one column for each longitude,
+// Light from all directions, infinitely far away: a picture with one row for each latitude and one column for each longitude,
 // and tables to choose directions by its brightness (Pharr, Jakob, Humphreys, Physically Based Rendering, 3rd ed., 14.2.4).
 //
 // z is up. The top row looks at +z, the middle of the picture at +y, its right quarter at +x, its sides at -y: OpenEXR's
@@ -22,7 +22,7 @@ INLINE void environment_place(vec direction, __constant const struct Material *m
 }
 
 // The light that comes from a direction: pixels blended linearly, around the sides too; above the middle of the top row and
-// below that of the last one they go on as they are.
+// below the middle of the last row they are constant.
 INLINE color environment_color(vec direction, __constant const struct Material *m, __global const float *map) {
     const int width = m->environment_width, height = m->environment_height;
     const int rows = m->environment_rows, columns = m->environment_columns;

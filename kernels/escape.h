@@ -1,8 +1,8 @@
-// Escape of points of a plane: exact counts with no distances, and orbits that come back found early.
+// Escape of points of a plane: exact counts without distances, and early detection of periodic orbits.
 //
-// From the build: PERIOD_CHECK, applications between two looks for an orbit that came back, a multiple of the chain's cycle.
+// From the build: PERIOD_CHECK, applications between two tests for a periodic orbit, a multiple of the chain's cycle.
 
-// The bits of two numbers are the same: unlike `equal`, for zeros of either sign it tells them apart.
+// Whether two numbers have the same bits: unlike `equal`, this distinguishes +0 and -0.
 #if REAL_IS_DOUBLE
 #if LANES == 1
 #define same_bits(a, b) (-(as_long(a) == as_long(b)))
@@ -27,7 +27,7 @@ typedef struct {
 // A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
-// will do: an orbit that comes near itself may still escape. `periodicity` 0 leaves it, for comparison.
+// will do: an orbit that comes near itself may still escape. `periodicity` 0 skips this test, for comparison.
 INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, __constant const struct Orbit *orbit,
                             __constant const scalar *k) {
     state c, z;

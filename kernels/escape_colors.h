@@ -3,7 +3,7 @@
 #define CURVE_ROOT 1
 #define CURVE_LOG 2
 
-// (Planes in another renderer's picture have their colours beside their places.)
+// (For planes in another renderer's picture, the colours are stored with the planes.)
 #ifndef ESCAPE_COLORS
 #define ESCAPE_COLORS EscapeColors
 #endif

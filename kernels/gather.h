@@ -1,5 +1,5 @@
-// Loads from places that differ from lane to lane. Where the compiler generates x86 code directly it is told the instruction;
-// elsewhere lane after lane.
+// Loads from places that differ from lane to lane. Where the compiler generates x86 code directly, the instruction is named;
+// elsewhere lanes are loaded one after another.
 #if LANES == 1
 #define to_ints(a) ((int)(a))
 #define to_reals(a) ((real)(a))
@@ -7,7 +7,7 @@
 #define ints_store(value, array) ((array)[0] = (value))
 #define floats_load(array) ((array)[0])
 #elif REAL_IS_DOUBLE
-// As wide as masks are; in memory they are ints and floats all the same.
+// As wide as masks; in memory these are ints and floats.
 #define to_ints(a) JOIN(convert_long, LANES)(a)
 #define to_reals(a) JOIN(convert_double, LANES)(a)
 #define ints_load(array) to_ints(JOIN(vload, LANES)(0, array))

@@ -1,8 +1,8 @@
 // A grid of voxels in bricks: 8 x 8 x 8 cells between the middles of voxels, 9 x 9 x 9 samples, so that what lies in a cell is
-// found in one brick. `table` tells for each brick where it is stored, or, if nothing in it can be seen, -(1 + sides): for each
-// octant of directions three digits, 8 bits apart, that tell how far there is nothing: a cube of 1 << digits bricks a side that
-// begins with this one.
-// `blocks` tells of stored bricks which blocks of 2 x 2 x 2 cells may be seen.
+// found in one brick. `table` has for each brick the slot where it is stored, or, if nothing in it is visible, -(1 + sides).
+// `sides` has three digits, 8 bits apart, for each octant of directions: in it, a cube of 1 << digits bricks a side that
+// begins with this brick is empty.
+// `blocks` has for stored bricks the blocks of 2 x 2 x 2 cells that may be visible.
 #define BRICK_CELLS 8
 #define BRICK_SIDE 9
 #define BRICK_STRIDE 736   // samples from one brick to the next
@@ -24,7 +24,7 @@ typedef struct {
 } cell;
 
 // The cell that holds a point, given in voxels from the middle of the first; beyond the outermost middles the nearest goes on.
-// (What is not a number, in lanes without a ray, is in the last: nothing is read past the grid.)
+// (NaN, in lanes without a ray, belongs to the last cell, so that nothing is read past the grid.)
 INLINE cell cell_at(vec p, __constant const struct Grid *about) {
     const real x = least(most(p.x, R(0.0)), (real)((scalar)(about->sides[0] - 1)));
     const real y = least(most(p.y, R(0.0)), (real)((scalar)(about->sides[1] - 1)));
@@ -99,7 +99,7 @@ INLINE vec pool_normal(__global const uchar *normals, cell c, ints at) {
         const real across = (i & 1) ? c.u : R(1.0) - c.u, up = (i & 2) ? c.v : R(1.0) - c.v, deep = (i & 4) ? c.w : R(1.0) - c.w;
         const int further = (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
         const ints found = gather_ints((__global const int *)normals, at + further);
-        // 128 in all three says that there is none.
+        // 128 in all three components means that there is no normal.
         const real weight = pick(equal_ints(found & 0xffffff, (ints)(0x808080)), R(0.0), across * up * deep);
         sum = vec_along(sum, weight, vec_of(to_reals(found & 255), to_reals((found >> 8) & 255), to_reals((found >> 16) & 255)));
         all += weight;

@@ -1,6 +1,6 @@
-// How fast a device marches packets of LANES rays: those of a small picture, and shadow rays from what they meet. Nothing is
-// shaded or written but how far the rays went, so it compiles in a fraction of the time that a renderer takes; what a picture
-// costs is the same march.
+// Measures how fast a device marches packets of LANES rays: those of a small picture, and shadow rays from their hits. Nothing is
+// shaded, and only the rays' lengths are written, so it compiles in a fraction of a renderer's time; the time of a picture
+// is mostly that of the same march.
 #include "lanes.h"
 #include "numbers/real.h"
 #include "numbers/dual.h"

@@ -47,7 +47,7 @@ INLINE real distance_from_growth(real square, real relative, real count, __const
     const real counts_left = (real)((scalar)orbit->iterations) - count;
     const mask late = less(counts_left, R(12.0));
     if (any_lane(late)) {
-        // Lane by lane: a ray must not depend on its neighbours in the packet, or regions would differ from whole pictures.
+        // For each lane separately: if a ray depended on its neighbours in the packet, regions would differ from whole pictures.
         height -= pick(late, (real)(orbit->log_bailout) * exp2(-counts_left * (real)(orbit->log2_degree)), R(0.0));
     }
     const real distance = R(0.5) * height * relative;
@@ -55,12 +55,12 @@ INLINE real distance_from_growth(real square, real relative, real count, __const
     const real radius = sqrt(square);
     const real distance = (R(1.0) - (real)(orbit->solid_radius) / radius) * relative;
 #endif
-    // A derivative that overflowed says that the surface is nearer than the number type can tell.
+    // An overflow of the derivative means that the surface is nearer than the number type can resolve.
     return fmax(pick(is_nan(distance), R(0.0), distance), R(0.0));
 }
 
-// Whether the work was cancelled. Long orbits look now and then, or a launch could last as long as it likes: the host writes
-// there while kernels run, which reaches them where both share their memory. What such a launch leaves is thrown away.
+// Whether the work was cancelled. Long orbits test this now and then, or a launch could take arbitrarily long. The host writes
+// the record while kernels run; they see it if both share their memory. The results of a cancelled launch are discarded.
 #define ORBIT_LOOK 4096
 INLINE int orbit_cancelled(__constant const struct Orbit *orbit) {
     return *(volatile __constant const int *)&orbit->cancelled;

@@ -1,6 +1,6 @@
-// A pass over a packet's pixels, the same for every renderer: samples `first` to `end` are added to what earlier passes found.
+// A pass over a packet's pixels, the same for every renderer: adds samples `first` to `end` to the results of earlier passes.
 //
-// What a pixel has so far is kept on the device between passes, number for number, so that a picture has the same bits
+// The sums of a pixel are kept on the device between passes, unchanged, so that a picture has the same bits
 // however its samples are split. A renderer defines before this file: `world`, what its shots read, and
 //   shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost)
 // which takes one shot at (across, below), in pixels from each pixel's middle.
@@ -29,7 +29,7 @@ typedef struct {
     int mode;                       // PASS_KEEP, PASS_ADD or both
 } pass;
 
-// A number of a packet's pixels, brought from where it was kept, or taken there.
+// A number of a packet's pixels, loaded from the kept data or stored there.
 INLINE void kept_number(__global scalar *kept, __constant const int *slots, int number, int write, real *value) {
     if (slots[number] < 0) return;
     __global scalar *at = kept + slots[number] * TILE_PIXELS;

@@ -1,6 +1,6 @@
-// What the samples of a pixel add up to, for every renderer.
+// The sums over the samples of a pixel, for every renderer.
 
-// What one sample found.
+// The results of one sample.
 typedef struct {
     color radiance;       // over the background; premultiplied where that is transparent
     mask hit;             // of the rest: where anything was found
@@ -51,7 +51,7 @@ INLINE void pixel_add(pixel *p, shot s, mask active, real offset) {
 }
 
 #if ADAPTIVE
-// Adds a shot to what tells a pixel's noise: brightness as the eye sees it, the square root of luminance, and coverage.
+// Adds a shot to the sums for a pixel's noise: perceived brightness (the square root of luminance), and coverage.
 INLINE void noise_add(pixel *p, shot s, mask active) {
     const real luminance = R(0.2126) * s.radiance.r + R(0.7152) * s.radiance.g + R(0.0722) * s.radiance.b;
     const real seen = pick(active, sqrt(fmax(luminance, R(0.0))), R(0.0));
@@ -60,7 +60,7 @@ INLINE void noise_add(pixel *p, shot s, mask active) {
     p->coverage_square += pick(active, s.coverage * s.coverage, R(0.0));
 }
 
-// The standard error of a pixel's mean: of its brightness, or of its coverage if that is larger and is seen.
+// The standard error of a pixel's mean: of its brightness, or of its coverage if that error is larger and coverage is shown.
 INLINE real noise_of(const pixel *p, int transparent) {
     const real share = R(1.0) / p->shots;
     const real mean = p->brightness * share, coverage = p->coverage * share;
@@ -70,7 +70,7 @@ INLINE real noise_of(const pixel *p, int transparent) {
 }
 #endif
 
-// Writes a pixel's channels; `slots` tells for each its place among the wanted ones, or -1; `film` begins at the tile.
+// Writes a pixel's channels; `slots` has for each channel its place among the wanted ones, or -1; `film` begins at the tile.
 INLINE void pixel_write(__global float *film, __constant const int *slots, const int *place, const pixel *p) {
     const real share = R(1.0) / fmax(p->shots, R(1.0));
     write_channel(film, slots[CHANNEL_R], place, p->radiance.r * share);

@@ -1,4 +1,4 @@
-// Cut planes that stand in the picture of an object: quads coloured by escape counts, composited by depth; and those that cut,
+// Cut planes in the picture of an object: quads coloured by escape counts, composited by depth; and those that cut,
 // which take away what lies in front of them and show the formula's counts on the face.
 //
 // PLANES of them; `orbits` has the scene's own limits, then those of each plane.
@@ -18,8 +18,8 @@ typedef struct {
     real count;
 } plane_layers;
 
-// Cuts a ray to what the cutting planes leave; lanes with nothing left are not in the result. `face`: the plane at which a lane
-// now begins, or -1.
+// Cuts a ray to the part that the cutting planes leave; lanes without such a part are not in the result. `face`: the plane
+// at which a lane now begins, or -1.
 INLINE mask planes_cut(ray *r, real *face, plane_set set) {
     *face = R(-1.0);
     for (int i = 0; i < PLANES; ++i) {

@@ -1,5 +1,5 @@
-// Asked of every driver before anything else runs on it: does it compile packets of LANES lanes, and are the results right, those
-// of loops whose lanes leave at different times too? Each work-item takes LANES points of a plane through the
+// Runs on every driver before anything else: does it compile packets of LANES lanes, and are the results right, even in
+// loops whose lanes end at different times? Each work-item takes LANES points of a plane through the
 // Mandelbulb of power 8 (White and Nylander's rule, polynomial form) and counts applications until it escapes; the second
 // kernel calls every built-in function that the number types use, because some drivers lack a few for wide vectors; the
 // third those with several ways of evaluation, in packets whose lanes need different ones (see repairs.h).

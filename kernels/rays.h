@@ -1,9 +1,9 @@
 #include "camera.h"
 
-// A march by the Jacobian has evaluated the surface's normal when it arrives.
+// A march by the Jacobian already knows the surface's normal when it arrives.
 #define MARCH_KEEPS_SURFACE (SEARCH == SEARCH_DISTANCE && !HAS_DERIVATIVE && !POLISH)
 
-// What a march finds.
+// The result of a march.
 typedef struct {
     mask hit;
     real t;       // distance along the ray; of a hit, a point still outside the solid
@@ -55,7 +55,7 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
     return c;
 }
 
-// What a march is after (see march.h and march_steps.h).
+// The goal of a march (see march.h and march_steps.h).
 #define GOAL_SURFACE 0
 #define GOAL_SHADOW 1
 #define GOAL_TOUCH 2

@@ -1,4 +1,4 @@
-// Random numbers and what is made of them: places in a pixel, on a disk, in a cone, on a hemisphere.
+// Random numbers and their uses: places in a pixel, on a disk, in a cone, on a hemisphere.
 //
 // Every random number is half of a point of one two-dimensional sequence, `unit_square(index, seed)`. The seed is a hash of
 // the pixel's place in the picture and of the purpose, so that neither tiles nor the order of work change a picture.
@@ -22,7 +22,7 @@ typedef JOIN(uint, LANES) bits;
 #endif
 #endif
 
-// Purposes: sequences of the same pixel that know nothing of each other. Lights count on from PURPOSE_LIGHT.
+// Purposes: independent sequences of the same pixel. Lights are numbered from PURPOSE_LIGHT on.
 #define PURPOSE_PIXEL 0u
 #define PURPOSE_POINTS 1u
 #define PURPOSE_LENS 2u

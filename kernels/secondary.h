@@ -8,7 +8,7 @@ INLINE color limited(color c, __constant const struct March *settings) {
 }
 
 #if HAS_SOFT_LIGHT
-// The direction to the part of a light that this ray looks at; `toward` leads to its middle.
+// The direction to the part of a light that this ray goes to; `toward` is the direction to its middle.
 INLINE vec soft_light(vec toward, __constant const struct Light *light, int light_index, int turn, int sample,
                       const int *columns, const int *rows, int bounce, world w) {
     const bits seed = pixel_seed(columns, rows, (uint)w.settings->seed,
@@ -51,7 +51,7 @@ INLINE incidence ambient_ray(const spot *here, int turn, int sample, const int *
     return in;
 }
 
-// What the ray brings from the environment; counts towards the open part of the hemisphere.
+// The light that the ray brings from the environment; the ray also counts towards the open part of the hemisphere.
 INLINE color ambient_light(const spot *here, int turn, incidence in, crossing met, world w, real *open) {
     if (turn < w.settings->cosine_rays) {
         const mask near = met.hit & less(met.t, (real)(w.settings->occlusion_distance));

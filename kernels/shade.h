@@ -38,7 +38,7 @@ INLINE real highlight_of(real x, scalar shininess) {
     return power;
 }
 
-// What one light adds. `lit` is s of Eq. 5; `open` is the part of the hemisphere that is free, which the ambient part is worth;
+// The light that one light adds. `lit` is s of Eq. 5; `open` is the unblocked part of the hemisphere, a factor on the ambient part;
 // `to_viewer` has length 1.
 INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
                    __constant const struct Light *light, __constant const struct Material *material) {

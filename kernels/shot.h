@@ -18,7 +18,7 @@ INLINE int stage_turns(int stage, __constant const struct March *settings) {
     return stage == STAGE_LIGHT ? settings->light_count * settings->light_rays : 1;
 }
 
-// The turn after this one: some lights need fewer rays than the one that needs most.
+// The turn after this one: some lights need fewer rays than others.
 INLINE int next_turn(int stage, int turn, world w) {
     if (stage != STAGE_LIGHT) return turn + 1;
     const int light = turn / w.settings->light_rays;
@@ -56,7 +56,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
     ray path = eye_ray;
     mask on_path = wanted;
 #if PLANES > 0
-    // Where a cutting plane lays the set bare, its face is what is seen.
+    // Where a cutting plane opens the set, its face is visible.
     real face, face_count = R(0.0);
     color face_tint = seen;
     vec face_normal = none;
@@ -135,7 +135,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
         }
         batch_run(&rays, goal, w.settings, w.orbit, w.k);
 
-        // What they tell.
+        // The results of these rays.
         ray leg = path;
         crossing met = nothing_met(R(0.0));
         vec normal = none;

@@ -1,8 +1,8 @@
-// What a shot reads, the spot of the surface that it finds, and what is known and seen there.
+// The data that a shot reads, the spot of the surface that it finds, and the spot's properties.
 #define COLORING_PER_POINT \
     (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
 
-// What a shot reads, in one place.
+// All data that a shot reads.
 typedef struct {
     __constant const struct View *view;
     __constant const struct March *settings;
@@ -28,7 +28,7 @@ typedef struct {
     color tint;
 } spot;
 
-// What is seen where nothing is hit, by rays from the eye (`mirrored` 0) and by mirrored ones.
+// The background where nothing is hit, for rays from the eye (`mirrored` 0) and for mirrored ones.
 INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
 #if HAS_ENVIRONMENT
     if (mirrored || w.material->environment_seen) return environment_color(direction, w.material, w.environment);
@@ -81,7 +81,7 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
     *smooth = smooth_count(there.end, surface, w.orbit);
 }
 
-// Whether any normal of the spot looks that way. (Were it the mean alone, a rough spot's other normals would go without shadow.)
+// Whether any normal of the spot faces that way. (With the mean normal only, a rough spot's other normals would have no shadow.)
 INLINE mask faces(const spot *s, vec direction) {
     mask any_normal = less(R(1.0), R(0.0));
     for (int i = 0; i < NORMAL_COUNT; ++i) {
@@ -90,7 +90,7 @@ INLINE mask faces(const spot *s, vec direction) {
     return any_normal;
 }
 
-// What one light ray adds, for every normal of the spot.
+// The light that one light ray adds, for every normal of the spot.
 INLINE color lit_by(const spot *s, incidence in, mask lit, real open, vec to_viewer, __constant const struct Light *light,
                     __constant const struct Material *material) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));

@@ -1,4 +1,4 @@
-// Rays through a grid: what they read, where they enter and leave, and what values look like.
+// Rays through a grid: the data that they read, where they enter and leave, and the transfer function.
 typedef struct {
     __constant const struct View *view;
     __constant const struct Volume *settings;

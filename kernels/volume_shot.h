@@ -87,7 +87,7 @@ typedef struct {
     mask found, on_plane, half_way;   // the last: where it was met by what came last
 } sight;
 
-// What stops a part `opacity` of the light comes into sight; gives the part of its own light that arrives.
+// A place with the given `opacity` becomes visible; returns the part of its own light that reaches the eye.
 INLINE real sight_pass(sight *s, real opacity, real t, real value, mask adds) {
     const real weight = pick(adds, s->through * opacity, R(0.0));
     s->through = pick(adds, s->through * (R(1.0) - opacity), s->through);
@@ -99,7 +99,7 @@ INLINE real sight_pass(sight *s, real opacity, real t, real value, mask adds) {
     return weight;
 }
 
-// The same with its light and normal.
+// The same, with the place's light and normal.
 INLINE void sight_add(sight *s, color light, real opacity, real t, real value, vec normal, mask of_plane, mask adds) {
     const real weight = sight_pass(s, opacity, t, value, adds);
     s->light = color_pick(adds, color_add(s->light, color_scale(light, weight)), s->light);
@@ -120,7 +120,7 @@ INLINE void sight_quads(sight *s, real until, mask active, const plane_hits *hit
 #endif
 
 #if !SURFACE
-// A place that is seen, not lit yet.
+// A visible place that is not lit yet.
 #define PENDING 4
 typedef struct {
     real number, value, weight;
@@ -134,7 +134,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     ray kept = r;
     mask active = wanted;
 #if PLANES > 0
-    // Where a cutting plane lays the set bare, its face is what is seen.
+    // Where a cutting plane opens the set, its face is visible.
     real face, face_count = R(0.0);
     color face_tint = color_of(R(0.0), R(0.0), R(0.0));
     vec face_normal = to_viewer;

@@ -1,4 +1,4 @@
-// Voxels as the fill evaluates them: bricks of 8 x 8 x 8, each voxel in one brick only (what is stored has a ninth layer).
+// Voxels as the fill evaluates them: bricks of 8 x 8 x 8, each voxel in one brick only (stored bricks have a ninth layer).
 //
 // From the build: FILL_INSIDE, FILL_COVERAGE, FILL_ITERATIONS and which of them FILL_KIND is; SAMPLE, the type of a value;
 // CHUNK, applications between two looks at a packet, a multiple of the chain's cycle.
@@ -53,8 +53,8 @@ INLINE uint lanes_bits(mask m) {
     return bits;
 }
 
-// Which points belong to the solid: as `orbit_inside` at the iteration limit, in fewer operations. Lanes that escaped go on
-// unheeded, and packets are looked at every few applications. An orbit that comes back to the very same z never escapes
+// Which points belong to the solid: as `orbit_inside` at the iteration limit, in fewer operations. Lanes that escaped continue
+// without effect, and packets are tested every few applications. An orbit that comes back to the very same z never escapes
 // (Brent 1980, "An improved Monte Carlo factorization algorithm", sec. 2: compare with a z that is renewed at powers of two).
 INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const mask all_lanes = equal(R(0.0), R(0.0));

@@ -1,4 +1,4 @@
-// What is stored of a grid: bricks of 9 x 9 x 9 samples with their normals. One work-item takes one brick.
+// The stored part of a grid: bricks of 9 x 9 x 9 samples with their normals. One work-item takes one brick.
 //
 // From the build besides what voxels_bricks.h needs: VALUE, the type of a stored value, and VALUE_BYTES; NORMALS, whether
 // normals are wanted; RADIUS of the low-pass filter before them, voxels.
@@ -13,7 +13,7 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
     if (brick >= count) return;
     const near_bricks around = near_bricks_of(bricks[brick], numbers, extent);
 #if SOURCE == SOURCE_BITS
-    // Most are told by the voxels that are their own.
+    // For most bricks their own voxels are enough.
     __global const uchar *bytes = samples + brick * 64;
     uchar16 least = vload16(0, bytes), most = least;
     for (int i = 1; i < 4; ++i) {

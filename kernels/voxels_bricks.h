@@ -15,7 +15,7 @@
 #define PLACE_Y(place) ((int)(((place) >> 21) & 0x1fffff))
 #define PLACE_Z(place) ((int)((place) >> 42))
 
-// A driver that cannot inline interprets: see lanes.h.
+// Drivers that interpret cannot inline: see lanes.h.
 #ifdef INTERPRETED
 #define INLINE static inline
 #else

@@ -44,7 +44,7 @@ INLINE int surface_samples(__global const uint *normals, ushort *list) {
             const bool within = min(min(cell_x, cell_y), cell_z) >= 0 && max(max(cell_x, cell_y), cell_z) < BRICK;
             wanted |= within && mixed[within ? cell_x + BRICK * (cell_y + BRICK * cell_z) : 0];
         }
-        // Without a direction to look along there is nothing to find.
+        // Without a direction for the search nothing can be found.
         if (wanted && (normals[sample] & 0xffffff) != 0x808080) list[count++] = (ushort)sample;
     }
     return count;

@@ -65,7 +65,7 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
     try:
         work = app(list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False)
     except Exception as error:
-        # Typer's own errors: their classes move between its versions, this method of theirs stays.
+        # Typer's own errors: their classes differ between its versions, but all have this method.
         tell = getattr(error, "format_message", None)
         if tell is None:
             raise
@@ -73,7 +73,7 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
         text = " ".join(str(tell()).split()).rstrip(".")
         shell.refuse(f"{command}: {text}; see {command} --help")
         return STATUS_BAD_INPUT
-    if work == STATUS_INTERRUPTED:  # what Typer makes of Ctrl-C
+    if work == STATUS_INTERRUPTED:  # Typer's status for Ctrl-C
         raise KeyboardInterrupt
     if callable(work):
         work()

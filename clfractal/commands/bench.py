@@ -89,7 +89,7 @@ ROWS: dict[str, tuple[str, tuple[str, ...], int]] = {
     "hast2-volume512-surface": (VOLUME, ("renderer.transfer={}",), REPETITIONS),
     "hast2-plane256": (PLANE, (), REPETITIONS),
 }
-# Rows that are no frames: filling the grid of row 5, and the whole program.
+# Other rows: filling the grid of row 5, and the whole program.
 GRID_ROW, SHELL_ROW = "hast2-grid512", "shell-to-png"
 
 

@@ -81,7 +81,7 @@ def _new_bar(shell: Shell, tiles: int) -> Bar:
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn
     from rich.progress import Progress as Bar
 
-    # Refreshed by hand: a thread that draws while Ctrl-C is being answered would spoil the line.
+    # Refreshed by hand: a drawing thread would spoil the message while Ctrl-C is handled.
     bar = Bar(
         TextColumn("rendering"),
         BarColumn(),

@@ -30,7 +30,7 @@ def render_scene(order: Order, shell: Shell) -> None:
     shell.mute_drivers()
     scene = ordered_scene(order)
     outputs = _outputs(order, scene)
-    # Imported only now: a mistake in the input is told without waiting for OpenCL.
+    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands import stats
     from clfractal.commands.unfinished import Unfinished
     from clfractal.pictures.outputs import output_files

@@ -71,7 +71,7 @@ class Shell:
             sys.stdout.write(text if text.endswith("\n") else text + "\n")
             sys.stdout.flush()
         except BrokenPipeError:
-            # The reader has seen enough, as `head` does; the rest is written to nobody.
+            # The reader closed the pipe, as `head` does; the rest of the output is dropped.
             with suppress(OSError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         except OSError as error:

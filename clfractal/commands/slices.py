@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from clfractal.work.job import Job
 
 MOST_SLICES = 100_000
-# Pictures beyond this are kept on disk until they are whole, bytes.
+# Pictures larger than this are kept on disk until they are complete, bytes.
 _IN_MEMORY = 1 << 28
 _LINE_SECONDS = 2.0
 
@@ -61,7 +61,7 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     files = [_numbered(order.outputs, number, stack.count) for number in numbers]
     _check_files(order, scene, files)
     scenes = [slice_scene(scene, stack, number) for number in numbers]
-    # Imported only now: a mistake in the input is told without waiting for OpenCL.
+    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.work.engine import Engine
 
     engine = Engine(order.device, tell=shell.say)

@@ -150,7 +150,7 @@ def fill(order: GridOrder, scene: Scene, shell: Shell) -> tuple[Grid, Job, Devic
         ClfractalError: it does not fit; the device failed.
     """
     assert isinstance(scene.renderer, VolumeRenderer)
-    # Imported only now: a mistake in the input is told without waiting for OpenCL.
+    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.device.select import choose
     from clfractal.scene.checks import used_boxes
     from clfractal.voxels.fill import FillProgress, fill_grid
@@ -211,7 +211,7 @@ def grid_volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
     assert isinstance(settings, VolumeRenderer)
     corner, spacing = np.array(grid.corner), np.array(grid.spacing)
     texts = {
-        # In one line, and without a colon before a space: VTK's reader takes what stands before one for a field.
+        # One line, and no colon before a space: VTK's reader would take the text before it for a field's name.
         SCENE_KEY: _one_line(job.resolved()),
         COLORING_KEY: _one_line(coloring.model_dump(mode="json")),
         "value": settings.value,

@@ -1,4 +1,4 @@
-"""Finds, in the logs that OpenCL compilers write, what is wrong and where in our own files."""
+"""Finds the errors in OpenCL compilers' logs, and their places in our own files."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Diagnostic:
 
 
 def diagnostics(log: str) -> list[Diagnostic]:
-    """The errors in a compiler's log, in its order; warnings and notes are left out."""
+    """The errors in a compiler's log, in the log's order, without warnings and notes."""
     return list(_parse(log))
 
 

@@ -1,7 +1,7 @@
 """The user's cache folder: compiled programs, and facts measured once per device and driver.
 
-A cache is never needed: whatever goes wrong with it (no space, no permission, a damaged file) is answered by
-doing the work again, so nothing in this file raises for the state of the disk.
+The cache is optional: if it fails (no space, no permission, a damaged file), the work is
+done again. So no function here raises an error because of the disk.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def folder() -> Path:
 
 
 def key_of(*parts: object) -> str:
-    """A name for everything `parts` says: SHA-256 of their JSON text, in hexadecimal."""
+    """A name that identifies `parts`: SHA-256 of their JSON text, in hexadecimal."""
     return hashlib.sha256(json.dumps(parts, sort_keys=True, default=str).encode()).hexdigest()
 
 
@@ -57,7 +57,7 @@ def load_blob(key: str) -> bytes | None:
 
 
 def store_blob(key: str, payload: bytes) -> None:
-    """Keep `payload` under `key`. Readers see the whole of it or nothing."""
+    """Keep `payload` under `key`. Readers see all of it or nothing."""
     path = _blob_path(key)
     try:
         _replace(path, _MAGIC + hashlib.sha256(payload).digest() + payload)

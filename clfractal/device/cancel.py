@@ -1,4 +1,4 @@
-"""Cancelling: a token that any thread may set and everything that takes long looks at."""
+"""Cancelling: a token that any thread may set, and that all long work checks."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from clfractal.errors import Stopped
 
 
 class CancelToken:
-    """Asks work to end. Launches under way are waited for, nothing more is started, builds are left."""
+    """Asks work to end: running launches are waited for, nothing more is started, and builds are abandoned."""
 
     def __init__(self) -> None:
         self._set = threading.Event()
 
     def cancel(self) -> None:
-        """Asks for the end; from any thread, as often as one likes."""
+        """Asks work to end; may be called from any thread, any number of times."""
         self._set.set()
 
     @property
     def cancelled(self) -> bool:
-        """Whether somebody asked."""
+        """Whether `cancel` was called."""
         return self._set.is_set()
 
     def __call__(self) -> bool:
-        """The same, as a function that what waits for something else may ask."""
+        """The same, as a function to pass to code that waits."""
         return self._set.is_set()
 
     def check(self) -> None:
-        """Raises Stopped if somebody asked."""
+        """Raises Stopped if `cancel` was called."""
         if self._set.is_set():
             raise Stopped

@@ -1,11 +1,11 @@
 """The child process that talks to drivers which may abort: `python -m clfractal.device.child DESCRIPTOR`.
 
-It takes one job after the other, since starting a driver takes longer than many a compilation. A line on standard input
+It takes one job after the other, because starting a driver takes longer than many compilations. A line on standard input
 names a folder that holds `request.json`; the answer goes into `answer.json` there, and a line into the pipe DESCRIPTOR. A
 job is a function of one argument, the request, that returns JSON data; it may leave files there. Nothing is printed:
 what appears on the standard streams comes from the driver, and goes into the folder's `driver.log`.
 
-It ends by itself when nothing is asked for some seconds, when its parent ends, and after a job that failed.
+It ends when there is no request for some seconds, when its parent ends, and after a failed job.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from clfractal.errors import ClfractalError
 REQUEST, ANSWER, NOISE = "request.json", "answer.json", "driver.log"
 DONE = b"done\n"
 
-# It holds some 200 MB of the compiler's: not for long.
+# The process holds some 200 MB of the compiler's memory, so it does not wait long.
 IDLE_S = 10.0
-# A compiler keeps something of all that it has compiled.
+# Jobs of one child: a compiler's memory grows with every compilation.
 MOST_JOBS = 20
 
 # A stand-in for a broken driver: the child aborts if its request contains this variable's text.
@@ -54,7 +54,7 @@ def main() -> None:
 
 
 def _next_folder() -> Path | None:
-    """Where the next request is; None if there is none for long, or never will be."""
+    """The folder of the next request; None if there is none for some time, or the parent has ended."""
     if not select.select([0], [], [], IDLE_S)[0]:
         return None
     # The parent writes a line at once, and no other before it is answered.
@@ -89,7 +89,7 @@ def _die_with(parent: int) -> None:
     """Ask the kernel to kill this process when its parent ends, however that happens (Linux)."""
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
-    if os.getppid() != parent:  # it ended before the question was asked
+    if os.getppid() != parent:  # the parent ended before the call above
         os._exit(1)
 
 

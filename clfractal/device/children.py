@@ -1,7 +1,7 @@
 """The processes that `isolate` sends jobs to: one pool of them for the whole process.
 
 A child takes one job after another, from any thread, and ends by itself when it has had none for some seconds. There are
-as many at a time as there are processors; who finds none free waits. All of them end with this process.
+at most as many children as processors; a caller waits if none is free. All of them end with this process.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from clfractal.device.child import DONE
 from clfractal.errors import DeviceError, Stopped
 
 POLL_S = 0.01
-"""How often somebody who waits asks whether to stop."""
+"""Seconds between checks whether a waiting caller should stop."""
 _SWEEP_S = 1.0  # how often children that have ended by themselves are looked for
 
 
 class EndedError(Exception):
-    """A child had ended before it could take the job, by itself or by somebody's hand: another one can do it."""
+    """A child ended before it could take the job, by itself or because it was killed; another child can take the job."""
 
 
 class Child:
-    """A process that waits for jobs, with a pipe to send them and one that tells when they are done."""
+    """A process that waits for jobs, with one pipe for sending jobs and one for their completion."""
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         self.environment = dict(environment)
@@ -40,14 +40,14 @@ class Child:
         reading, writing = os.pipe()
         try:
             self.process = subprocess.Popen(
-                # -P: the folder the user happens to be in is no place to import from.
+                # -P: nothing is imported from the current folder.
                 [sys.executable, "-P", "-m", "clfractal.device.child", str(writing), str(os.getpid())],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 env=self.environment,
                 pass_fds=[writing],
-                # A Ctrl-C at the terminal goes to this process alone, which then decides.
+                # Ctrl-C at the terminal must reach only this process, which then decides about its children.
                 start_new_session=True,
                 bufsize=0,
             )
@@ -62,11 +62,11 @@ class Child:
         """Send the job in `folder` and wait until it is done.
 
         Returns:
-            0 once it is; else the child's exit status, negative for a signal; None if it takes too long.
+            0 when the job is done; else the child's exit status, negative for a signal; None if it takes too long.
 
         Raises:
             EndedError: the child had ended before.
-            Stopped: `stopped` answered that nobody wants the result any more.
+            Stopped: `stopped` returned True.
         """
         self.jobs += 1
         sent = self._send(os.fsencode(folder) + b"\n")
@@ -101,14 +101,14 @@ class Child:
         return self.process.poll() is not None
 
     def kill(self) -> None:
-        """End it, whatever it does; who waits for its answer is told so."""
+        """End it, whatever it does; a thread that waits for its answer then gets an error."""
         if not self.has_ended():
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
 
     def end(self) -> None:
-        """End it and close its pipes; only for who holds it alone."""
+        """End it and close its pipes; the caller must be the only one to use it."""
         self.kill()
         self.close()
 
@@ -122,7 +122,7 @@ class Child:
 
 
 class Lease:
-    """What somebody holds who asks for a child. It is filled by the pool, so that an interrupt loses no child."""
+    """A caller's hold on a child. The pool fills it in, so that an interrupt cannot lose a child."""
 
     def __init__(self) -> None:
         self.child: Child | None = None
@@ -191,12 +191,12 @@ class Children:
             child.kill()
 
     def forget(self) -> None:
-        """Close the pipes in a process that was forked off: the children are its parent's."""
+        """Close the pipes in a forked process, because the children belong to its parent."""
         for child in [*self._idle, *(lease.child for lease in self._leases if lease.child is not None)]:
             child.close()
 
     def _drop_useless(self, environment: Mapping[str, str]) -> None:
-        """Without those that have ended, or whose drivers were told something else when they started."""
+        """Remove children that have ended, or that were started with another environment."""
         useless = [each for each in self._idle if each.has_ended() or each.environment != dict(environment)]
         for child in useless:
             self._idle.remove(child)
@@ -230,7 +230,7 @@ class Children:
             with self._changed:
                 if child is not None and lease in self._leases:
                     lease.child = child
-                elif child is not None:  # whoever ordered it waits no longer
+                elif child is not None:  # the caller that ordered it no longer waits
                     self._idle.append(child)
                 self._changed.notify_all()
 

@@ -20,7 +20,7 @@ import pyopencl as cl
 from clfractal.device.select import Device, by_key, is_pocl
 
 BINARY = "binary"  # the file that `compile_job` leaves
-# In the place of a binary: the driver keeps the machine code, and finds it again by the program's text.
+# Stored instead of a binary: the driver has its own cache, and finds the machine code by the program's text.
 KEPT_BY_DRIVER = b"kept by the driver"
 
 ArgumentKind = Literal["buffer", "scalar", "bytes", "local"]
@@ -68,7 +68,7 @@ class Warm:
 
     @staticmethod
     def from_data(data: Mapping[str, Any]) -> Warm:
-        """The recipe from what `as_data` gave."""
+        """The recipe from the result of `as_data`."""
         local = data["local_size"]
         return Warm(
             data["kernel"],
@@ -102,7 +102,7 @@ def load_binary(device: Device, binary: bytes, flags: Sequence[str]) -> Any | No
 
 
 def load_kept(device: Device, binary: bytes, text: str, flags: Sequence[str]) -> Any | None:
-    """The program from what `binary_of` gave; None if the driver refuses it."""
+    """The program from the result of `binary_of`; None if the driver refuses it."""
     if binary != KEPT_BY_DRIVER:
         return load_binary(device, binary, flags)
     try:
@@ -127,7 +127,7 @@ def binary_of(device: Device, program: Any) -> bytes:
 
 
 def warm_up(device: Device, program: Any, warm: Warm) -> None:
-    """Perform the first launch and wait for it.
+    """Run the first launch and wait for it.
 
     Raises:
         DeviceError: the launch failed.

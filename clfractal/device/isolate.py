@@ -1,7 +1,7 @@
 """Runs a job in a child process, so that a driver which aborts or hangs takes nothing else with it.
 
-LLVM, inside most CPU drivers, answers some inputs by aborting the process. The parent only waits, so it can
-also be interrupted, or told to stop, at any moment of a long compilation. `children.py` keeps the children.
+LLVM, which most CPU drivers contain, aborts the process for some inputs. The parent only waits, so it can
+be interrupted or cancelled at any moment of a long compilation. `children.py` keeps the children.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def run(
             keys `device` (see `select.by_key`), `folder` (where files may be left), `doing` and `job`.
         device: the device the job will use.
         arguments: JSON data.
-        doing: what goes on, for messages: `building`.
+        doing: the activity, for messages, such as `building`.
         timeout_s: seconds after which the child is killed.
         folder: a folder for request, answer and files; a temporary one if None.
         stopped: asked at least every 20 ms while the child works, in the thread that called; once it answers True
@@ -84,7 +84,7 @@ def run(
 
 
 def end_children() -> None:
-    """End the children that wait for jobs, and those that work: the next job gets a new one."""
+    """End all children, idle or working; the next job starts a new one."""
     children.pool.close()
 
 

@@ -1,4 +1,4 @@
-"""Long work in launches: each short enough for a display's watchdog, and for an interrupt to be answered."""
+"""Splits long work into launches that are short enough for a display's watchdog and for quick interrupts."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ BUDGET_SECONDS = 0.1
 IN_FLIGHT = 2
 # A launch grows at most by this factor over the one before: what follows may be much heavier.
 GROWTH = 3.0
-# Longest sleep between looks at a launch; an interrupt is seen then.
+# Longest sleep between checks of a launch; an interrupt is noticed after it.
 POLL_SECONDS = 0.0005
-# PoCL makes other code for more in one dimension.
+# With more work-items in one dimension PoCL compiles the kernel again.
 MOST_GROUPS = 32_768
 
 T = TypeVar("T")
@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Part(Generic[T]):
-    """A launch on its way: the event that ends it, how much of the work it is, and what the caller wants to know of it."""
+    """A launch that is under way: its event, its amount of work, and data that the caller gets back with it."""
 
     event: cl.Event
     amount: float
@@ -42,7 +42,7 @@ class Part(Generic[T]):
 
 @dataclass(slots=True)
 class Pace:
-    """How much work a launch takes to last as long as it should; what is learned serves the next picture, too.
+    """How much work a launch gets, so that it takes the wanted time; measured speeds also serve the next picture.
 
     Attributes:
         size: work of the next launch, in units of the caller's.
@@ -58,7 +58,7 @@ class Pace:
     slowest: float | None = None
 
     def begin(self) -> None:
-        """Starts over with what is safe for the heaviest work so far: what came last may have been light."""
+        """Starts again with a size that is safe for the heaviest work so far, because the last work may have been light."""
         if self.slowest is not None:
             self.size = float(np.clip(self.slowest * self.seconds, self.least, self.most))
 
@@ -101,15 +101,15 @@ def in_launches(
     token: CancelToken | None = None,
     watched: Sequence[Watched] = (),
 ) -> Iterator[tuple[T, float]]:
-    """Runs work in launches, two of them under way at a time, and gives what `enqueue` told of each with its milliseconds.
+    """Runs work in launches, two at a time, and yields the data that `enqueue` gave for each, with its milliseconds.
 
-    However it is left (to the end, by an error, an interrupt, or because the caller stops asking), the device is idle then.
+    Afterwards the device is idle, however it ends (completed, by an error, an interrupt, or because the caller stops).
 
     Args:
         enqueue: starts the next part, of at most the given amount; None if there is nothing more to do.
         pace: sizes the launches, and learns from them.
         token: ends the work.
-        watched: records of the kernel's that make launches under way end early, where that can be.
+        watched: records that can make the kernel's running launches end early, if the device allows it.
 
     Raises:
         DeviceError: a launch failed.
@@ -141,7 +141,7 @@ def in_launches(
 
 
 def _end(flying: Iterable[Part[T]], device: Device, doing: str, watched: Sequence[Watched]) -> None:
-    """Waits until launches under way are over, sooner where they look whether somebody does."""
+    """Waits until running launches end; launches that watch a record are told to end early."""
     for records in watched:
         records.cancel(True)
     try:

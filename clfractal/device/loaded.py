@@ -1,4 +1,4 @@
-"""Programs that are in a device's memory, so that what was built once is not looked for on the disk again."""
+"""Programs that are loaded on a device, so that they are not read from the disk again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _MOST = 64
 
 
 class BuildTime:
-    """How long programs have been built for a device in all: time in which several were counts once."""
+    """The total time of building programs for a device; overlapping builds count once."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

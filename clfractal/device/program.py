@@ -22,7 +22,7 @@ from clfractal.device.structs import Precision
 
 BUILD_TIMEOUT_S = 600.0
 
-_REMARK_SECONDS = 1.5  # longer than a refusal takes: an error stays alone on its line
+_REMARK_SECONDS = 1.5  # longer than a failing build takes, so that no remark precedes an error
 _FORMAT = 3  # of what is kept under a key
 
 
@@ -46,10 +46,10 @@ class Program:
 
 
 def math_flags(precision: Precision) -> tuple[str, ...]:
-    """What compilers may assume, by number type. None lets them assume that numbers are finite.
+    """Compiler flags by number type. None of them allows compilers to assume that numbers are finite.
 
     float32 may fuse a*b+c with either rounding, and denormal numbers, which no picture shows, may become
-    zero. float64 must keep them apart: it exists for small differences.
+    zero. float64 must keep denormal numbers, because it is used for small differences.
     """
     flags: dict[Precision, tuple[str, ...]] = {
         "float32": ("-cl-std=CL1.2", "-cl-mad-enable", "-cl-denorms-are-zero"),
@@ -72,14 +72,14 @@ def build(
     """The program of one flat text, from the cache or the driver's compiler.
 
     Args:
-        device: where it shall run.
+        device: the device that runs it.
         text: the whole program, with `#line` directives (see `source.flatten`).
         flags: all compiler flags (see `math_flags`).
         sources: the texts that the `#line` directives name, for messages.
         warm: a first launch to perform before the binary is kept, so that later runs start at once.
         isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
             an interrupt is answered at once.
-        on_compile: told a line, from another thread, if compiling takes more than a moment.
+        on_compile: called with a message, from another thread, if compiling takes more than a moment.
         stopped: asked at least every 20 ms while a child process compiles; it ends the child by answering True.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Which OpenCL devices there are, what is peculiar about each, and which one to take.
+"""Finds OpenCL devices, knows their peculiarities, and chooses one.
 
 `Device` wraps a device with its context and queue, so that only code that owns buffers has to import
 pyopencl.
@@ -34,7 +34,7 @@ _INSTALL_HINT = (
 
 @dataclass(frozen=True, slots=True)
 class DeviceInfo:
-    """What is known of a device without opening it. Memory is in bytes."""
+    """The data of a device that are known without opening it. Memory is in bytes."""
 
     index: str
     """Platform and device number as in `--device 0:0`, both counted from 0 in the loader's order."""
@@ -118,7 +118,7 @@ class Device:
             return cl.Buffer(self.context, flags, max(int(nbytes), 16))
 
     def check_memory(self, total: int, what: str, *, largest: int = 0) -> None:
-        """Refuse work whose buffers, `total` bytes and the `largest` of them, cannot fit on the device.
+        """Refuse work whose buffers, with `total` bytes and the `largest` one, do not fit on the device.
 
         Raises:
             DeviceError: status 2, with the memory needed and available.
@@ -136,7 +136,7 @@ class Device:
 
     @contextmanager
     def failures(self, doing: str, *, need: int | None = None) -> Iterator[None]:
-        """Turn pyopencl's exceptions into DeviceError: status 2 for want of memory, else 3."""
+        """Turn pyopencl's exceptions into DeviceError: status 2 if memory is missing, else 3."""
         try:
             yield
         except cl.Error as error:
@@ -180,7 +180,7 @@ def choose(spec: str | None = None, *, properties: Sequence[tuple[Any, Any]] = (
         raise _nothing_fits(found, spec)
     speeds = cache.recall(SPEEDS)
     if any(device.info.key not in speeds for device in fitting):
-        speeds = {}  # a measured device beside one that was never measured says nothing
+        speeds = {}  # speeds count only if all these devices were measured
     best = max(fitting, key=lambda device: _score(device.info, speeds))
     return best.reopened(properties) if properties else best
 
@@ -240,8 +240,8 @@ def vectorises_across_work_items(info: DeviceInfo) -> bool:
 def sees_host_writes(info: DeviceInfo) -> bool:
     """Whether a running kernel sees what the host writes into a buffer made of the host's own memory.
 
-    Processors do: their drivers use that memory in its place (tried with PoCL 3.0 and 3.1). The standard promises nothing,
-    so only the wish to end early is told that way.
+    Processors do: their drivers use that memory directly (tried with PoCL 3.0 and 3.1). The standard guarantees nothing,
+    so this is only used to ask kernels to end early.
     """
     return info.kind == "cpu" and not is_simulator(info)
 

@@ -1,4 +1,4 @@
-"""Records that kernels look at while they run: so the host can end launches that would last too long.
+"""Records that kernels read while they run, so that the host can end launches that would take too long.
 
 OpenCL has no way to end a launch. Where host and device share their memory, as processors do, a kernel sees what the host
 writes into a buffer that lies in the host's own memory. Elsewhere the record is an ordinary one, and launches are only as
@@ -16,19 +16,19 @@ import pyopencl as cl
 from clfractal.device.select import Device, sees_host_writes
 
 CANCELLED = "cancelled"
-"""The field of a struct that kernels look at."""
+"""The field of a struct that kernels read."""
 
-# What drivers want of memory that they are to use in its place.
+# Alignment that drivers need to use host memory directly.
 _ALIGNMENT = 4096
 
 
 def is_watched(record: npt.NDArray[Any]) -> bool:
-    """Whether kernels look at records of this kind while they run."""
+    """Whether kernels read records of this kind while they run."""
     return CANCELLED in (record.dtype.names or ())
 
 
 class Watched:
-    """Records on a device, in `buffer`, that tell kernels that look at them to end."""
+    """Records on a device, in `buffer`, by which kernels that read them are asked to end."""
 
     def __init__(self, device: Device, records: npt.NDArray[Any]) -> None:
         nbytes = -(-records.nbytes // _ALIGNMENT) * _ALIGNMENT
@@ -43,6 +43,6 @@ class Watched:
             self.buffer = cl.Buffer(device.context, cl.mem_flags.READ_ONLY | flags, hostbuf=self._bytes)
 
     def cancel(self, cancelled: bool) -> None:
-        """Tells kernels that look there to end, or that they need not."""
+        """Asks kernels that read the records to end, or takes that back."""
         if self._shared:
             self._records[CANCELLED] = int(cancelled)

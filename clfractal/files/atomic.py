@@ -32,7 +32,7 @@ def _target(path: str | Path) -> Path:
 
 def _open_beside(target: Path) -> tuple[int, Path]:
     """A new hidden file in the folder of `target`, with the permissions that a plain new file would have."""
-    # A name as long as the file system allows has no room for ours beside it: only its beginning is kept.
+    # A name may already have the greatest length that the file system allows, so only its beginning is used.
     beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
     flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
     return os.open(beside, flags, 0o666), beside
@@ -67,7 +67,7 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
                 raise file_error(path, "cannot be written: it is not a regular file", "")
             if not os.access(target, os.W_OK):
                 raise file_error(path, "cannot be written: it is write-protected", "")
-        # Access rights, read-only file systems, quotas: only trying answers for all of them.
+        # Access rights, read-only file systems, quotas: only an attempt to write tests all of them.
         descriptor, beside = _open_beside(target)
         os.close(descriptor)
         beside.unlink()

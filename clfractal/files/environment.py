@@ -25,7 +25,7 @@ BRIGHTEST = 1e9
 """Of a pixel: sums of brighter ones would leave the range of float32."""
 
 _MOST_BYTES = 8 << 30  # of all channels, as they lie in memory while the file is read
-_STRONGEST = 100.0  # factor between primaries that still are colours
+_STRONGEST = 100.0  # largest factor between primaries that are still colours
 _CUBE = b"\x01"  # value of the attribute `envmap`
 _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 _REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # ITU-R BT.709-6, items 1.3 and 1.4
@@ -87,7 +87,7 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
 
 def _check_numbers(path: str | Path, pixels: Floats) -> None:
     """Refuses numbers that cannot be light: an error here is better than spots in a picture."""
-    # NaN wins in both.
+    # Both results are NaN if any number is.
     limits = pixels.min(initial=0.0), pixels.max(initial=0.0)
     if -np.inf < limits[0] and limits[1] <= BRIGHTEST:
         return
@@ -111,7 +111,7 @@ def _in_rec709(pixels: Floats, values: Mapping[str, Any]) -> Floats:
     if not isinstance(given, tuple) or np.allclose(given, _REC709, atol=2e-3):
         return pixels
     if not np.isfinite(given).all() or given[7] <= 0:
-        return pixels  # no white at all: the header is of no use
+        return pixels  # without a white point the header cannot be used
     try:
         matrix = np.linalg.solve(_to_xyz(_REC709), _adaptation(given) @ _to_xyz(given))
     except np.linalg.LinAlgError:

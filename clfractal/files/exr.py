@@ -73,7 +73,7 @@ def write_exr(
         elif isinstance(value, bool | int | float | np.number):
             plain[name] = float(value)
         elif isinstance(value, list | tuple) and all(isinstance(each, str) for each in value):
-            plain[name] = list(value)  # of a tuple the library makes nothing good
+            plain[name] = list(value)  # the library does not write tuples correctly
         else:
             attributes[name] = _matrix_bytes(value)
     kinds = {name: "chromaticities" if name == "chromaticities" else "m44f" for name in attributes}
@@ -100,7 +100,7 @@ def read_exr(path: str | Path, *, tiles: bool = False) -> tuple[dict[str, npt.ND
         kinds = "several parts or deep pixels" if tiles else "tiles, several parts or deep pixels"
         raise file_error(path, f"holds {kinds}, which are not read", "")
     try:
-        # Of pixels that cannot be read the library only prints a line, to Python's standard output.
+        # For pixels that cannot be read the library only prints a line, on Python's standard output.
         with (
             redirect_stdout(StringIO()) as said,
             OpenEXR.File(os.fspath(path), separate_channels=True) as file,

@@ -131,7 +131,7 @@ def text(header: Header) -> bytes:
     lines += [
         f"type: {_TYPES[header.dtype.str[1:]][0]}",
         "dimension: 3",
-        # Of the right-handed spaces the one that ITK and 3D Slicer take coordinates of as they are.
+        # The right-handed space whose coordinates ITK and 3D Slicer use without a change.
         "space: left-posterior-superior",
         "sizes: " + " ".join(str(side) for side in reversed(header.shape)),
         "space directions: " + " ".join(rows),
@@ -146,7 +146,7 @@ def text(header: Header) -> bytes:
             raise ValueError(f"a key of a NRRD file has letters and digits, got {key!r}")
         lines.append(f"{key}:={_escaped(value)}")
     plain = "\n".join(lines).encode() + b"\n"
-    # Filled up by a comment, so that the data stand at a place where they can be mapped.
+    # Padded by a comment, so that the data begin at an offset where they can be mapped.
     missing = -(len(plain) + 3) % _ALIGNED
     return plain + b"#" + b" " * missing + b"\n\n"
 
@@ -349,7 +349,7 @@ class _Parser:
         if "space origin" in self.fields:
             origin = self._vectors("space origin", 1)[0]
         if not right_handed:
-            # Such a space is the mirror image of ours: x is turned around (left becomes right).
+            # Such a space is the mirror image of ours: x is reversed (left becomes right).
             origin[0], directions[:, 0] = -origin[0], -directions[:, 0]
         return origin, directions
 

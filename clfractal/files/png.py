@@ -110,7 +110,7 @@ def _rows(bands: Iterable[Floats], bits: Bits, alpha: bool, origin: tuple[int, i
         else:
             code = encode16(straight)
         if alpha:
-            # Coverage is no light: it is stored as it is, and nothing would be gained by dithering it.
+            # Coverage is not light: it is stored without the transfer function, and needs no dithering.
             largest = np.float32((1 << bits) - 1)
             code[..., 3] = np.rint(np.fmin(np.fmax(band[..., 3], 0), 1) * largest)
         if bits == 16:
@@ -124,7 +124,7 @@ def _straight(band: Floats) -> Floats:
     """Colours divided by their coverage, as PNG wants them (section 12.4.1 of the specification)."""
     result = band.copy()
     coverage = np.fmin(band[..., 3:], np.float32(1))
-    with np.errstate(over="ignore"):  # by almost nothing: infinite, which is limited to 1 later
+    with np.errstate(over="ignore"):  # a division by almost 0 gives infinity, which is limited to 1 later
         np.divide(band[..., :3], coverage, out=result[..., :3], where=coverage > 0)
     return result
 
@@ -163,7 +163,7 @@ def _read_texts(stream: BinaryIO) -> dict[str, str]:
         raise _DamagedError("is not a PNG file")
     texts: dict[str, str] = {}
     place = 8
-    # All chunks are walked to the last: what was cut short while copied is refused, wherever it was cut.
+    # All chunks are read: a file that was cut short while it was copied is refused, wherever it was cut.
     while True:
         head = stream.read(8)
         length, tag = int.from_bytes(head[:4], "big"), head[4:]

@@ -39,8 +39,8 @@ BESIDE = ".json"
 
 _MAPPED = 64 << 20  # bytes; smaller data are read: a mapped file that is cut short later ends the process
 _PIECE = 1 << 20  # bytes read, written or compressed at once, so that Ctrl-C is heard in between
-# Bytes after which the disk is waited for: to bring a large file to it at once, at the end, takes seconds, in which
-# Ctrl-C could not be answered in an orderly way.
+# Bytes after which the file is flushed to the disk: flushing a large file only at its end takes seconds, in which
+# Ctrl-C could not be handled properly.
 _FLUSHED = 16 << 20
 _DEFLATE_AT_MOST = 1032  # times smaller, by the format itself
 _NPY_MAGIC = b"\x93NUMPY"
@@ -154,7 +154,7 @@ def write_slabs(
                 "directions": directions.tolist(),
                 "texts": dict(place.texts),
             }
-            # Both get their names only when both are whole.
+            # Both files get their names only when both are complete.
             other = stack.enter_context(atomic_writer(f"{path}{BESIDE}"))
             other.write_text(json.dumps(notes, indent=1) + "\n", encoding="utf-8")
             _write_values(stream, slabs, shape, stored)
@@ -208,7 +208,7 @@ def _write_values(
         for start in range(0, len(plain), _PIECE):
             piece = memoryview(plain[start : start + _PIECE])
             waiting += len(piece)
-            while len(piece):  # an unbuffered file may take less than it is given
+            while len(piece):  # an unbuffered file may write less than it is given
                 piece = piece[stream.write(piece) :]
             if waiting >= _FLUSHED:
                 os.fdatasync(stream.fileno())
@@ -278,7 +278,7 @@ def _plain(
         return np.memmap(stream, dtype, "r", offset, shape)
     values = _room(path, native, shape, limit)
     stream.seek(offset)
-    # In the file's byte order, turned around in place piece by piece.
+    # In the file's byte order; the bytes are swapped in place, piece by piece.
     raw: Any = values.reshape(-1).view(np.uint8)
     for start in range(0, need, _PIECE):
         wanted = memoryview(raw[start : start + _PIECE])

@@ -1,4 +1,4 @@
-"""Binds a formula to parameter values, and refuses values that give it no meaning."""
+"""Binds a formula to parameter values, and refuses values for which it is undefined."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def bind(
     distance_bailout: float | None = None,
     live: Sequence[str] = (),
 ) -> BoundFormula:
-    """The formula with values for its parameters; what is not given has its default.
+    """The formula with values for its parameters; values that are not given are the defaults.
 
     `julia` (one number for each variable) adds this constant in place of the point. `live` names parameters whose
     values never become part of the code.

@@ -245,7 +245,7 @@ class _Resolver:
         return {**entry, "julia": spec["julia"]}
 
 
-# Formulas that stood in scenes, the last used last: a scene whose numbers move keeps its formula.
+# Formulas of scenes, the last used one last: a scene whose numbers change keeps its formula.
 _PARSED: dict[tuple[str, str], Formula] = {}
 _MOST_PARSED = 64
 
@@ -255,7 +255,7 @@ def _parsed_once(data: Mapping[str, Any], place: Where, name: str) -> Formula:
     try:
         key = (name, json.dumps(data))
     except (TypeError, ValueError, RecursionError):
-        # What is no plain data is told by the formula's own checks.
+        # Values that are not plain data are refused by the formula's own checks.
         return formula_from_mapping(data, place, name=name)
     formula = _PARSED.pop(key, None) or formula_from_mapping(data, place, name=name)
     _PARSED[key] = formula

@@ -81,7 +81,7 @@ class Parameter:
 class Formula:
     """A map of three or four real variables that is iterated, as its file describes it.
 
-    Formulas are equal only if they are one object: the catalog gives one object for one content.
+    Formulas are equal only if they are the same object: the catalog returns one object for equal contents.
 
     Attributes:
         variables: names of the components of z; their order is the order of `map`.
@@ -141,7 +141,7 @@ class Formula:
         return {}
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields alone: functions that were made of them cannot be sent to another process."""
+        """Only the fields: functions made from them cannot be sent to another process."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
 
@@ -165,7 +165,7 @@ class BoundFormula:
 
     @cached_property
     def key(self) -> tuple[object, ...]:
-        """Equal for two bound formulas that are the same in everything; bytes, since 0.0 == -0.0."""
+        """Equal for two bound formulas that are the same in every value; bytes, because 0.0 == -0.0."""
         numbers = (*self.values.values(), *(self.julia or ()))
         return (
             self.formula,

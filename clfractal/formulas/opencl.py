@@ -1,7 +1,7 @@
 """Writes a chain of formulas as OpenCL C over packets: the functions that `kernels/orbit.h` iterates.
 
 The text depends on what shapes code (the expressions, baked parameters, counts); everything else is in `constants`, the
-values of the kernel argument `k`, so that dragging a parameter recompiles nothing. A text is kept with all that it
+values of the kernel argument `k`, so that changing a parameter needs no compilation. A text is kept with all that it
 depends on, so that it is written once for all parameter values that give it (`write_formula`).
 """
 
@@ -70,7 +70,7 @@ def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap =
 
 
 def forget_texts() -> None:
-    """Writes every text anew from now on."""
+    """Forgets all kept texts."""
     write_formula.cache_clear()
     with _LOCK:
         _WRITTEN.clear()
@@ -122,7 +122,7 @@ _LOCK = Lock()
 
 @lru_cache(maxsize=512)
 def _one(text: str) -> str:
-    """The same object for equal texts, so that comparing two takes no time."""
+    """One object for equal texts, so that comparing them takes no time."""
     return text
 
 

@@ -1,8 +1,8 @@
 """Stereo geometry for users with an OpenGL of their own, and parallax: the thesis's section 3.3.1.
 
-Two measures meet here: scene units, and those of the real screen. `relation` is what one unit of the screen's is in
-scene units. Parallax is measured on the screen, from the left eye's picture of a point to the right eye's: negative for
-what stands before the screen, the interpupillary distance for the infinitely far.
+There are two units of length: scene units, and the unit of the real screen. `relation` is the number of scene units in one
+unit of the screen. Parallax is measured on the screen, from the left eye's picture of a point to the right eye's: it is
+negative for points in front of the screen, and the interpupillary distance for infinitely distant points.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class Frustum:
 
 
 def frustum(view: View, *, front: float, back: float) -> Frustum:
-    """The frustum of a View whose eye may be anywhere before its plane (thesis, 3.3.1, the ten steps).
+    """The frustum of a View whose eye may be anywhere in front of its plane (thesis, 3.3.1, the ten steps).
 
     Args:
-        front, back: how far before and behind the view plane the scene reaches, scene units. `near` is kept above 0.
+        front, back: how far the scene extends in front of and behind the view plane, scene units. `near` is kept above 0.
 
     Raises:
         SceneError: the eye lies on or behind the view plane, or there is none; `back` leaves nothing to see.
@@ -91,7 +91,7 @@ def attitude(view: View) -> Floats:
 
 
 def eye_distance(view: View) -> float:
-    """How far the eye is before the view plane, scene units.
+    """The eye's distance from the view plane, scene units.
 
     Raises:
         SceneError: it lies on or behind the plane, or at infinity.

@@ -56,7 +56,7 @@ _DUBOIS: dict[Glasses, tuple[list[list[float]], list[list[float]]]] = {
     ),
 }
 
-# Numbers past it, and infinite ones, are taken as this: far lighter than any light, and sums of it are finite.
+# Larger and infinite numbers are replaced by this one: it is far brighter than any light, and sums of it are finite.
 _LIGHTEST = np.float32(1e30)
 
 
@@ -101,7 +101,7 @@ def mix(left: Floats, right: Floats, by: tuple[Matrix, Matrix]) -> Floats:
 
 def _limited(picture: Floats) -> Floats:
     """Numbers within +-`_LIGHTEST`, and no NaN."""
-    # Nearly every picture is within the limits: two quick looks, of which NaN passes neither.
+    # Nearly every picture is within the limits, so two quick comparisons come first; NaN fails both.
     if picture.size == 0 or (picture.min() >= -_LIGHTEST and picture.max() <= _LIGHTEST):
         return picture
     return np.clip(np.where(np.isnan(picture), np.float32(0), picture), -_LIGHTEST, _LIGHTEST)

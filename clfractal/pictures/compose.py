@@ -248,7 +248,7 @@ def _picked(stereo: Stereo, name: str, first: Planes, second: Planes, origin: tu
     for planes, of_eye, color in zip((first, second), places, stereo.colors, strict=True):
         passed = np.float32(color["RGB".index(name)] if colored else 1.0)
         for place in of_eye:
-            if passed == 0:  # what a filter stops is black, however light it is
+            if passed == 0:  # a primary that a filter blocks is black, however bright it is
                 result[place] = 0
             else:
                 np.multiply(planes[name][place], passed, out=result[place])
@@ -262,7 +262,7 @@ def _anaglyph(stereo: Stereo, left: Planes, right: Planes, channels: Sequence[st
     """
     by = matrices(stereo.method, stereo.glasses)
     first, second = (right, left) if stereo.swap else (left, right)
-    # Planes in memory, and colours along the last axis for whoever looks at them.
+    # Stored as planes, with the colours as the last axis of the view.
     colors = [np.moveaxis(np.stack([planes[name] for name in "RGB"]), 0, -1) for planes in (first, second)]
     mixed = mix(colors[0], colors[1], by)
     result = {name: mixed[..., component] for component, name in enumerate("RGB")}

@@ -16,7 +16,7 @@ from clfractal.files.png import Bits, stream_png, write_png
 from clfractal.pictures.tiled import Floats, Picture
 from clfractal.scene.stereo import APART, Stereo
 
-# Names of the header's keys in a file: those that OpenEXR defines keep theirs, ours begin with the program's.
+# Names of the header's keys in a file: OpenEXR's own names are kept, the others begin with the program's name.
 _MATRICES = ("worldToCamera", "worldToNDC")
 _FILE_KEYS = {"scene": "clfractal"} | {name: name for name in (*_MATRICES, "view", "multiView")}
 _FILE_KEYS |= {f"{view}.{name}": f"{view}.{name}" for view in VIEWS for name in _MATRICES}
@@ -213,7 +213,7 @@ def _colors(store: Picture, *, alpha: bool, exposure: float) -> Iterator[Floats]
         rows, width = band["R"].shape
         pixels = np.empty((rows, width, 4 if alpha else 3), dtype=np.float32)
         for component, name in enumerate("RGB"):
-            with np.errstate(over="ignore"):  # infinitely light is limited to 1 later
+            with np.errstate(over="ignore"):  # infinity is limited to 1 later
                 np.multiply(band[name], gain, out=pixels[..., component])
         if alpha:
             pixels[..., 3] = band["A"]

@@ -1,1 +1,1 @@
-"""What each kind of picture needs of a device: the text of its program and what that reads."""
+"""For each kind of picture, the text of its program and the data that the program reads."""

@@ -1,4 +1,4 @@
-"""The cut-plane renderer: its program, and what it reads."""
+"""The cut-plane renderer: its program, and the program's data."""
 
 from __future__ import annotations
 

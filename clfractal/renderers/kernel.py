@@ -1,7 +1,7 @@
-"""A renderer of tiles: how a planned view becomes the text of a program, and what that program reads.
+"""A renderer of tiles: turns a planned view into the text of a program and the program's data.
 
-`kernels/passes.h` has what all their kernels have in common. What a kernel is launched over, and where its results go, is
-no concern of a renderer.
+`kernels/passes.h` has what all their kernels have in common. A renderer does not decide
+how its kernel is launched, or where the results go.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class TileKernel(ABC):
 
     @property
     def has_alpha(self) -> bool:
-        """Whether pixels may be covered in part, so that coverage has noise of its own."""
+        """Whether pixels may be partly covered, so that coverage has its own noise."""
         return True
 
 
@@ -84,5 +84,5 @@ def _flat_text(
 
 
 def palette_or_none(table: npt.NDArray[np.float32] | None) -> npt.NDArray[np.float32]:
-    """A palette's colours, or a stand-in where the program reads none: no buffer is empty."""
+    """A palette's colours, or a placeholder if the program reads none, because buffers cannot be empty."""
     return np.zeros(3, np.float32) if table is None else np.ascontiguousarray(table, np.float32)

@@ -1,4 +1,4 @@
-"""Which lane count is the fastest on a device: measured once for each device and driver, by the march as it is rendered.
+"""Finds the fastest lane count of a device: measured once for each device and driver, with the march used for rendering.
 
 Small pictures are marched with each lane count that works (`device/tune.py`): the Mandelbulb by its scalar rule, and hast
 by its Jacobian, since what fits one into the processor's registers need not fit the other.
@@ -80,7 +80,7 @@ _reports: dict[tuple[str, str, str], tuple[MarchReport, ...]] = {}
 
 
 def rule_of(chain: Chain) -> Rule:
-    """How distances of a formula are marched by: by its scalar rule, if every member has one."""
+    """The rule for a formula's distances while marching: its scalar rule, if every member has one, else the Jacobian."""
     return "scalar" if all(link.bound.derivative is not None for link in chain.links) else "jacobian"
 
 
@@ -91,7 +91,7 @@ def best_lanes(
     *,
     on_start: Callable[[str], None] | None = None,
 ) -> int:
-    """The lane count that marches fastest by a rule, or what the environment variable CLFRACTAL_LANES says.
+    """The lane count that marches fastest by a rule, or the value of the environment variable CLFRACTAL_LANES.
 
     Args:
         device: the device.

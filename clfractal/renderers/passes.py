@@ -1,4 +1,4 @@
-"""What every renderer's kernel has in common (`kernels/passes.h`): sampling, what is kept of pixels, statistics."""
+"""The common parts of all renderers' kernels (`kernels/passes.h`): sampling, data kept for pixels, statistics."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ FILTERS = ("box", "tent", "blackman_harris")
 FILTER_WIDTHS = {"box": 1.0, "tent": 2.0, "blackman_harris": 3.0}
 
 STATISTICS = ("rays", "steps", "iterations", "bad_distances")
-"""What a packet counts, in the kernel's order."""
+"""The statistics that a packet counts, in the kernel's order."""
 
 # What the mode of a pass asks for, as bits.
 PASS_KEEP = 1  # what pixels have so far is kept for a later pass
@@ -59,7 +59,7 @@ _KEPT: dict[str, tuple[str, ...]] = {
 
 
 def pass_defines(plan: Plan) -> dict[str, object]:
-    """What the text of every renderer depends on."""
+    """The defines in every renderer's text."""
     return {
         "LANES": plan.lanes,
         "REAL_IS_DOUBLE": int(plan.precision == "float64"),

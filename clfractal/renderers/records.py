@@ -146,7 +146,7 @@ def struct_text() -> str:
 def view_record(view: View, width: int, height: int, plan: Plan, precision: Precision) -> Record:
     """A View for a picture of `width` x `height` pixels, of which the plan's region is rendered.
 
-    With a divider each pixel stands for that many in both directions, and all that is counted in pixels is so in these.
+    With a divider, each pixel stands for that many in both directions, and all numbers in pixels count these larger ones.
     """
     coarse, region = plan.divider, plan.region
     values = {

@@ -1,4 +1,4 @@
-"""What takes long to make and serves many pictures: grids, packed maps, palettes."""
+"""Data that take long to make and serve many pictures: grids, packed maps, palettes."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from clfractal.device.select import Device
 
 T = TypeVar("T")
 
-# Pictures that did not ask for a thing before it is dropped: an animation may change back and forth.
+# Pictures without a use after which data are dropped; an animation may change back and forth.
 _IDLE_PICTURES = 2
 
 
 class Kept:
-    """Things by a key that says all they follow from. What the last pictures did not ask for is dropped."""
+    """Data under keys that contain everything they depend on. Data that the last pictures did not use are dropped."""
 
     def __init__(self) -> None:
         self._things: dict[str, Any] = {}
@@ -24,14 +24,14 @@ class Kept:
         self._picture = 0
 
     def begin_picture(self) -> None:
-        """Counts the pictures, and drops what nobody asked for lately."""
+        """Counts the pictures, and drops data that were not used lately."""
         self._picture += 1
         for key, asked in list(self._last_asked.items()):
             if asked < self._picture - _IDLE_PICTURES:
                 del self._things[key], self._last_asked[key]
 
     def once(self, key: str, make: Callable[[], T]) -> T:
-        """What was made for this key, or is made now."""
+        """The data made earlier for this key; they are made now if there are none."""
         if key not in self._things:
             self._things[key] = make()
         self._last_asked[key] = self._picture
@@ -41,7 +41,7 @@ class Kept:
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """Where a renderer gets what its kernel reads.
+    """Gives a renderer the data that its kernel reads.
 
     Attributes:
         device: where buffers are.

@@ -1,4 +1,4 @@
-"""The surface renderer: its program, and what it reads."""
+"""The surface renderer: its program, and the program's data."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Floats = npt.NDArray[np.float32]
 
 
 def defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """What shapes the program's text besides the formula."""
+    """The defines that determine the program's text, besides the formula."""
     return {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
@@ -77,7 +77,7 @@ def feature_defines(scene: Scene) -> dict[str, object]:
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
-    """What `kernels/coloring.h` and `shade.h` need to know when they are compiled."""
+    """The defines that `kernels/coloring.h` and `shade.h` need."""
     families = (
         ("COLORING", COLORINGS, coloring.by),
         ("ALONG", ALONG, coloring.along),

@@ -1,4 +1,4 @@
-"""What a formula knows of a mesh's vertices: their normals, exactly, and their colours."""
+"""Exact normals and colours of a mesh's vertices, from the formula."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ def dress(
 ) -> Mesh:
     """The mesh with normals from the formula's Jacobian, and colours.
 
-    A normal stays as it is where the formula has none nearby, or one that is far from it: the detail there is finer than
-    the grid. Colours are the scene's material's where `coloring.by` is none of COLORED_BY.
+    A normal stays unchanged if the formula has none nearby, or a very different one: there the detail is finer than
+    the grid. If `coloring.by` is not in COLORED_BY, colours are the material's.
 
     Args:
-        coloring: what chooses the colours, in place of the scene's.
+        coloring: used instead of the scene's coloring.
         voxel: the side of a voxel, scene units.
         flat: (n,), vertices that keep their normal: those of faces that the box cuts.
-        progress: told the part that is done, 0 to 1.
+        progress: called with the finished fraction, 0 to 1.
 
     Raises:
         DeviceError, KernelBuildError: the device failed.

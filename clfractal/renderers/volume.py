@@ -1,4 +1,4 @@
-"""The volume renderer: what its rays read besides the grid, and the tables that tell what values look like."""
+"""The volume renderer: the data that rays read besides the grid, and the transfer tables."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
 
 
 def ray_precision(scene: Scene, plan: Plan) -> Precision:
-    """The number type of rays: the grid is looked at in a measure of its own, whatever it was filled with.
+    """The number type of rays: rays use the grid's own coordinates, whatever number type filled it.
 
     Only cut planes evaluate the formula where a zoom has led, and want what filling wants.
     """
@@ -111,7 +111,7 @@ def ray_precision(scene: Scene, plan: Plan) -> Precision:
 
 
 class VolumeKernel(TileKernel):
-    """Rays through a grid of voxels, which is filled when it is first asked for."""
+    """Rays through a grid of voxels, which is filled at its first use."""
 
     name = "volume"
 
@@ -189,7 +189,7 @@ class VolumeKernel(TileKernel):
 
 
 def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
-    """The value up to which a grid's voxels cannot be seen; None if the least can."""
+    """The largest value at which a grid's voxels are invisible; None if even the least is visible."""
     stops = settings.transfer.opacity
     if stops is None:
         return float(
@@ -249,7 +249,7 @@ def full_sample(grid: Grid) -> float:
 
 
 def unseen_sample(scene: Scene, grid: Grid) -> float:
-    """The sample at and below which nothing is seen; not a number where the least is seen."""
+    """The largest sample that is invisible; NaN if even the least sample is visible."""
     record = volume_record(scene, grid, "float32")
     if settings_of(scene).transfer.opacity is None:
         return float(np.nextafter(np.float32(record["level"]), np.float32(-np.inf)))

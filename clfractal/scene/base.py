@@ -17,7 +17,7 @@ Fraction = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Amount = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12, allow_inf_nan=False)]
 
-# Strictness would refuse the lists of YAML and JSON; it is kept for what is in them.
+# Strict tuples would refuse the lists of YAML and JSON; their entries stay strict.
 Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
 Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False)]
 Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]

@@ -37,7 +37,7 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if scene.layout is not None:
         _check_views(scene)
     if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
-        # (A file's grid is no solid of the formula's; its light goes where it may.)
+        # (A grid from a file is not the formula's solid, so its lights may be anywhere.)
         _check_lights(scene)
 
 

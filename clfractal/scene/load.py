@@ -158,7 +158,7 @@ def _overridden(document: Document, override: str) -> Document:
         return document
     index = next((i for i, part in enumerate(parts) if part.isdecimal()), 0)
     if index and not document.has(parts[:index]):
-        # An entry of a list that the file leaves to its default.
+        # An entry of a list that is not in the file but in its default.
         default = _default(parts[:index])
         if isinstance(default, list):
             document = document.replaced(parts[:index], node_from_plain(default, label))

@@ -178,7 +178,7 @@ def _length(details: ErrorDetails) -> Problem | None:
     place = _place(details["loc"])
     if any(get_origin(t) is tuple and ... not in get_args(t) for t in place.types):
         return _tuple(details, place)
-    # An entry that is wrong itself is not counted by the check, and is reported where it stands.
+    # The check does not count an entry that is itself wrong; that entry has its own error.
     if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
         return None
     if not details["input"]:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-# What a scene has read or resolved, and the section that it follows from.
+# Data that a scene has read or resolved, and the section that they depend on.
 _SECTIONS = {
     "chain": "formula",
     "surroundings": "environment",
@@ -59,7 +59,7 @@ class Scene(Section):
     stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; null: one picture")
     output: Output = Field(default_factory=dict, validate_default=True)
 
-    # Beside the fields: no part of what a scene says, and not compared.
+    # Not fields: they are not part of the scene's values, and not compared.
     _folder: Path = PrivateAttr(default_factory=Path)
     _read: dict[str, Any] = PrivateAttr(default_factory=dict)
 
@@ -131,7 +131,7 @@ class Scene(Section):
 
     @property
     def given(self) -> "GivenGrid | None":
-        """The grid that a volume scene shows instead of its formula; in a loaded scene it has already been read and checked.
+        """The grid that a volume scene shows instead of its formula; in a loaded scene it has been read and checked.
 
         Raises:
             FileError: its file is missing or wrong; the path says where.
@@ -171,7 +171,7 @@ class Scene(Section):
                 )
             own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}
             if isinstance(view.renderer, CutPlaneRenderer):
-                # The scene's planes stand in pictures of its object, and a plane by itself is none.
+                # The scene's planes belong to pictures of its object; a cut_plane renderer shows no object.
                 own["cut_planes"] = ()
             found.append((self.model_copy(update={**own, **view.changes()}), place))
         return found

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from clfractal.scene.base import Section, problem
 
-# Where `min_samples` leaves it open: fewer tell too little about how much a pixel's samples scatter.
+# The default of `min_samples`: fewer samples do not show how much a pixel's samples scatter.
 USUAL_MIN_SAMPLES = 16
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Position, Reflectance, Section, cross, length, problem
 
-# Screen, distance and eyes are measured in one unit: no viewer's differ by more than this.
+# Screen, distance and eyes are measured in one unit, so their ratios cannot be larger than this.
 MAX_RATIO = 10_000
 
 Positive = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]

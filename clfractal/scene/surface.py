@@ -10,7 +10,7 @@ from clfractal.scene.sampled import Sampled
 
 Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 
-# The normals that are made from a middle point and the eight around it: of a grid with an odd side.
+# Normals that need a middle point and its eight neighbours, so a grid with an odd side.
 GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")
 MAX_POINTS = 64
 

@@ -1,4 +1,4 @@
-"""Which parts of a grid's stored bricks may be seen: the octree's last levels, for values that are above a given one."""
+"""Finds the parts of stored bricks that may be visible: the octree's last levels, for values above a given one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
     Args:
         grid: the grid.
         unseen: as samples are kept, 0 to 255 of `byte`. A sample that is not a number counts as above.
-        on_compile: told a line if the program is compiled first.
+        on_compile: called with a message if the program is compiled first.
 
     Returns:
         Eight bytes a slot, on the grid's device: for each octant of 4 x 4 x 4 cells, x fastest, then y, then z, a byte

@@ -1,4 +1,4 @@
-"""A grid out of a whole array of values, from wherever it comes: the bricks that can be seen, with gradient normals."""
+"""A grid from an array of values, of any origin: the visible bricks, with gradient normals."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def grid_from_dense(
     lattice = Lattice(corner, spacing, (nx, ny, nz))
     visible = np.ones(lattice.bricks[::-1], np.bool_)
     if threshold is not None:
-        # NaN is above nothing: it cannot be seen.
+        # NaN is not above any number, so it is invisible.
         visible = _brick_maximum(values) > threshold
     least = (
         float(np.nextafter(np.float32(threshold), np.float32(np.inf))) if threshold is not None else -np.inf

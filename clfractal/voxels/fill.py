@@ -37,7 +37,7 @@ OCTANT = 4
 
 @dataclass(frozen=True, slots=True)
 class FillProgress:
-    """How far a fill is: the stage (`octree`, `fill`, `store` or `normals`), and its bricks."""
+    """The progress of a fill: the stage (`octree`, `fill`, `store` or `normals`), and its bricks."""
 
     stage: str
     done: int
@@ -60,7 +60,7 @@ def fill_grid(
 ) -> Grid:
     """The grid of a scene's formula in the renderer's last box, with its values, normals and octree.
 
-    `octree` fills skip what the distance shows to be outside; `brute` evaluates every voxel. Values of kind
+    `octree` skips regions that distances show to be outside; `brute` evaluates every voxel. Values of kind
     `iterations` know no empty bricks: all are evaluated and stored.
 
     Args:
@@ -84,7 +84,7 @@ def fill_grid(
 
 
 def check_grid(lattice: Lattice, renderer: VolumeRenderer, device: Device) -> None:
-    """Refuses a grid that cannot fit, whatever is in it.
+    """Refuses a grid that cannot fit, whatever it contains.
 
     Raises:
         DeviceError: status 2, with the least memory needed and the memory available.
@@ -217,7 +217,7 @@ class _Filler:
         return descend(self.lattice, classify)
 
     def _look(self, classify_nodes: programs.Built, nodes: cl.Buffer, packets: int, cells: int) -> cl.Buffer:
-        """Classes of nodes, a byte of each, on the device."""
+        """The classes of nodes, one byte each, on the device."""
         device, kernel = self.device, classify_nodes.kernel
         flags = device.buffer(packets * self.lanes, "nodes")
         with device.failures("checking the octree's nodes"):

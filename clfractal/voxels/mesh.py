@@ -1,4 +1,4 @@
-"""Isosurfaces of grids: marching cubes brick by brick, the bricks joined where they touch without any seam.
+"""Isosurfaces of grids: marching cubes brick by brick, joined without seams.
 
 Each brick goes through scikit-image's marching cubes (Lewiner, Lopes, Vieira, Tavares: "Efficient
 implementation of Marching Cubes' cases with topological guarantees", 2003), which here only decides which
@@ -59,7 +59,7 @@ def extract(
         close: whether what lies beyond the grid counts as outside: the surface is closed, flat half a voxel beyond
             the last one. Otherwise it ends at the outermost voxels.
         brick: cells along the side of a brick.
-        progress: told the part that is done, 0 to 1, after each brick.
+        progress: called with the finished fraction, 0 to 1, after each brick.
 
     Returns:
         A mesh in scene units: triangles counter-clockwise seen from outside, normals by the values' gradient. It has no
@@ -83,7 +83,7 @@ def extract(
 
 
 def value_range(values: Values) -> tuple[float, float]:
-    """Least and largest finite value, a slab at a time; (0, 0) if there is none."""
+    """The least and the largest finite value, found slab by slab; (0, 0) if there is none."""
     low, high = np.inf, -np.inf
     for plane in _slabs(values):
         finite = plane[np.isfinite(plane)] if plane.dtype.kind == "f" else plane

@@ -27,7 +27,7 @@ class Descent:
     Attributes:
         open: places of bricks that are not decided, those of one node beside each other.
         full: places of bricks that are inside as a whole, their ninth layer included.
-        looked: how many nodes were looked at.
+        looked: how many nodes were checked.
     """
 
     open: Places

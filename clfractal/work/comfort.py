@@ -35,13 +35,13 @@ SIDES: tuple[EyeName, ...] = ("left", "right")
 LIMIT_DEGREES = 1.0
 """Parallax past which the viewer is warned."""
 
-# The quick look at the depth is that many pixels wide at most.
+# Largest width of the quick look at the depth, pixels.
 _QUICK_SIDE = 320
-# The depth of a picture larger than this is not read again to measure parallax; a quick look tells as much.
+# For pictures larger than this, depth is measured by a quick look instead of reading all pixels again.
 _MOST_PIXELS = 1 << 24
-# It misses the finest spikes: what is fitted is fitted to this part of the budget.
+# The quick look misses the finest spikes, so depth is fitted to this part of the budget.
 _MARGIN = 0.95
-# An angle whose tangent is large but no more than that: the eyes of no viewer turn so far.
+# An angle with a large but finite tangent; no viewer's eyes turn so far.
 _NEARLY_RIGHT = np.radians(89.9)
 
 
@@ -115,7 +115,7 @@ def comfort_of_depth(
     if scene.stereo.convergence == "toe_in":
         points = points_of_depth(view, depth, size, origin)
         return comfort_of(scene, points, eye) if len(points) else None
-    # Of eyes that look straight on parallax follows from depth alone: two points tell of all.
+    # If the eyes look straight ahead, parallax follows from depth alone, so two points are enough.
     nearest = float(np.where(depth > 0, depth, np.inf).min())
     farthest = float(np.where(depth < np.inf, depth, 0).max())
     if nearest == np.inf or farthest <= 0:
@@ -141,7 +141,7 @@ class Look:
             "height": max(round(scene.image.height * scale), 1),
         }
         small = scene.model_copy(update={"image": sides})
-        # A job of one view, whichever eye's it is.
+        # A job of one view, for any eye.
         alone = prepare(_with(small, mode="left", fit=None), self.device, samples=1, channels=("Z",))
         view = replace(alone.views[0], scene=small, eye=eye)
         film = Film(view.plan.channels, view.size)
@@ -210,7 +210,7 @@ def points_of_depth(
     """
     assert view.eye is not None
     width, height = size
-    # (What an eye inside the solid sees is where it is itself.)
+    # (An eye inside the solid sees points at its own place.)
     rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))
     across = ((origin[0] + columns + 0.5) / width - 0.5) * view.width
     rise = (0.5 - (origin[1] + rows + 0.5) / height) * view.height
@@ -236,7 +236,7 @@ def fitted(scene: Scene, look: Look) -> Scene:
         return scene
     current = _with(scene, fit=None)
     view = scene_view(current)
-    # First what the eye between the two sees, then what the two see that follow from it.
+    # First from the depth that the middle eye sees, then from that of both eyes placed by it.
     points = look.points(current)
     if not len(points):
         raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))

@@ -246,7 +246,7 @@ class Drawing:
         assert self.view is not None
         kept = (
             self._kept if self._kept is not None else self.outputs.sets[0][2]
-        )  # a stand-in: nobody reads it
+        )  # a placeholder that is never read
         counts = (len(self.view.plan.channels), self._kept_count)
         with self.device.failures("setting arguments"):
             for kernel, (film, statistics, places) in zip(self._kernels, self.outputs.sets, strict=True):
@@ -258,7 +258,7 @@ class Drawing:
     def _warm(self, name: str, channels: int, sizes: list[int]) -> Warm:
         """A first launch that renders nothing: it ends before its first packet."""
         outputs = [TILE_PIXELS * 4 * channels, 16, self.packets * 4 * len(STATISTICS), 16]
-        # Of a large environment map a part is enough.
+        # A part of a large environment map is enough.
         buffers = [*outputs, *(min(max(size, 16), 65_536) for size in sizes)]
         arguments = [Argument("buffer", size) for size in buffers]
         arguments += [Argument("scalar", dtype="int32", value=0.0)] * 7

@@ -56,7 +56,7 @@ class Engine:
         self.device = device if isinstance(device, Device) else choose(device)
         self.tell = tell
         self.executor = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
-        # Looks have a size of their own: they would drive a picture's buffers out.
+        # A separate executor for looks: their size differs, so they would replace a picture's buffers.
         self._looking = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
         self._looking.kept = self.executor.kept
         self._busy = threading.Lock()
@@ -107,7 +107,7 @@ class Engine:
             channels=channels,
             on_start=self.tell,
         )
-        # First of all, so that what is wrong is told before anything is rendered.
+        # Made first, so that mistakes are reported before anything is rendered.
         job = decide(loaded)
         if loaded.stereo is None or loaded.stereo.fit is None:
             return job
@@ -157,7 +157,7 @@ class Engine:
             if loaded.stereo is None:
                 raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
             if loaded.stereo.mode not in ("pair", "split_half", "over_under_half"):
-                # The others may need less of a pair.
+                # The other modes may need only parts of a pair.
                 stereo = loaded.stereo.model_copy(update={"mode": "pair"})
                 loaded = loaded.model_copy(update={"stereo": stereo})
             job = self.prepare(loaded, precision=precision, samples=samples, channels=channels)

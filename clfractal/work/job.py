@@ -25,7 +25,7 @@ from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
 
-# What tells how a pair is shown, and changes neither eye's picture.
+# Settings for showing a pair, which do not change either eye's picture.
 _SHOWN = ("mode", "swap", "method", "glasses", "colors")
 
 
@@ -191,7 +191,7 @@ class Job:
         return {
             **found,
             "scene": scene,
-            # The scene only names its map and its grid, and the files may be others by now.
+            # The scene only names its map and its grid, and these files may have changed.
             "environment": surroundings.digest if surroundings is not None else None,
             "grid": given.digest if given is not None else None,
             "version": clfractal.__version__,
@@ -216,7 +216,7 @@ class Job:
         eyes = self.eyes(stores)
         alone = made.stereo.mode in ("left", "right")
         seconds = sum(store.header.get("seconds", 0.0) for store in stores)
-        # A picture of both has no camera of its own, and took the time of two.
+        # A composed picture has no camera, and its time is that of both pictures.
         common = {key: value for key, value in (header or {}).items() if not key.startswith("worldTo")}
         added = None if alone else {**common, "seconds": seconds}
         return Composed(made.stereo, made.image, eyes.get("left"), eyes.get("right"), made.region, added)
@@ -255,5 +255,5 @@ def _decided(renderer: dict[str, Any], view: PlannedView) -> dict[str, Any]:
     if found["min_samples"] is not None:
         found["min_samples"] = min(found["min_samples"], view.plan.samples)
     if (found["min_samples"] or 0) < 4:
-        found["min_samples"] = None  # the same, and a scene that loads
+        found["min_samples"] = None  # null has the same effect, and is valid in a scene
     return found

@@ -107,7 +107,7 @@ def _launched(
     ):
         tally.kernel_ms += milliseconds
         if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
-            # A part of a tile: nothing to be read yet.
+            # Only a part of a tile is done: there is nothing to read yet.
             yield Result(item.view, np.zeros(0, np.int32), np.zeros((0, 0, TILE, TILE), np.float32), tally)
         else:
             film, sums = drawing.collect(span)
@@ -129,7 +129,7 @@ class _Cutter:
         self.per_tile = drawing.packets * (self.end - self.first)
         self.place = 0  # of the next tile
         self.slot = 0
-        # Of a tile in parts: its packets, and the next sample; no packets between two tiles.
+        # The packets and the next sample of a tile that is rendered in parts; no packets between two tiles.
         self.packets = (0, 0)
         self.sample = self.first
 

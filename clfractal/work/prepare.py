@@ -52,7 +52,7 @@ def prepare(
         raise SceneError(f"must be from 1 to {MAX_SAMPLES}, got {samples}", Where("--samples"))
     names = check_channels(channels if channels is not None else scene.output.channels)
     chooser = _Chooser(device, precision, on_start)
-    # One number type for both eyes, by what the eye between them sees.
+    # One number type for both eyes, chosen for the view of the eye between them.
     chosen = [chooser.number_type(view, eye) for view, eye, _ in shown_views(scene)]
     views: list[PlannedView] = []
 

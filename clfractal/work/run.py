@@ -41,7 +41,7 @@ class WorkItem:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """Counts and times of work: camera rays (all samples), distance evaluations and applications of all rays, times in ms."""
+    """Counts and times: camera rays (all samples), distance evaluations and applications of all rays; times in ms."""
 
     rays: int = 0
     steps: int = 0
