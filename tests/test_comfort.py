@@ -258,10 +258,10 @@ class TestTold:
         assert (
             Comfort(-0.01, 0.005, -0.5, 1.25)
             .warning()
-            .startswith("parallax reaches 1.25 degrees, and beyond 1 ")
+            .startswith("parallax reaches 1.25 degrees, but eyes tire beyond 1; ")
         )
         assert (
             Comfort(-0.1, 0.005, -2.5, 1.25)
             .warning()
-            .startswith("parallax reaches 2.50 degrees, and beyond 1 ")
+            .startswith("parallax reaches 2.50 degrees, but eyes tire beyond 1; ")
         )

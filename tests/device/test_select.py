@@ -170,7 +170,7 @@ def test_no_device_at_all(tmp_path: Path) -> None:
     )
     lines = result.stdout.splitlines()
     assert len(lines) == 4
-    assert all(line.startswith("3 no OpenCL device; install one") for line in lines)
+    assert all(line.startswith("3 no OpenCL device; install a driver") for line in lines)
     assert all("pip install pocl-binary-distribution" in line for line in lines)
 
 

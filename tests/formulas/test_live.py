@@ -254,7 +254,7 @@ def test_a_live_f0_is_a_number() -> None:
     formula = inline(map=["x*x - y*y + p**-1", "2*x*y", "z*z"])
     spec = {"inline": formula, "live": ["p"]}
     assert write_formula(catalog.load_chain({**spec, "parameters": {"p": 0.5}})).constants[0] == 2.0
-    with pytest.raises(FormulaError, match=r"f\(0\) is no finite number with p = 0"):
+    with pytest.raises(FormulaError, match=r"f\(0\) is not a finite number with p = 0"):
         catalog.load_chain({**spec, "parameters": {"p": 0}})
 
 
