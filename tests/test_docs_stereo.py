@@ -131,7 +131,7 @@ def test_glasses() -> None:
 
 
 def test_the_angle_that_keeps_the_camera() -> None:
-    told = re.search(r"stays:\n?\s*([\d.]+) degrees for the defaults and 16 : 9", text("stereo.md"))
+    told = re.search(r"screen's angle:\n?\s*([\d.]+) degrees for the defaults and 16 : 9", text("stereo.md"))
     assert told
     stereo = stereo_of()
     high = stereo.screen_width * 9 / 16
