@@ -185,12 +185,10 @@ class Drawing:
         kernel, (first, end) = self._kernels[span.slot], span.packets
         numbers = (first, end, *span.samples, span.mode)
         with self.device.failures("rendering"):
-            # In the kernels' own queue, and nobody waits: with every core at work PoCL would let a write wait for the launch
-            # before. The array has to live as long.
+            # In the kernels' own queue, and nobody waits: while every core is at work PoCL lets a write wait for the
+            # launch before. The array has to live that long.
             self._places[span.slot] = places
-            cl.enqueue_copy(
-                self.device.queue, self.outputs.sets[span.slot][2], places, is_blocking=False
-            )
+            cl.enqueue_copy(self.device.queue, self.outputs.sets[span.slot][2], places, is_blocking=False)
             for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
                 kernel.set_arg(index, np.int32(number))
             count = -(-(end - first) // self.group) * self.group
