@@ -77,7 +77,7 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
         DeviceError: the launch failed.
         Stopped: the token was set.
     """
-    pause = POLL_SECONDS / 16
+    start = time.perf_counter()
     with device.failures(doing):
         while True:
             status = event.command_execution_status
@@ -87,8 +87,9 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
                 raise DeviceError(f"{device.info.name}: the device failed while {doing}: status {status}")
             if token is not None:
                 token.check()
-            time.sleep(pause)
-            pause = min(2 * pause, POLL_SECONDS)
+            # Short launches are looked at often, long ones are not kept from their cores.
+            pause = (time.perf_counter() - start) / 16
+            time.sleep(min(max(pause, POLL_SECONDS / 16), POLL_SECONDS))
         return float(event.profile.end - event.profile.start) * 1e-6
 
 

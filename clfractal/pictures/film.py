@@ -47,9 +47,12 @@ class Film:
         self._told: dict[str, Any] = {}
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
-        self._data = np.empty((len(self.channels), self.region.height, self.region.width), np.float32)
-        self._data[:] = np.array([CHANNELS[name].fill for name in self.channels])[:, None, None]
+        # Zeros cost nothing until something is written.
+        self._data = np.zeros((len(self.channels), self.region.height, self.region.width), np.float32)
         self._planes = dict(zip(self.channels, self._data, strict=True))
+        for name in self.channels:
+            if CHANNELS[name].fill != 0:
+                self._planes[name].fill(CHANNELS[name].fill)
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
 
     @property
