@@ -104,6 +104,8 @@ def in_launches(
 ) -> Iterator[tuple[T, float]]:
     """Runs work in launches, two of them under way at a time, and gives what `enqueue` told of each with its milliseconds.
 
+    While the caller has one of these the next two are under way, so what launches write to must be there three times.
+
     However it is left (to the end, by an error, an interrupt, or because the caller stops asking), the device is idle then.
 
     Args:
@@ -118,23 +120,26 @@ def in_launches(
     """
     flying: deque[Part[T]] = deque()
     more = True
+
+    def fill() -> None:
+        nonlocal more
+        while more and len(flying) < IN_FLIGHT:
+            if token is not None:
+                token.check()
+            part = enqueue(pace.size)
+            if part is None:
+                more = False
+            else:
+                flying.append(part)
+
     try:
-        while True:
-            while more and len(flying) < IN_FLIGHT:
-                if token is not None:
-                    token.check()
-                part = enqueue(pace.size)
-                if part is None:
-                    more = False
-                else:
-                    flying.append(part)
-            if not flying:
-                return
+        fill()
+        while flying:
             milliseconds = wait(flying[0].event, device, doing, token)
             part = flying.popleft()
             pace.learn(part.amount, milliseconds)
-            if token is not None:
-                token.check()
+            # Before the caller reads what is finished: the device must not wait for that.
+            fill()
             yield part.about, milliseconds
     finally:
         if flying:

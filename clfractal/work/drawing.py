@@ -34,7 +34,8 @@ TILE_PIXELS = TILE * TILE
 GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
 # Tiles of the largest launch: 1024 of them are a megapixel.
 CAPACITY = 512
-_SLOTS = 2
+SLOTS = 3
+"""Sets of buffers for results: two launches are under way, and one is being read."""
 _ALIGNMENT = 4096
 
 Floats = npt.NDArray[np.float32]
@@ -51,7 +52,7 @@ class Span:
         samples: first sample of each pixel, and the one after the last.
         mode: PASS_KEEP and PASS_ADD, as bits.
         kept_places: of each tile, its number among those that are kept for later passes.
-        slot: which of the two sets of buffers the results go into.
+        slot: which of the sets of buffers the results go into.
     """
 
     tiles: npt.NDArray[np.int32]
@@ -73,7 +74,7 @@ class OutputSet:
 
 
 class OutputBuffers:
-    """Two sets, so that the device does not wait for the host to read one."""
+    """Some sets, so that the device does not wait for the host to read one."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
@@ -88,7 +89,7 @@ class OutputBuffers:
         wide = -(-max(self.sizes[1], statistics) // _ALIGNMENT) * _ALIGNMENT
         self.sizes = (max(self.sizes[0], film), wide, max(self.sizes[2], places))
         self.sets = []
-        for _ in range(_SLOTS):
+        for _ in range(SLOTS):
             results = self.device.buffer(wide + self.sizes[0], "the film")
             with self.device.failures("allocating the film"):
                 statistics_part = results.get_sub_region(0, wide)
@@ -136,12 +137,12 @@ class Drawing:
         statistics = self.capacity * self.packets * 4 * len(STATISTICS)
         sizes = [_size(argument) for argument in arguments]
         self.device.check_memory(
-            _SLOTS * (film + statistics) + sum(sizes), "rendering", largest=max(film, *sizes)
+            SLOTS * (film + statistics) + sum(sizes), "rendering", largest=max(film, *sizes)
         )
         built = self._built(kernel, sizes, resources)
         self.build_ms = self.device.loaded.building.milliseconds - built_before
         if self._program is None or built.cl_program is not self._program.cl_program:
-            self._kernels = [built.kernel(kernel.name) for _ in range(_SLOTS)]
+            self._kernels = [built.kernel(kernel.name) for _ in range(SLOTS)]
             self._begin_pace()
         elif self.view is not None and view.scene.formula.iterations > self.view.scene.formula.iterations:
             self._begin_pace()
