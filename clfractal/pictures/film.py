@@ -47,12 +47,12 @@ class Film:
         self._told: dict[str, Any] = {}
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
-        # Zeros cost nothing until something is written.
-        self._data = np.zeros((len(self.channels), self.region.height, self.region.width), np.float32)
+        # Not `zeros`: NumPy asks for large pages only for memory that it does not want cleared, and small ones take the
+        # system ten times as long.
+        self._data = np.empty((len(self.channels), self.region.height, self.region.width), np.float32)
         self._planes = dict(zip(self.channels, self._data, strict=True))
-        for name in self.channels:
-            if CHANNELS[name].fill != 0:
-                self._planes[name].fill(CHANNELS[name].fill)
+        for name, plane in self._planes.items():
+            plane.fill(CHANNELS[name].fill)
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
 
     @property
