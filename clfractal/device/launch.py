@@ -88,7 +88,7 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
             if token is not None:
                 token.check()
             # Short launches are looked at often, long ones are not kept from their cores.
-            pause = (time.perf_counter() - start) / 16
+            pause = (time.perf_counter() - start) / 32
             time.sleep(min(max(pause, POLL_SECONDS / 16), POLL_SECONDS))
         return float(event.profile.end - event.profile.start) * 1e-6
 
