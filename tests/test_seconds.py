@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import pytest
 
 import clfractal
 from clfractal.device import program
+from clfractal.device.select import choose
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.voxels import programs
 from clfractal.work.run import Progress
 from tests.shell import SCENE, Ended, InProcess
 
@@ -33,18 +31,17 @@ KINDS = {
 def builds(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The texts of the programs that are built from now on, each of which takes its time (some beside each other)."""
     texts: list[str] = []
-    build = program.build
+    built = program._built
 
-    def slow(device: Any, text: str, **named: Any) -> program.Program:
+    def slow(device: Any, key: str, text: str, *others: Any) -> tuple[Any, bool]:
         texts.append(text)
         time.sleep(COMPILING)
-        built = build(device, text, **named)
-        return replace(built, build_ms=built.build_ms + 1e3 * COMPILING)
+        return built(device, key, text, *others)
 
     for kind in KINDS:  # whatever they really take is over
         clfractal.render(SCENE + KINDS[kind])
-    monkeypatch.setattr(program, "build", slow)
-    monkeypatch.setattr(programs, "_loaded", WeakKeyDictionary())  # those that fill grids
+    monkeypatch.setattr(program, "_built", slow)
+    choose().loaded.clear()
     return texts
 
 
@@ -84,5 +81,5 @@ def test_of_the_shell(
 def test_of_both_eyes_films(builds: list[str]) -> None:
     """Each tells its own time."""
     films = clfractal.render_pair(SCENE + KINDS["stereo"])
-    assert len(builds) == 2
+    assert len(builds) == 1  # both eyes have one program
     assert all(0 < film.header["seconds"] < 1 for film in films)

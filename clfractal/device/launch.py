@@ -77,7 +77,7 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
         DeviceError: the launch failed.
         Stopped: the token was set.
     """
-    pause = POLL_SECONDS / 16
+    start = time.perf_counter()
     with device.failures(doing):
         while True:
             status = event.command_execution_status
@@ -87,8 +87,9 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
                 raise DeviceError(f"{device.info.name}: the device failed while {doing}: status {status}")
             if token is not None:
                 token.check()
-            time.sleep(pause)
-            pause = min(2 * pause, POLL_SECONDS)
+            # Short launches are looked at often, long ones are not kept from their cores.
+            pause = (time.perf_counter() - start) / 32
+            time.sleep(min(max(pause, POLL_SECONDS / 16), POLL_SECONDS))
         return float(event.profile.end - event.profile.start) * 1e-6
 
 
@@ -102,6 +103,8 @@ def in_launches(
     watched: Sequence[Watched] = (),
 ) -> Iterator[tuple[T, float]]:
     """Runs work in launches, two at a time, and yields the data that `enqueue` gave for each, with its milliseconds.
+
+    While the caller handles one result, the next two launches are under way, so launches need three sets of output buffers.
 
     Afterwards the device is idle, however it ends (completed, by an error, an interrupt, or because the caller stops).
 
@@ -117,23 +120,26 @@ def in_launches(
     """
     flying: deque[Part[T]] = deque()
     more = True
+
+    def fill() -> None:
+        nonlocal more
+        while more and len(flying) < IN_FLIGHT:
+            if token is not None:
+                token.check()
+            part = enqueue(pace.size)
+            if part is None:
+                more = False
+            else:
+                flying.append(part)
+
     try:
-        while True:
-            while more and len(flying) < IN_FLIGHT:
-                if token is not None:
-                    token.check()
-                part = enqueue(pace.size)
-                if part is None:
-                    more = False
-                else:
-                    flying.append(part)
-            if not flying:
-                return
+        fill()
+        while flying:
             milliseconds = wait(flying[0].event, device, doing, token)
             part = flying.popleft()
             pace.learn(part.amount, milliseconds)
-            if token is not None:
-                token.check()
+            # Before the caller reads what is finished: the device must not wait for that.
+            fill()
             yield part.about, milliseconds
     finally:
         if flying:

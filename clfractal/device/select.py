@@ -129,8 +129,8 @@ class Device:
         ):
             if need > have:
                 raise DeviceError(
-                    f"{what} needs {_size(need)} of device memory, "
-                    f"{self.info.name} has {_size(have)} of {limit}",
+                    f"{what} needs {shown_size(need)} of device memory, "
+                    f"{self.info.name} has {shown_size(have)} of {limit}",
                     status=STATUS_BAD_INPUT,
                 )
 
@@ -142,10 +142,10 @@ class Device:
         except cl.Error as error:
             name = self.info.name
             if is_out_of_memory(error):
-                wanted = f"{_size(need)} are needed, " if need is not None else ""
+                wanted = f"{shown_size(need)} are needed, " if need is not None else ""
                 raise DeviceError(
                     f"{name}: out of device memory while {doing}: "
-                    f"{wanted}{_size(self.info.memory)} are available",
+                    f"{wanted}{shown_size(self.info.memory)} are available",
                     details=str(error),
                     status=STATUS_BAD_INPUT,
                 ) from error
@@ -398,5 +398,6 @@ def _version_numbers(version: str) -> tuple[int, ...]:
     return tuple(int(number) for number in match.group(1).split(".")) if match else ()
 
 
-def _size(nbytes: int) -> str:
+def shown_size(nbytes: int) -> str:
+    """A size in bytes for messages, such as `1.5 GiB`."""
     return f"{nbytes / 2**30:.1f} GiB" if nbytes >= 2**30 else f"{nbytes / 2**20:.1f} MiB"

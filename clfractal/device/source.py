@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from clfractal.errors import KernelBuildError, Where, nearest
@@ -86,8 +87,32 @@ def flatten(
     Raises:
         KernelBuildError: an include cannot be found or is not quoted, with its file and line.
     """
-    flattener = _Flattener(kernels or folder("kernels"), dict(generated or {}))
-    for name, value in (defines or {}).items():
+    parts = tuple((generated or {}).items()), tuple((defines or {}).items()), tuple(user)
+    if kernels is not None:
+        return _flatten(entry, *parts, kernels)
+    return _flatten_kept(entry, *parts)
+
+
+@lru_cache(maxsize=64)
+def _flatten_kept(
+    entry: str,
+    generated: tuple[tuple[str, str], ...],
+    defines: tuple[tuple[str, object], ...],
+    user: tuple[str, ...],
+) -> FlatText:
+    """Of the kernels that travel with the program: one picture after the other asks for the same text."""
+    return _flatten(entry, generated, defines, user, folder("kernels"))
+
+
+def _flatten(
+    entry: str,
+    generated: tuple[tuple[str, str], ...],
+    defines: tuple[tuple[str, object], ...],
+    user: tuple[str, ...],
+    kernels: Path,
+) -> FlatText:
+    flattener = _Flattener(kernels, dict(generated))
+    for name, value in defines:
         flattener.lines.append(f"#define {name} {value}")
     flattener.add(entry, Where())
     return FlatText("\n".join(flattener.lines) + "\n", SourceMap(flattener.texts, frozenset(user)))

@@ -47,9 +47,12 @@ class Film:
         self._told: dict[str, Any] = {}
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
+        # Not `zeros`: NumPy asks for large pages only for memory that it does not want cleared, and small ones take the
+        # system ten times as long.
         self._data = np.empty((len(self.channels), self.region.height, self.region.width), np.float32)
-        self._data[:] = np.array([CHANNELS[name].fill for name in self.channels])[:, None, None]
         self._planes = dict(zip(self.channels, self._data, strict=True))
+        for name, plane in self._planes.items():
+            plane.fill(CHANNELS[name].fill)
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
 
     @property

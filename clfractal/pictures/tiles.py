@@ -9,6 +9,7 @@ Tiles at the rim of the region are cut to it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -132,7 +133,15 @@ class TileGrid:
 
         Distances are compared in whole half-pixels, so the order is the same on every machine.
         """
-        boxes = self.boxes().astype(np.int64)
-        across = 2 * boxes[:, 0] + boxes[:, 2] - (2 * self.region.x + self.region.width)
-        down = 2 * boxes[:, 1] + boxes[:, 3] - (2 * self.region.y + self.region.height)
-        return np.argsort(across * across + down * down, kind="stable").astype(np.int32)
+        return _order_from_center(self)
+
+
+@lru_cache(maxsize=8)
+def _order_from_center(grid: TileGrid) -> npt.NDArray[np.int32]:
+    """Kept, and not to be written to: frames of a film ask for the same again and again."""
+    boxes, region = grid.boxes().astype(np.int64), grid.region
+    across = 2 * boxes[:, 0] + boxes[:, 2] - (2 * region.x + region.width)
+    down = 2 * boxes[:, 1] + boxes[:, 3] - (2 * region.y + region.height)
+    order = np.argsort(across * across + down * down, kind="stable").astype(np.int32)
+    order.setflags(write=False)
+    return order

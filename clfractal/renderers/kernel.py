@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any, ClassVar, TypeAlias
 
-import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
@@ -72,17 +70,5 @@ class TileKernel(ABC):
 
 
 def flat_text(entry: str, *, generated: Mapping[str, str], defines: Mapping[str, object]) -> FlatText:
-    """As `flatten`; the last texts are kept, since a picture after the other asks for the same."""
-    return _flat_text(entry, tuple(generated.items()), tuple(defines.items()))
-
-
-@lru_cache(maxsize=32)
-def _flat_text(
-    entry: str, generated: tuple[tuple[str, str], ...], defines: tuple[tuple[str, object], ...]
-) -> FlatText:
-    return flatten(entry, generated=dict(generated), defines=dict(defines), user=["formula.h"])
-
-
-def palette_or_none(table: npt.NDArray[np.float32] | None) -> npt.NDArray[np.float32]:
-    """A palette's colours, or a placeholder if the program reads none, because buffers cannot be empty."""
-    return np.zeros(3, np.float32) if table is None else np.ascontiguousarray(table, np.float32)
+    """The text of a renderer's program: as `flatten`, and the formula is the user's."""
+    return flatten(entry, generated=generated, defines=defines, user=["formula.h"])

@@ -81,7 +81,7 @@ _reports: dict[tuple[str, str, str], tuple[MarchReport, ...]] = {}
 
 def rule_of(chain: Chain) -> Rule:
     """The rule for a formula's distances while marching: its scalar rule, if every member has one, else the Jacobian."""
-    return "scalar" if all(link.bound.derivative is not None for link in chain.links) else "jacobian"
+    return "scalar" if write_formula(chain).has_derivative else "jacobian"
 
 
 def best_lanes(

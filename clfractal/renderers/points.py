@@ -10,16 +10,19 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device import program
+from clfractal.device.cancel import CancelToken
+from clfractal.device.launch import Pace, Part, in_launches
 from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
+from clfractal.device.watched import Watched
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 
 Floats = npt.NDArray[np.float64]
 
-# Points of one launch: bounds the device memory, and how long a launch may run.
+# Most points of one launch: bounds the device memory.
 LAUNCH_POINTS = 1 << 18
 
 # Points of a work-group. Fixed, because PoCL compiles a kernel anew for every size of work-group.
@@ -54,6 +57,7 @@ def escape(
     lanes: int,
     precision: Precision = "float32",
     bailout: float | None = None,
+    token: CancelToken | None = None,
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
     """Escape counts of points, shape (n, 3) in scene units: (iterations, inside), both of shape (n,).
 
@@ -63,8 +67,9 @@ def escape(
     Raises:
         ValueError: points of another shape, or not finite.
         DeviceError, KernelBuildError: the device failed.
+        Stopped: the token was set.
     """
-    result = _run(chain, points, iterations, "escape_counts", 2, device, lanes, precision, bailout)
+    result = _run(chain, points, iterations, "escape_counts", 2, device, lanes, precision, bailout, token)
     return result[0].astype(np.int64), result[1] > 0
 
 
@@ -76,9 +81,10 @@ def distances(
     device: Device,
     lanes: int,
     precision: Precision = "float32",
+    token: CancelToken | None = None,
 ) -> Distances:
     """Distances to the solid at points of shape (n, 3), with normals; see `escape` for the errors."""
-    result = _run(chain, points, iterations, "distances", 7, device, lanes, precision, None)
+    result = _run(chain, points, iterations, "distances", 7, device, lanes, precision, None, token)
     inside = result[6] > 0
     # Inside the kernel's gradient is that of |z| after the last application; the distance is 0 all around.
     normal = np.where(inside[:, None], 0.0, result[2:5].T)
@@ -95,6 +101,7 @@ def _run(
     lanes: int,
     precision: Precision,
     bailout: float | None,
+    token: CancelToken | None,
 ) -> Floats:
     """Runs one of the kernels of `points.cl`; gives its planes, shape (planes, n)."""
     array = np.asarray(points, np.float64)
@@ -108,25 +115,51 @@ def _run(
     text = flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
     built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
     kernel = built.kernel(kernel_name)
-    orbit = records.orbit_record(chain, iterations, precision, bailout).reshape(1)
-    constants = np.array(formula.constants, precision)
+    orbit = Watched(device, records.orbit_record(chain, iterations, precision, bailout).reshape(1))
+    constants = _upload(device, np.array(formula.constants, precision))
     result = np.empty((planes, len(array)))
-    with device.failures("evaluating points"):
-        fixed = [_upload(device, orbit), _upload(device, constants)]
-        for start in range(0, len(array), LAUNCH_POINTS):
-            part = array[start : start + LAUNCH_POINTS]
-            count = -(-len(part) // GROUP_POINTS) * GROUP_POINTS
-            padded = np.zeros((3, count), precision)
-            padded[:, : len(part)] = part.T
-            out = np.empty((planes, count), precision)
-            buffer = device.buffer(out.nbytes, "results")
-            # A kernel keeps no reference to its arguments: `arguments` must outlive the launch.
-            arguments: list[Any] = [_upload(device, padded), buffer, np.int32(count), *fixed]
+    place = 0
+
+    def enqueue(size: float) -> Part[_Launch] | None:
+        nonlocal place
+        if place >= len(array):
+            return None
+        part = array[place : place + int(min(size, LAUNCH_POINTS))]
+        count = -(-len(part) // GROUP_POINTS) * GROUP_POINTS
+        padded = np.zeros((3, count), precision)
+        padded[:, : len(part)] = part.T
+        with device.failures("evaluating points"):
+            buffer = device.buffer(planes * count * padded.itemsize, "results")
+            # A kernel keeps no reference to its arguments: they must outlive the launch.
+            arguments: list[Any] = [_upload(device, padded), buffer, np.int32(count), orbit.buffer, constants]
             kernel.set_args(*arguments)
-            cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (GROUP_POINTS // lanes,))
-            cl.enqueue_copy(device.queue, out, buffer)
-            result[:, start : start + len(part)] = out[:, : len(part)]
+            event = cl.enqueue_nd_range_kernel(
+                device.queue, kernel, (count // lanes,), (GROUP_POINTS // lanes,)
+            )
+            device.queue.flush()
+        place += len(part)
+        return Part(event, float(len(part)), _Launch(place - len(part), len(part), count, arguments))
+
+    # What a point takes is not known yet: a group of points for each core, of any number of applications.
+    pace = Pace(float(GROUP_POINTS * max(device.info.compute_units, 1)), least=float(GROUP_POINTS))
+    for launch, _ in in_launches(
+        device, enqueue, pace, doing="evaluating points", token=token, watched=[orbit]
+    ):
+        out = np.empty((planes, launch.padded), precision)
+        with device.failures("evaluating points"):
+            cl.enqueue_copy(device.transfers, out, launch.arguments[1])
+        result[:, launch.first : launch.first + launch.count] = out[:, : launch.count]
     return result
+
+
+@dataclass(frozen=True, slots=True)
+class _Launch:
+    """Points of a launch: the first, how many, how many with those that fill up the last group; and its arguments."""
+
+    first: int
+    count: int
+    padded: int
+    arguments: list[Any]
 
 
 def _upload(device: Device, array: npt.NDArray[np.generic]) -> cl.Buffer:

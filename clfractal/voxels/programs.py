@@ -110,6 +110,8 @@ def build_all(
         )
         return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
 
+    if len(recipes) == 1:
+        return [build(recipes[0])]
     with ThreadPoolExecutor(max(len(recipes), 1)) as pool:
         try:
             return list(pool.map(build, recipes))

@@ -13,6 +13,7 @@ from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device
+from clfractal.device.source import FlatText
 from clfractal.device.watched import Watched, is_watched
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.cut_plane import CutPlaneKernel
@@ -33,7 +34,9 @@ TILE_PIXELS = TILE * TILE
 GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
 # Tiles of the largest launch: 1024 of them are a megapixel.
 CAPACITY = 512
-_SLOTS = 2
+SLOTS = 3
+"""Sets of buffers for results: two launches are under way, and one is being read."""
+_ALIGNMENT = 4096
 
 Floats = npt.NDArray[np.float32]
 Counts = npt.NDArray[np.uint64]
@@ -49,7 +52,7 @@ class Span:
         samples: first sample of each pixel, and the one after the last.
         mode: PASS_KEEP and PASS_ADD, as bits.
         kept_places: of each tile, its number among those that are kept for later passes.
-        slot: which of the two sets of buffers the results go into.
+        slot: which of the sets of buffers the results go into.
     """
 
     tiles: npt.NDArray[np.int32]
@@ -60,28 +63,39 @@ class Span:
     slot: int
 
 
+@dataclass(frozen=True, slots=True)
+class OutputSet:
+    """Where one launch leaves its results: `results` as a whole, of which `statistics` are the head and `film` the rest."""
+
+    results: cl.Buffer
+    statistics: cl.Buffer
+    film: cl.Buffer
+    places: cl.Buffer
+
+
 class OutputBuffers:
-    """Buffers for the results of launches: two sets, so that the device does not wait while the host reads one."""
+    """Buffers for the results of launches: several sets, so that the device does not wait while the host reads one."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self.sizes = (0, 0, 0)
-        self.sets: list[tuple[cl.Buffer, cl.Buffer, cl.Buffer]] = []
+        self.sets: list[OutputSet] = []
 
-    def fit(self, film: int, statistics: int, places: int) -> bool:
-        """Makes sure that each set has room for so many bytes; True if the buffers were replaced."""
-        wanted = (film, statistics, places)
-        if all(have >= want for have, want in zip(self.sizes, wanted, strict=True)):
-            return False
-        self.sizes = tuple(map(max, self.sizes, wanted))  # type: ignore[assignment]
+    def fit(self, film: int, statistics: int, places: int) -> None:
+        """Makes sure that each set has room for so many bytes."""
+        if all(have >= want for have, want in zip(self.sizes, (film, statistics, places), strict=True)):
+            return
+        # Parts of a buffer begin at multiples of what any device asks for.
+        wide = -(-max(self.sizes[1], statistics) // _ALIGNMENT) * _ALIGNMENT
+        self.sizes = (max(self.sizes[0], film), wide, max(self.sizes[2], places))
         self.sets = []
-        names = ("the film", "statistics", "tiles' places")
-        for _ in range(_SLOTS):
-            first, second, third = (
-                self.device.buffer(size, name) for size, name in zip(self.sizes, names, strict=True)
-            )
-            self.sets.append((first, second, third))
-        return True
+        for _ in range(SLOTS):
+            results = self.device.buffer(wide + self.sizes[0], "the film")
+            with self.device.failures("allocating the film"):
+                statistics_part = results.get_sub_region(0, wide)
+                film_part = results.get_sub_region(wide, self.sizes[0])
+            places_buffer = self.device.buffer(self.sizes[2], "tiles' places")
+            self.sets.append(OutputSet(results, statistics_part, film_part, places_buffer))
 
 
 class Drawing:
@@ -94,6 +108,7 @@ class Drawing:
         self.build_ms = 0.0
         self.pace = Pace(1.0)
         self._program: program.Program | None = None
+        self._text: FlatText | None = None
         self._kernels: list[cl.Kernel] = []
         self._buffers: list[cl.Buffer] = []
         self._given: list[KernelArgument] = []
@@ -122,21 +137,12 @@ class Drawing:
         statistics = self.capacity * self.packets * 4 * len(STATISTICS)
         sizes = [_size(argument) for argument in arguments]
         self.device.check_memory(
-            _SLOTS * (film + statistics) + sum(sizes), "rendering", largest=max(film, *sizes)
+            SLOTS * (film + statistics) + sum(sizes), "rendering", largest=max(film, *sizes)
         )
-        text = kernel.text()
-        built = program.build(
-            self.device,
-            text.text,
-            flags=program.math_flags(plan.precision),
-            sources=text.sources,
-            warm=self._warm(kernel.name, len(plan.channels), sizes),
-            on_compile=resources.on_compile,
-            stopped=resources.token,
-        )
+        built = self._built(kernel, sizes, resources)
         self.build_ms = self.device.loaded.building.milliseconds - built_before
         if self._program is None or built.cl_program is not self._program.cl_program:
-            self._kernels = [built.kernel(kernel.name) for _ in range(_SLOTS)]
+            self._kernels = [built.kernel(kernel.name) for _ in range(SLOTS)]
             self._begin_pace()
         elif self.view is not None and view.scene.formula.iterations > self.view.scene.formula.iterations:
             self._begin_pace()
@@ -185,10 +191,10 @@ class Drawing:
         kernel, (first, end) = self._kernels[span.slot], span.packets
         numbers = (first, end, *span.samples, span.mode)
         with self.device.failures("rendering"):
-            # Non-blocking, in the kernels' own queue: with all cores busy, PoCL would delay a blocking write until the
-            # launch before has ended. So the array must stay alive until the write is done.
+            # In the kernels' own queue, and nobody waits: while every core is at work PoCL lets a write wait for the
+            # launch before. The array has to live that long.
             self._places[span.slot] = places
-            cl.enqueue_copy(self.device.queue, self.outputs.sets[span.slot][2], places, is_blocking=False)
+            cl.enqueue_copy(self.device.queue, self.outputs.sets[span.slot].places, places, is_blocking=False)
             for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
                 kernel.set_arg(index, np.int32(number))
             count = -(-(end - first) // self.group) * self.group
@@ -201,13 +207,30 @@ class Drawing:
     def collect(self, span: Span) -> tuple[Floats, Counts]:
         """Channels of finished tiles, shape (tiles, channels, TILE, TILE), and the sums of STATISTICS."""
         assert self.view is not None
-        film = np.empty((len(span.tiles), len(self.view.plan.channels), TILE, TILE), np.float32)
-        statistics = np.empty((len(span.tiles) * self.packets, len(STATISTICS)), np.uint32)
-        from_film, from_statistics, _ = self.outputs.sets[span.slot]
+        shape = (len(span.tiles), len(self.view.plan.channels), TILE, TILE)
+        head, counts = self.outputs.sizes[1], len(span.tiles) * self.packets * len(STATISTICS)
+        found = np.empty(head + 4 * int(np.prod(shape)), np.uint8)
         with self.device.failures("reading the film"):
-            cl.enqueue_copy(self.device.transfers, statistics, from_statistics)
-            cl.enqueue_copy(self.device.transfers, film, from_film)
-        return film, statistics.sum(axis=0, dtype=np.uint64)
+            cl.enqueue_copy(self.device.transfers, found, self.outputs.sets[span.slot].results)
+        statistics = found[: 4 * counts].view(np.uint32).reshape(-1, len(STATISTICS))
+        return found[head:].view(np.float32).reshape(shape), statistics.sum(axis=0, dtype=np.uint64)
+
+    def _built(self, kernel: TileKernel, sizes: list[int], resources: Resources) -> program.Program:
+        """The kernel's program: the one before, if its text is the same."""
+        text = kernel.text()
+        if self._program is not None and text is self._text:
+            return self._program
+        built = program.build(
+            self.device,
+            text.text,
+            flags=program.math_flags(kernel.plan.precision),
+            sources=text.sources,
+            warm=self._warm(kernel.name, len(kernel.plan.channels), sizes),
+            on_compile=resources.on_compile,
+            stopped=resources.token,
+        )
+        self._text = text
+        return built
 
     def _begin_pace(self) -> None:
         """One sample of a tile for each core, because the speed is not known yet."""
@@ -239,18 +262,20 @@ class Drawing:
         if buffer is None:
             buffer = self.device.buffer(max(data.nbytes, 16), "constants", read_only=True)
         with self.device.failures("uploading constants"):
-            cl.enqueue_copy(self.device.queue, buffer, data.reshape(-1).view(np.uint8))
+            # Before all launches to come, and nobody waits: the array is kept until the next one.
+            cl.enqueue_copy(self.device.queue, buffer, data.reshape(-1).view(np.uint8), is_blocking=False)
         return buffer
 
     def _set_arguments(self) -> None:
         assert self.view is not None
         kept = (
-            self._kept if self._kept is not None else self.outputs.sets[0][2]
-        )  # a placeholder that is never read
+            self._kept if self._kept is not None else self.outputs.sets[0].places
+        )  # a stand-in: nobody reads it
         counts = (len(self.view.plan.channels), self._kept_count)
         with self.device.failures("setting arguments"):
-            for kernel, (film, statistics, places) in zip(self._kernels, self.outputs.sets, strict=True):
-                for index, buffer in enumerate((film, kept, statistics, places, *self._buffers)):
+            for kernel, own in zip(self._kernels, self.outputs.sets, strict=True):
+                first = (own.film, kept, own.statistics, own.places)
+                for index, buffer in enumerate((*first, *self._buffers)):
                     kernel.set_arg(index, buffer)
                 for index, number in enumerate(counts, start=4 + len(self._buffers)):
                     kernel.set_arg(index, np.int32(number))

@@ -9,16 +9,19 @@ import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
-from clfractal.device.select import Device
+from clfractal.device.select import Device, shown_size
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.passes import PASS_ADD, PASS_KEEP
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Kept, Resources
-from clfractal.work.drawing import Drawing, OutputBuffers, Span
+from clfractal.work.drawing import SLOTS, Drawing, OutputBuffers, Span
 from clfractal.work.job import Job
 from clfractal.work.run import Result, Tally, WorkItem
 
 Tiles = npt.NDArray[np.int32]
+
+# Device memory for passes that the user is told of before it is taken.
+_WORTH_TELLING = 1 << 28
 
 
 class LocalExecutor:
@@ -62,7 +65,7 @@ class LocalExecutor:
             del self._drawings[number]
 
     def check_room(self, job: Job) -> None:
-        """Makes sure that a job can be rendered in passes.
+        """Makes sure that a job can be rendered in passes, and tells what a large one needs.
 
         Raises:
             DeviceError: status 2, with the memory needed and available, if the data kept between passes do not fit.
@@ -72,6 +75,8 @@ class LocalExecutor:
             for number, view in enumerate(job.views)
         ]
         self.device.check_memory(sum(needs), "a picture in passes", largest=max(needs))
+        if self.tell is not None and sum(needs) >= _WORTH_TELLING:
+            self.tell(f"a picture in passes needs {shown_size(sum(needs))} of device memory")
 
     def forget(self) -> None:
         """Frees the data kept between the passes of a picture."""
@@ -192,5 +197,5 @@ class _Cutter:
         kept = tiles if self.keep else np.zeros(len(tiles), np.int32)
         span = Span(tiles, packets, samples, mode, kept, self.slot)
         if last:
-            self.slot = 1 - self.slot
+            self.slot = (self.slot + 1) % SLOTS
         return span

@@ -273,3 +273,13 @@ class TestRefinement:
         with Engine(device) as engine:
             engine.refine(changed(BULB))._ipython_display_()
         assert shown == ["every 8th pixel", "every 4th pixel", "every 2nd pixel", ""]
+
+    def test_large_needs_are_told_first(self, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+        from clfractal.work import local
+
+        told: list[str] = []
+        monkeypatch.setattr(local, "_WORTH_TELLING", 1 << 10)
+        with Engine(device, tell=told.append) as engine:
+            list(engine.refine(changed(BULB, "renderer.samples=2", "output.channels=[R, G, B]")))
+        # Three colours and the number of shots, of 2 x 2 tiles.
+        assert told == ["a picture in passes needs 0.1 MiB of device memory"]
