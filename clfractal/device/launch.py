@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
@@ -101,7 +101,7 @@ def in_launches(
     doing: str,
     token: CancelToken | None = None,
     watched: Sequence[Watched] = (),
-) -> Iterator[tuple[T, float]]:
+) -> Generator[tuple[T, float]]:
     """Runs work in launches, two at a time, and yields the data that `enqueue` gave for each, with its milliseconds.
 
     While the caller handles one result, the next two launches are under way, so launches need three sets of output buffers.
@@ -217,10 +217,12 @@ def run_in_parts(
         return Part(event, part, min(place, count))
 
     total = 0.0
-    for finished, milliseconds in in_launches(
+    launches = in_launches(
         device, enqueue, Pace(float(first_part)), doing=doing, token=token, watched=watched
-    ):
-        total += milliseconds
-        if done is not None:
-            done(finished)
+    )
+    with closing(launches):
+        for finished, milliseconds in launches:
+            total += milliseconds
+            if done is not None:
+                done(finished)
     return total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -142,13 +143,13 @@ def _run(
 
     # What a point takes is not known yet: a group of points for each core, of any number of applications.
     pace = Pace(float(GROUP_POINTS * max(device.info.compute_units, 1)), least=float(GROUP_POINTS))
-    for launch, _ in in_launches(
-        device, enqueue, pace, doing="evaluating points", token=token, watched=[orbit]
-    ):
-        out = np.empty((planes, launch.padded), precision)
-        with device.failures("evaluating points"):
-            cl.enqueue_copy(device.transfers, out, launch.arguments[1])
-        result[:, launch.first : launch.first + launch.count] = out[:, : launch.count]
+    launches = in_launches(device, enqueue, pace, doing="evaluating points", token=token, watched=[orbit])
+    with closing(launches):
+        for launch, _ in launches:
+            out = np.empty((planes, launch.padded), precision)
+            with device.failures("evaluating points"):
+                cl.enqueue_copy(device.transfers, out, launch.arguments[1])
+            result[:, launch.first : launch.first + launch.count] = out[:, : launch.count]
     return result
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
+from contextlib import closing
 
 import numpy as np
 import numpy.typing as npt
@@ -49,7 +50,7 @@ class LocalExecutor:
 
     def execute(
         self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
-    ) -> Iterator[Result]:
+    ) -> Generator[Result]:
         """See `Executor`. Tiles of a view come in the order in which they are wanted."""
         self.kept.begin_picture()
         for item in items:
@@ -99,7 +100,7 @@ class LocalExecutor:
 
 def _launched(
     drawing: Drawing, item: WorkItem, budget_seconds: float, token: CancelToken | None, *, keep: bool
-) -> Iterator[Result]:
+) -> Generator[Result]:
     """Launches an item's tiles and gives them as they are finished."""
     cutter = _Cutter(drawing, item, keep=keep)
     pace = drawing.pace
@@ -107,18 +108,22 @@ def _launched(
     pace.most = float(drawing.capacity * cutter.per_tile)
     pace.begin()
     tally = Tally(build_ms=drawing.build_ms)
-    for span, milliseconds in in_launches(
+    launches = in_launches(
         drawing.device, cutter.enqueue, pace, doing="rendering", token=token, watched=drawing.watched
-    ):
-        tally.kernel_ms += milliseconds
-        if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
-            # Only a part of a tile is done: there is nothing to read yet.
-            yield Result(item.view, np.zeros(0, np.int32), np.zeros((0, 0, TILE, TILE), np.float32), tally)
-        else:
-            film, sums = drawing.collect(span)
-            tally.rays, tally.steps, tally.iterations, tally.bad_distances = (int(each) for each in sums)
-            yield Result(item.view, span.tiles, film, tally)
-        tally = Tally()
+    )
+    with closing(launches):
+        for span, milliseconds in launches:
+            tally.kernel_ms += milliseconds
+            if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
+                # Only a part of a tile is done: there is nothing to read yet.
+                yield Result(
+                    item.view, np.zeros(0, np.int32), np.zeros((0, 0, TILE, TILE), np.float32), tally
+                )
+            else:
+                film, sums = drawing.collect(span)
+                tally.rays, tally.steps, tally.iterations, tally.bad_distances = (int(each) for each in sums)
+                yield Result(item.view, span.tiles, film, tally)
+            tally = Tally()
 
 
 class _Cutter:

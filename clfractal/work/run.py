@@ -6,7 +6,8 @@ An executor is whatever does work items: this process (`local.py`), and later th
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -82,7 +83,7 @@ class Executor(Protocol):
 
     def execute(
         self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
-    ) -> Iterator[Result]:
+    ) -> Generator[Result]:
         """Executes the items of a job and yields results as they come: complete tiles, each once, in any order.
 
         When the iterator is closed, or raises, no work of the job is running any more.
@@ -162,16 +163,17 @@ def run(
             items.append(WorkItem(number, order[~store.done[order]], (0, view.plan.samples)))
         elif samples[0] < view.plan.samples:
             items.append(WorkItem(number, order, (samples[0], min(samples[1], view.plan.samples))))
-    results = executor.execute(job, items, token)
     last, seconds = state.seconds, [0.0] * len(stores)
-    for result in results:
-        if len(result.tiles):
-            stores[result.view].put_tiles(result.tiles, result.film)
-        state.tiles_done += len(result.tiles)
-        state.add(result.tally)
-        seconds[result.view] += state.seconds - last
-        stores[result.view].tell("seconds", seconds[result.view])
-        last = state.seconds
-        if progress is not None:
-            progress(state)
+    # Closed at once, whatever happens here: the device is idle before an error or an interrupt is seen.
+    with closing(executor.execute(job, items, token)) as results:
+        for result in results:
+            if len(result.tiles):
+                stores[result.view].put_tiles(result.tiles, result.film)
+            state.tiles_done += len(result.tiles)
+            state.add(result.tally)
+            seconds[result.view] += state.seconds - last
+            stores[result.view].tell("seconds", seconds[result.view])
+            last = state.seconds
+            if progress is not None:
+                progress(state)
     return state

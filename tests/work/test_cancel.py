@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import clfractal
 from benchmarks.cancel import waits
 from clfractal.commands.bench import HAST
-from clfractal.device import isolate
+from clfractal.device import isolate, launch
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device
@@ -100,3 +101,29 @@ def test_a_pace_begins_with_what_is_safe_for_the_heaviest() -> None:
     assert pace.size > 1000
     pace.begin()
     assert pace.size == pytest.approx(5)
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_after_an_error_the_device_is_idle(
+    error: type[BaseException], device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At once, not when the launches' generator happens to be collected."""
+    ended: list[int] = []
+    end = launch._end
+
+    def noted(flying: Any, *others: Any) -> None:
+        end(flying, *others)
+        ended.append(len(flying))
+
+    monkeypatch.setattr(launch, "_end", noted)
+
+    def stop(_: object) -> None:
+        raise error
+
+    scene = changed(BULB, "image.width=640", "image.height=480", "renderer.samples=4")
+    with Engine(device, budget_seconds=0.001) as engine:
+        with pytest.raises(error) as raised:
+            engine.render(scene, stop)
+        # (The exception is still alive, and with it all frames that it went through.)
+        assert raised.value.__traceback__ is not None
+        assert ended == [2]
