@@ -52,7 +52,14 @@ class TileKernel(ABC):
         """All arguments that stay the same from one launch to the next, in the kernel's order."""
         image, transparent = self.scene.image, self.scene.background == "transparent"
         return [
-            view_record(self.view.camera, image.width, image.height, self.plan, self.precision),
+            view_record(
+                self.view.camera,
+                image.width,
+                image.height,
+                self.plan,
+                self.precision,
+                footprint=self.footprint,
+            ),
             sampling_record(
                 self.scene.renderer,
                 self.plan.samples,
@@ -62,6 +69,11 @@ class TileKernel(ABC):
             *self.own_arguments(),
             slots(self.plan, self.scene.renderer),
         ]
+
+    @property
+    def footprint(self) -> int:
+        """How many of the picture's pixels a ray's cone is wide."""
+        return 1
 
     @property
     def has_alpha(self) -> bool:

@@ -39,8 +39,8 @@ class Plan:
         samples: rays per pixel.
         region: the part of the picture to render, in pixels.
         channels: what the film holds, in order.
-        divider: of a coarse picture, how many of the picture's pixels in each direction one of its pixels stands for;
-            the region is counted in these.
+        divider: n for a coarse picture, which has every nth pixel of the picture in each direction; the region is counted
+            in these.
     """
 
     precision: Precision

@@ -143,10 +143,16 @@ def struct_text() -> str:
     return "".join(struct.c_text() for struct in STRUCTS)
 
 
-def view_record(view: View, width: int, height: int, plan: Plan, precision: Precision) -> Record:
+def view_record(
+    view: View, width: int, height: int, plan: Plan, precision: Precision, *, footprint: int = 1
+) -> Record:
     """A View for a picture of `width` x `height` pixels, of which the plan's region is rendered.
 
-    With a divider, each pixel stands for that many in both directions, and all numbers in pixels count these larger ones.
+    With a divider d pixel (x, y) of the plan is the picture's pixel (d x + d / 2, d y + d / 2), with the very same ray: a
+    coarse picture shows what the finished one will show there.
+
+    Args:
+        footprint: how many of the picture's pixels the cone of a ray is wide.
     """
     coarse, region = plan.divider, plan.region
     values = {
@@ -159,9 +165,9 @@ def view_record(view: View, width: int, height: int, plan: Plan, precision: Prec
         "up": view.up,
         "lens_radius": view.lens_radius,
         "focus_distance": view.focus_distance,
-        "center_x": width / 2 / coarse,
-        "center_y": height / 2 / coarse,
-        "pixel_size": view.pixel_size(height) * coarse,
+        "center_x": (width - (coarse > 1)) / 2 / coarse,
+        "center_y": (height - (coarse > 1)) / 2 / coarse,
+        "pixel_size": view.pixel_size(height) * footprint,
         "perspective": int(view.eye is not None),
         "height": -(-height // coarse),
         "region_left": region.x,

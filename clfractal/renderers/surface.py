@@ -98,6 +98,12 @@ class SurfaceKernel(TileKernel):
     def text(self) -> FlatText:
         return program_text(self.scene, self.plan)
 
+    @property
+    def footprint(self) -> int:
+        # The points of a pixel lie all over the block that a coarse picture's pixel stands for, and their shared march has
+        # to be as wide.
+        return self.plan.divider if self.scene.surface.used_points.count > 1 else 1
+
     def own_arguments(self) -> list[KernelArgument]:
         scene, precision, kept = self.scene, self.precision, self.resources.kept
         formula = write_formula(scene.chain)

@@ -18,11 +18,9 @@ from clfractal.work.local import LocalExecutor
 from clfractal.work.run import run
 
 DIVIDERS = (8, 4, 2)
-"""Pixels of the picture, in each direction, that a pixel of the first passes stands for.
+"""Every how many pixels, in each direction, the first passes render.
 
-They are pictures of their own: a quarter of the next pass's pixels could be taken from the one before, but not where its
-rays' cones are as wide as its pixels, which makes it cheap; and a packet with a quarter of its lanes idle takes as long as
-a full one.
+Later passes do not reuse these pixels: a packet of which a quarter of the lanes is done takes as long as a full one.
 """
 
 
