@@ -56,7 +56,10 @@ def test_both_films(tmp_path: Path, mode: str) -> None:
 
 def test_what_is_no_single_film() -> None:
     for mode in ("pair", "multi_view"):
-        with pytest.raises(clfractal.SceneError, match=rf"stereo\.mode: {mode} keeps the two eyes. pictures apart; use render_pair"):
+        with pytest.raises(
+            clfractal.SceneError,
+            match=rf"stereo\.mode: {mode} keeps the two eyes. pictures apart; use render_pair",
+        ):
             clfractal.render(stereo(mode))
     with pytest.raises(clfractal.SceneError, match="stereo: a pair needs a scene with a stereo section"):
         clfractal.render_pair(SCENE)
