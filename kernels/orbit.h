@@ -71,6 +71,19 @@ INLINE mask settled(real square, __constant const struct Orbit *orbit) {
     return less_equal(square, (real)(orbit->bailout_square));
 }
 
+// What an orbit for a distance looks at after `look` applications: at the limit, which of its lanes are inside; before it, whether
+// the work was cancelled, which is the result.
+INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, __constant const struct Orbit *orbit) {
+    if (n < orbit->iterations) {
+        *look = min(n + ORBIT_LOOK, orbit->iterations);
+        return orbit_cancelled(orbit);
+    }
+    *inside = *alive & settled(square, orbit);
+    *alive &= ~*inside;
+    *look = INT_MAX;
+    return 0;
+}
+
 // Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
 INLINE orbit_end orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     state c, z;
@@ -140,15 +153,7 @@ INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const 
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
     mask inside = alive & ~alive;
     for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look) {
-            if (n == orbit->iterations) {
-                inside = alive & settled(square, orbit);
-                alive &= ~inside;
-            } else if (orbit_cancelled(orbit)) {
-                break;
-            }
-            look = n < orbit->iterations ? min(n + ORBIT_LOOK, orbit->iterations) : INT_MAX;
-        }
+        if (n == look && orbit_look(n, &look, square, &alive, &inside, orbit)) break;
         if (!any_lane(alive)) break;
         real next_growth = growth;
         const state next = apply_derivative(n, z, c, &next_growth, k);
@@ -189,15 +194,7 @@ INLINE clearance orbit_dual_distance(vec point, mask active, __constant const st
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
     mask inside = alive & ~alive;
     for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look) {
-            if (n == orbit->iterations) {
-                inside = alive & settled(square, orbit);
-                alive &= ~inside;
-            } else if (orbit_cancelled(orbit)) {
-                break;
-            }
-            look = n < orbit->iterations ? min(n + ORBIT_LOOK, orbit->iterations) : INT_MAX;
-        }
+        if (n == look && orbit_look(n, &look, square, &alive, &inside, orbit)) break;
         if (!any_lane(alive)) break;
         const dual_state next = dual_apply(n, z, c, k);
         z = dual_state_pick(alive, next, z);

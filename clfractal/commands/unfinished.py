@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -82,7 +83,7 @@ class Unfinished:
 
     def _drop_others(self, output: Path, shell: Shell) -> None:
         """Removes the journals of views that an earlier render to the same output had, but this one does not."""
-        for stale in output.parent.glob(f"{_escaped(output.name)}.*{PARTIAL}"):
+        for stale in output.parent.glob(f"{glob.escape(output.name)}.*{PARTIAL}"):
             if stale not in self.paths and _names_a_view(stale.name[len(output.name) : -len(PARTIAL)]):
                 shell.say(f"{stale}: earlier work is discarded")
                 stale.unlink(missing_ok=True)
@@ -105,9 +106,3 @@ def _names_a_view(words: str) -> bool:
     return all(
         word == "right" or (word[:4] == "view" and word[4:].isdecimal()) for word in words.split(".")[1:]
     )
-
-
-def _escaped(name: str) -> str:
-    from glob import escape
-
-    return escape(name)

@@ -109,6 +109,7 @@ class Drawing:
         self.pace = Pace(1.0)
         self._program: program.Program | None = None
         self._text: FlatText | None = None
+        self._flags: tuple[str, ...] = ()
         self._kernels: list[cl.Kernel] = []
         self._buffers: list[cl.Buffer] = []
         self._given: list[KernelArgument] = []
@@ -120,7 +121,8 @@ class Drawing:
     def update(self, view: PlannedView, resources: Resources, *, tiles: int) -> None:
         """Takes a view, of which at most `tiles` tiles are rendered at a time.
 
-        Only data that differ from the view before are sent; a program is built only if its text has changed.
+        Only data that differ from the view before are sent; a program is built only if its text has changed. After an
+        exception the drawing must not be used again: some of its buffers may hold the new view's data.
 
         Raises:
             DeviceError: too little memory (status 2), or the device failed.
@@ -217,19 +219,20 @@ class Drawing:
 
     def _built(self, kernel: TileKernel, sizes: list[int], resources: Resources) -> program.Program:
         """The kernel's program: the one before, if its text is the same."""
-        text = kernel.text()
-        if self._program is not None and text is self._text:
+        # A volume's rays may be float32 whatever its grid was filled with: then the texts are the same, and the flags not.
+        text, flags = kernel.text(), program.math_flags(kernel.plan.precision)
+        if self._program is not None and text is self._text and flags == self._flags:
             return self._program
         built = program.build(
             self.device,
             text.text,
-            flags=program.math_flags(kernel.plan.precision),
+            flags=flags,
             sources=text.sources,
             warm=self._warm(kernel.name, len(kernel.plan.channels), sizes),
             on_compile=resources.on_compile,
             stopped=resources.token,
         )
-        self._text = text
+        self._text, self._flags = text, flags
         return built
 
     def _begin_pace(self) -> None:

@@ -91,10 +91,10 @@ class LocalExecutor:
         self.kept = Kept()
 
     def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
-        if number not in self._drawings:
-            self._drawings[number] = Drawing(self.device, self._outputs)
-        drawing = self._drawings[number]
+        # Put back only when it is complete: one whose update failed is half of each view.
+        drawing = self._drawings.pop(number, None) or Drawing(self.device, self._outputs)
         drawing.update(view, Resources(self.device, self.kept, self.tell, token), tiles=tiles)
+        self._drawings[number] = drawing
         return drawing
 
 

@@ -68,8 +68,9 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
         films = JobFilms(job)
         for samples in ranges:
             before, films = films, JobFilms(job)
-            for film, old in zip(films.films, before.films, strict=True):
-                film.take(old)  # for views that are finished before the others
+            for view, film, old in zip(job.views, films.films, before.films, strict=True):
+                if view.plan.samples <= samples[0]:  # finished before the others
+                    film.take(old)
             seconds += run(job, films.films, executor, token=token, samples=samples).seconds
             last = samples[1] == job.samples
             yield _shown(films, seconds, "" if last else f"{samples[1]} of {job.samples} samples")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 import clfractal
 from clfractal.device import program
 from clfractal.device.select import Device, choose
-from clfractal.errors import ClfractalError, SceneError
+from clfractal.errors import ClfractalError, DeviceError, SceneError
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.voxels import fill
@@ -283,3 +284,43 @@ class TestRefinement:
             list(engine.refine(changed(BULB, "renderer.samples=2", "output.channels=[R, G, B]")))
         # Three colours and the number of shots, of 2 x 2 tiles.
         assert told == ["a picture in passes needs 0.1 MiB of device memory"]
+
+
+def test_a_view_that_half_arrived_leaves_nothing(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Out of memory after some of a new view's data were sent: the old view is complete again afterwards."""
+    old, new = changed(BULB), changed(BULB, *CHANGES["camera"], *CHANGES["light"], *CHANGES["a palette"])
+    with Engine(device) as engine:
+        expected = engine.render(old)
+        sent, calls = Drawing._sent, []
+
+        def failing(self: Drawing, *arguments: object) -> object:
+            calls.append(arguments)
+            if len(calls) == 2:
+                raise DeviceError("out of device memory")
+            return sent(self, *arguments)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(Drawing, "_sent", failing)
+        with pytest.raises(DeviceError):
+            engine.render(new)
+        monkeypatch.setattr(Drawing, "_sent", sent)
+        equal(engine.render(old), expected)
+        equal(engine.render(new), clfractal.render(new))
+
+
+def test_flags_follow_the_number_type_where_the_text_does_not(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A volume's rays are float32 in both, and the program's text is the same."""
+    flags: list[tuple[str, ...]] = []
+    build = program.build
+
+    def noted(*arguments: Any, **settings: Any) -> program.Program:
+        if "volume" in settings["warm"].kernel:
+            flags.append(settings["flags"])
+        return build(*arguments, **settings)
+
+    monkeypatch.setattr(program, "build", noted)
+    with Engine(device) as engine:
+        for precision in ("float32", "float64", "float64"):
+            engine.render(changed(VOLUME), precision=precision)
+    assert flags == [program.math_flags("float32"), program.math_flags("float64")]
