@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache as cache_of_calls
@@ -25,6 +25,9 @@ ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
 SPEEDS = "speeds"  # section of the cache: rays per second or the like, by `DeviceInfo.key`
 
 Kind = Literal["cpu", "gpu", "accelerator"]
+
+Properties = Sequence[tuple[Any, Any]]
+"""Of a context, beside its platform: pairs of `cl.context_properties`, or their numbers, and values."""
 
 _INSTALL_HINT = (
     "no OpenCL device; install a driver for the CPU with `pip install pocl-binary-distribution`, "
@@ -48,6 +51,7 @@ class DeviceInfo:
     max_alloc: int
     has_float64: bool
     gl_sharing: bool
+    """Whether it can share textures with an OpenGL context that it draws for."""
     compute_units: int
     target: str
     """The device's own version text; PoCL names the processor it generates code for in it."""
@@ -66,16 +70,22 @@ class Device:
     Args:
         info: what is known of it.
         cl_device: pyopencl's device.
-        properties: of its context, added to the platform: pairs of `cl.context_properties` and values, such as those
-            that let it share textures with an OpenGL context.
+        properties: of its context, added to the platform, such as those that let it share textures with an OpenGL
+            context.
+        make_context: makes the context from the device and the properties, where pyopencl would refuse them.
     """
 
     def __init__(
-        self, info: DeviceInfo, cl_device: cl.Device, properties: Sequence[tuple[Any, Any]] = ()
+        self,
+        info: DeviceInfo,
+        cl_device: cl.Device,
+        properties: Properties = (),
+        make_context: Callable[[cl.Device, Properties], cl.Context] | None = None,
     ) -> None:
         self.info = info
         self.cl_device = cl_device
         self.properties = tuple(properties)
+        self._make_context = make_context
         self.loaded = LoadedPrograms()
 
     def __repr__(self) -> str:
@@ -84,6 +94,8 @@ class Device:
     @cached_property
     def context(self) -> cl.Context:
         with self.failures("opening the device"):
+            if self._make_context is not None:
+                return self._make_context(self.cl_device, self.properties)
             if not self.properties:
                 return cl.Context([self.cl_device])
             platform = (cl.context_properties.PLATFORM, self.cl_device.platform)
@@ -102,9 +114,13 @@ class Device:
         with self.failures("opening the device"):
             return cl.CommandQueue(self.context)
 
-    def reopened(self, properties: Sequence[tuple[Any, Any]] = ()) -> Device:
+    def reopened(
+        self,
+        properties: Properties = (),
+        make_context: Callable[[cl.Device, Properties], cl.Context] | None = None,
+    ) -> Device:
         """The same device with another context, whose buffers and programs are its own."""
-        return Device(self.info, self.cl_device, properties)
+        return Device(self.info, self.cl_device, properties, make_context)
 
     def buffer(self, nbytes: int, what: str, *, read_only: bool = False) -> cl.Buffer:
         """Allocate `nbytes` of device memory for `what` (used in the message).
@@ -159,7 +175,7 @@ def devices() -> list[DeviceInfo]:
     return [device.info for device in _find()]
 
 
-def choose(spec: str | None = None, *, properties: Sequence[tuple[Any, Any]] = ()) -> Device:
+def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     """The device that `spec` names, else the environment variable CLFRACTAL_DEVICE, else the best one.
 
     `spec` is `cpu`, `gpu`, `accelerator`, indices `PLATFORM:DEVICE`, or part of a device's or platform's name
@@ -265,10 +281,11 @@ def error_number(error: cl.Error) -> int:
 def error_code(error: cl.Error) -> str:
     """Routine and status of a failure as one short text, e.g. `clEnqueueNDRangeKernel: OUT_OF_RESOURCES`."""
     routine = getattr(error, "routine", "") or "OpenCL"
-    return f"{routine}: {_status_name(error_number(error))}"
+    return f"{routine}: {status_name(error_number(error))}"
 
 
-def _status_name(number: int) -> str:
+def status_name(number: int) -> str:
+    """The name of an OpenCL status code, such as `OUT_OF_RESOURCES`."""
     to_string: Any = cl.status_code.to_string
     return str(to_string(number, "status %d"))
 
@@ -310,7 +327,7 @@ def _describe(index: str, platform: cl.Platform, device: cl.Device) -> DeviceInf
         memory=int(device.global_mem_size),
         max_alloc=int(device.max_mem_alloc_size),
         has_float64=_double_capabilities(device) != 0 or "cl_khr_fp64" in extensions,
-        gl_sharing="cl_khr_gl_sharing" in extensions and bool(cl.have_gl()),
+        gl_sharing="cl_khr_gl_sharing" in extensions,
         compute_units=int(device.max_compute_units),
         target=_tidy(device.version),
     )
