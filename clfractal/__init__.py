@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from clfractal.scene.model import Scene as Scene
     from clfractal.work.engine import Engine as Engine
     from clfractal.work.run import Progress as Progress
+    from clfractal.work.variations import variations as variations
 
 __version__ = "0.1.0"
 
@@ -54,6 +55,7 @@ _HOMES = {
     "Scene": "clfractal.scene.model",
     "Engine": "clfractal.work.engine",
     "Progress": "clfractal.work.run",
+    "variations": "clfractal.work.variations",
 }
 
 

@@ -64,7 +64,7 @@ def load_scene(
     text = source if isinstance(source, SceneText) else read_scene(source)
     document, scene = _validated(text, overrides, folder or text.folder)
     with _located(document):
-        _check(scene)
+        check_scene(scene)
     return scene
 
 
@@ -101,10 +101,11 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
     path = Path(source)
     if str(source) == "":
         raise FileError("a scene needs a file name")
-    return SceneText(read_document(_text(path), str(source)), path.parent)
+    return SceneText(read_document(read_text(path), str(source)), path.parent)
 
 
-def _text(path: Path) -> str:
+def read_text(path: Path) -> str:
+    """The text of a scene file, or of the scene that a picture holds; FileError if it cannot be read or holds none."""
     start = read_bytes(path, prefix=len(_PNG))
     found: str | None
     if start.startswith(_EXR):
@@ -178,7 +179,7 @@ def _defaults() -> dict[str, Any]:
     return Scene.model_validate(least).model_dump(mode="json")
 
 
-def _check(scene: Scene) -> None:
+def check_scene(scene: Scene) -> None:
     """Raises ClfractalError, at a dotted path, for mistakes that the schema cannot find; files are kept with the scene."""
     _ = scene.chain
     check_parts(scene)

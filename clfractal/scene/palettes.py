@@ -62,10 +62,20 @@ PALETTES = {
 def table(palette: Palette, size: int) -> npt.NDArray[np.float32]:
     """The palette as linear Rec. 709 at `size` equal distances from 0 to 1, shape (size, 3), within 0..1."""
     codes = np.array([list(bytes.fromhex(color)) for color in palette.colors.split()]) / 255
-    lab = np.cbrt(decode(codes) @ _TO_CONES.T) @ _TO_LAB.T
-    curve = _smooth(lab, np.linspace(0.0, 1.0, size), palette.periodic)
-    linear = (curve @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_CONES).T
-    return np.clip(linear, 0.0, 1.0).astype(np.float32)
+    curve = _smooth(to_oklab(decode(codes)), np.linspace(0.0, 1.0, size), palette.periodic)
+    return np.clip(from_oklab(curve), 0.0, 1.0).astype(np.float32)
+
+
+def to_oklab(linear: Floats) -> Floats:
+    """Linear Rec. 709 to Oklab (lightness, green-red, blue-yellow), shape (..., 3); white is (1, 0, 0)."""
+    lab: Floats = np.cbrt(linear @ _TO_CONES.T) @ _TO_LAB.T
+    return lab
+
+
+def from_oklab(lab: Floats) -> Floats:
+    """Oklab to linear Rec. 709, shape (..., 3); colours outside the gamut have negative components."""
+    linear: Floats = (lab @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_CONES).T
+    return linear
 
 
 def _smooth(knots: Floats, places: Floats, periodic: bool) -> Floats:
