@@ -78,16 +78,19 @@ INLINE void render_packet(pass s, world w) {
     if (s.first > 0) kept_pixel(kept, kept_slots, 0, &p);
     const real shots_before = p.shots;
     tally cost = {R(0.0), R(0.0), R(0.0)};
-    // A pixel that was done in an earlier pass has fewer shots.
-    mask active = at.in_region & equal(p.shots, (real)((scalar)s.first));
     for (int sample = s.first; sample < s.end; ++sample) {
+        // A pixel that is done has fewer shots. One that has more got them before this pass was interrupted.
+        mask active = at.in_region & ~less(p.shots, (real)((scalar)sample));
+        if (!any_lane(active)) break;
+        active &= equal(p.shots, (real)((scalar)sample));
 #if ADAPTIVE
         // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
         if (sample > 0 && sample >= s.sampling->min_samples && (sample & 3) == 0) {
             active &= less((real)(s.sampling->noise), noise_of(&p, s.sampling->transparent));
         }
 #endif
-        if (!any_lane(active) || *(volatile __constant const int *)&s.sampling->cancelled) break;
+        if (*(volatile __constant const int *)&s.sampling->cancelled) return;
+        if (!any_lane(active)) continue;
         // One sample lies in the middle.
         real across = R(0.0), below = R(0.0);
         if (s.sampling->samples > 1) {
@@ -101,6 +104,8 @@ INLINE void render_packet(pass s, world w) {
         noise_add(&p, found, active);
 #endif
     }
+    // A shot that was told to end is worth nothing: what the packet had before stays.
+    if (*(volatile __constant const int *)&s.sampling->cancelled) return;
     pixel_write(s.film + tile * s.channel_count * TILE_PIXELS, s.slots, at.place, &p);
     if (s.mode & PASS_KEEP) kept_pixel(kept, kept_slots, 1, &p);
 

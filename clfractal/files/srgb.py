@@ -16,9 +16,9 @@ Floats = npt.NDArray[np.float32]
 
 # The table for 8 bits is indexed by the leading bits of the float itself (exponent and 13 bits of the
 # fraction): equally fine, relative to the value, in shadows and lights, and the index costs no arithmetic.
-_SHIFT = 23 - 13
-_LOWEST = int(np.float32(2.0**-16).view(np.int32)) >> _SHIFT  # below: code 0.05 of 255, taken as 0
-_ONE = int(np.float32(1.0).view(np.int32)) >> _SHIFT
+TABLE_SHIFT = 23 - 13
+TABLE_LOWEST = int(np.float32(2.0**-16).view(np.int32)) >> TABLE_SHIFT  # below: code 0.05 of 255, taken as 0
+TABLE_ONE = int(np.float32(1.0).view(np.int32)) >> TABLE_SHIFT
 
 
 def encode(linear: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -33,11 +33,11 @@ def decode(code: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 @cache
-def _table8() -> npt.NDArray[np.uint16]:
-    """Code values in 1/256 of an 8-bit step (0 to 65280) for every index from `_LOWEST` to `_ONE`."""
-    index = np.arange(_LOWEST, _ONE + 1, dtype=np.int32)
+def table8() -> npt.NDArray[np.uint16]:
+    """Code values in 1/256 of an 8-bit step (0 to 65280) for every index from `TABLE_LOWEST` to `TABLE_ONE`."""
+    index = np.arange(TABLE_LOWEST, TABLE_ONE + 1, dtype=np.int32)
     # The middle of the interval of floats that share an index, but 1 itself for the last one.
-    middle = ((index << _SHIFT) + (1 << (_SHIFT - 1))).view(np.float32).astype(np.float64)
+    middle = ((index << TABLE_SHIFT) + (1 << (TABLE_SHIFT - 1))).view(np.float32).astype(np.float64)
     table = np.rint(encode(np.minimum(middle, 1.0)) * 255 * 256).astype(np.uint16)
     table[0] = 0
     return table
@@ -72,10 +72,10 @@ def encode8(linear: Floats, *, origin: tuple[int, int] = (0, 0)) -> npt.NDArray[
     for first in range(0, rows, 16):
         last = min(first + 16, rows)
         index = np.fmax(linear[first:last], np.float32(0)).view(np.int32)
-        np.right_shift(index, _SHIFT, out=index)
-        np.clip(index, _LOWEST, _ONE, out=index)
-        index -= _LOWEST
-        code = _table8().take(index)
+        np.right_shift(index, TABLE_SHIFT, out=index)
+        np.clip(index, TABLE_LOWEST, TABLE_ONE, out=index)
+        index -= TABLE_LOWEST
+        code = table8().take(index)
         top = (origin[1] + first) % 16
         code += pattern[top : top + last - first]
         code >>= 8

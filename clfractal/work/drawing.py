@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +39,8 @@ SLOTS = 3
 """Sets of buffers for results: two launches are under way, and one is being read."""
 _ALIGNMENT = 4096
 
+Outlet = Callable[[cl.Buffer, cl.Buffer, int], None]
+"""Takes finished tiles on the device by a kernel in its queue: of the film, at these places, so many."""
 Floats = npt.NDArray[np.float32]
 Counts = npt.NDArray[np.uint64]
 
@@ -205,6 +208,12 @@ class Drawing:
             )
             self.device.queue.flush()
         return event
+
+    def hand_over(self, span: Span, outlet: Outlet) -> None:
+        """Lets an outlet take the tiles of a launch that has ended, before the launch's buffers are used again."""
+        own = self.outputs.sets[span.slot]
+        with self.device.failures("showing tiles"):
+            outlet(own.film, own.places, len(span.tiles))
 
     def collect(self, span: Span) -> tuple[Floats, Counts]:
         """Channels of finished tiles, shape (tiles, channels, TILE, TILE), and the sums of STATISTICS."""

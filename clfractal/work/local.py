@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 from contextlib import closing
+from functools import partial as partial_of
 
 import numpy as np
 import numpy.typing as npt
+import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
@@ -15,11 +17,16 @@ from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.passes import PASS_ADD, PASS_KEEP
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Kept, Resources
-from clfractal.work.drawing import SLOTS, Drawing, OutputBuffers, Span
+from clfractal.work.drawing import SLOTS, Drawing, Outlet, OutputBuffers, Span
 from clfractal.work.job import Job
 from clfractal.work.run import Result, Tally, WorkItem
 
 Tiles = npt.NDArray[np.int32]
+ViewOutlet = Callable[[int, cl.Buffer, cl.Buffer, int], None]
+"""An `Outlet` for several views: the view's number, then as there."""
+
+_NO_TILES = np.zeros(0, np.int32)
+_NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
 
 # Device memory for passes that the user is told of before it is taken.
 _WORTH_TELLING = 1 << 28
@@ -32,6 +39,8 @@ class LocalExecutor:
         device: where.
         budget_seconds: limit of the work that is queued on the device: cancelled work ends after about this time.
         tell: called with a message if a program has to be compiled first, or if something does not fit.
+
+    `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no films and no statistics.
     """
 
     def __init__(
@@ -45,6 +54,7 @@ class LocalExecutor:
         self.budget_seconds = budget_seconds
         self.tell = tell
         self.kept = Kept()
+        self.outlet: ViewOutlet | None = None
         self._outputs = OutputBuffers(device)
         self._drawings: dict[int, Drawing] = {}
 
@@ -61,7 +71,8 @@ class LocalExecutor:
             partial = item.samples != (0, view.plan.samples)
             if partial:
                 drawing.keep(TileGrid(view.plan.region).count)
-            yield from _launched(drawing, item, self.budget_seconds, token, keep=partial)
+            outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
+            yield from _launched(drawing, item, self.budget_seconds, token, keep=partial, outlet=outlet)
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
 
@@ -99,7 +110,13 @@ class LocalExecutor:
 
 
 def _launched(
-    drawing: Drawing, item: WorkItem, budget_seconds: float, token: CancelToken | None, *, keep: bool
+    drawing: Drawing,
+    item: WorkItem,
+    budget_seconds: float,
+    token: CancelToken | None,
+    *,
+    keep: bool,
+    outlet: Outlet | None,
 ) -> Generator[Result]:
     """Launches an item's tiles and gives them as they are finished."""
     cutter = _Cutter(drawing, item, keep=keep)
@@ -116,9 +133,11 @@ def _launched(
             tally.kernel_ms += milliseconds
             if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
                 # Only a part of a tile is done: there is nothing to read yet.
-                yield Result(
-                    item.view, np.zeros(0, np.int32), np.zeros((0, 0, TILE, TILE), np.float32), tally
-                )
+                yield Result(item.view, _NO_TILES, _NO_FILM, tally)
+            elif outlet is not None:
+                # Only now: a launch that was cancelled has left unfinished tiles.
+                drawing.hand_over(span, outlet)
+                yield Result(item.view, span.tiles, _NO_FILM, tally)
             else:
                 film, sums = drawing.collect(span)
                 tally.rays, tally.steps, tally.iterations, tally.bad_distances = (int(each) for each in sums)

@@ -64,7 +64,7 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
                 _enlarge(found, film, divider)
             stage = {8: "8th", 4: "4th", 2: "2nd"}[divider]
             yield _shown(whole, seconds, f"every {stage} pixel")
-        ranges = _ranges(job.samples) if _fits(job, executor) else [(0, job.samples)]
+        ranges = pass_ranges(job.samples) if has_room(job, executor) else [(0, job.samples)]
         films = JobFilms(job)
         for samples in ranges:
             before, films = films, JobFilms(job)
@@ -78,7 +78,7 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
         executor.forget()
 
 
-def _ranges(samples: int) -> list[tuple[int, int]]:
+def pass_ranges(samples: int) -> list[tuple[int, int]]:
     """The first sample and the one after the last of each pass: one, and then twice as many in all."""
     ends = [0, 1]
     while ends[-1] < samples:
@@ -86,7 +86,7 @@ def _ranges(samples: int) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-def _fits(job: Job, executor: LocalExecutor) -> bool:
+def has_room(job: Job, executor: LocalExecutor) -> bool:
     """Whether the device has room for the data kept between passes; if not, a message is printed."""
     if job.samples == 1:
         return True

@@ -1,0 +1,251 @@
+"""Canvases to a screen's numbers, on the device: exposure, sRGB, dither, and two eyes in one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device import program
+from clfractal.device.compiler import Argument, Warm
+from clfractal.device.select import Device
+from clfractal.device.source import flatten
+from clfractal.device.structs import Field, Struct
+from clfractal.files import srgb
+from clfractal.pictures.anaglyph import matrices
+from clfractal.pictures.compose import BELOW, BESIDE, Side, eye_size, picture_size
+from clfractal.scene.layout import Place
+from clfractal.scene.stereo import APART, Stereo
+from clfractal.work.canvas import Canvas
+from clfractal.work.job import Identity, Job, StereoPair
+
+MOST_VIEWS = 64
+GROUP = (32, 8)
+MODES = ("ONE", "BESIDE", "BELOW", "ROWS", "COLUMNS", "CHECKERBOARD", "CHESSBOARD", "ANAGLYPH")
+_PICKED = {"rows": 3, "columns": 4, "checkerboard": 5, "anaglyph_chessboard": 6}
+
+SHOW = Struct(
+    "Show",
+    [
+        Field("width", "int", 0, "of what is shown, pixels"),
+        Field("height", "int"),
+        Field("mode", "int", 0, "MODE_..."),
+        Field("first", "int", 0, "the eye shown first (left, upper, even): 0 left, 1 right"),
+        Field("eye_width", "int", 0, "of each eye's picture, pixels"),
+        Field("eye_height", "int"),
+        Field("views", "int", 0, "number of views"),
+        Field("smooth", "int", 0, "1: coarse pictures are interpolated"),
+        Field("transparent", "int", 0, "1: a board shows where nothing covers it"),
+        Field("gain", "float", 0, "two to the power of the exposure"),
+        Field("background", "float", 3, "between the views of a layout, linear"),
+        Field("matrix", "float", 18, "of an anaglyph, a row for each colour: left R, G, B, right R, G, B; or two filters"),
+    ],
+)
+SHOWN_VIEW = Struct(
+    "ShownView",
+    [
+        Field("offset", "int", 0, "first pixel in the canvas"),
+        Field("width", "int", 0, "in the canvas, pixels"),
+        Field("height", "int"),
+        Field("divider", "int", 0, "pixels of the picture for one in the canvas"),
+        Field("left", "int", 0, "place in the eye's picture, pixels"),
+        Field("top", "int"),
+        Field("right", "int", 0, "the first column and row behind it"),
+        Field("bottom", "int"),
+        Field("eye", "int", 0, "0: left, or no eye's in particular; 1: right"),
+    ],
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a finished picture is shown; changing it needs no new rays.
+
+    Attributes:
+        exposure: stops.
+        stereo: the scene's section; None without stereo.
+        smooth: whether coarse pictures are interpolated.
+        transparent: whether the background is, and a board is shown there.
+    """
+
+    exposure: float = 0.0
+    stereo: Stereo | None = None
+    smooth: bool = True
+    transparent: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Arrangement:
+    """Where the views of a job lie in each eye's picture; follows from the job.
+
+    Attributes:
+        image: width and height of the scene's image, pixels.
+        eyes: of each view, 0 (left, or none) or 1.
+        places: of each view in its eye's picture.
+        background: between views, linear.
+    """
+
+    image: tuple[int, int]
+    eyes: tuple[int, ...]
+    places: tuple[Place, ...]
+    background: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
+
+    @classmethod
+    def of(cls, job: Job) -> Arrangement:
+        """The arrangement of a job's views."""
+        image = (job.scene.image.width, job.scene.image.height)
+        made = job.composition
+        parts: dict[Side, Any] = dict(made.eyes) if isinstance(made, StereoPair) else {"left": made}
+        eyes, places = [0] * len(job.views), [Place(0, 0, *image)] * len(job.views)
+        background = (0.0, 0.0, 0.0)
+        for side, part in parts.items():
+            if isinstance(part, Identity):
+                numbers: Sequence[int] = (part.view,)
+                size = (job.views[part.view].scene.image.width, job.views[part.view].scene.image.height)
+                places[part.view] = Place(0, 0, *size)
+            else:
+                numbers, background = part.views, part.background
+                for number, place in zip(part.views, part.places, strict=True):
+                    places[number] = place
+            for number in numbers:
+                eyes[number] = int(side == "right")
+        return cls(image, tuple(eyes), tuple(places), background)
+
+    def size(self, look: Look) -> tuple[int, int]:
+        """Width and height of what is shown."""
+        return self.image if look.stereo is None else picture_size(_joined(look.stereo), self.image)
+
+
+def _joined(stereo: Stereo) -> Stereo:
+    """What is shown of a pair that stays apart in files: both beside each other."""
+    return stereo.model_copy(update={"mode": "split"}) if stereo.mode in APART else stereo
+
+
+class Shower:
+    """The kernel that shows canvases, on one device, with a queue of its own: it does not wait for a picture's launches.
+
+    Args:
+        to_image: whether it writes to an image (a texture that is shared) instead of a buffer.
+
+    Raises:
+        DeviceError, KernelBuildError: it cannot be built.
+    """
+
+    def __init__(self, device: Device, *, to_image: bool = False) -> None:
+        self.device, self.to_image = device, to_image
+        defines: dict[str, object] = {f"MODE_{name}": number for number, name in enumerate(MODES)}
+        defines |= {
+            "TO_IMAGE": int(to_image),
+            "TABLE_SHIFT": srgb.TABLE_SHIFT,
+            "TABLE_LOWEST": srgb.TABLE_LOWEST,
+            "TABLE_ONE": srgb.TABLE_ONE,
+        }
+        structs = SHOW.c_text("float32") + SHOWN_VIEW.c_text("float32")
+        text = flatten("show.cl", generated={"show_structs.h": structs}, defines=defines)
+        warm = Warm("show", GROUP, GROUP, (Argument("buffer", 4096),) * 5)
+        built = program.build(
+            device,
+            text.text,
+            flags=("-cl-std=CL1.2", "-cl-denorms-are-zero"),
+            sources=text.sources,
+            warm=None if to_image else warm,
+        )
+        self._kernel = built.kernel("show")
+        with device.failures("opening the device"):
+            self.queue = cl.CommandQueue(device.context)
+        table = srgb.table8()
+        self._table = self._sent(table)
+        self._views = device.buffer(SHOWN_VIEW.dtype("float32").itemsize * MOST_VIEWS, "views")
+        self._show = device.buffer(SHOW.dtype("float32").itemsize, "how it is shown")
+
+    def enqueue(self, canvas: Canvas, arrangement: Arrangement, look: Look, shown: Any) -> cl.Event:
+        """Starts the kernel on a canvas whose picture is complete; `shown` is where pixels go, row by row from the top.
+
+        Raises:
+            DeviceError: the device failed.
+        """
+        record, views = self.records(canvas, arrangement, look)
+        width, height = arrangement.size(look)
+        size = [-(-side // group) * group for side, group in zip((width, height), GROUP, strict=True)]
+        with self.device.failures("showing the picture"):
+            cl.enqueue_copy(self.queue, self._views, views)
+            cl.enqueue_copy(self.queue, self._show, record)
+            self._kernel.set_args(canvas.colors, self._views, self._show, self._table, shown)
+            event = cl.enqueue_nd_range_kernel(self.queue, self._kernel, size, GROUP)
+            self.queue.flush()
+        return event
+
+    @staticmethod
+    def records(
+        canvas: Canvas, arrangement: Arrangement, look: Look
+    ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
+        """The kernel's structs, of the whole and of the views."""
+        width, height = arrangement.size(look)
+        eye = arrangement.image if look.stereo is None else eye_size(_joined(look.stereo), arrangement.image)
+        mode, first, matrix = _way(look)
+        values = {
+            "width": width,
+            "height": height,
+            "mode": mode,
+            "first": first,
+            "eye_width": eye[0],
+            "eye_height": eye[1],
+            "views": len(canvas.parts),
+            "smooth": int(look.smooth),
+            "transparent": int(look.transparent),
+            "gain": 2.0**look.exposure,
+            "background": np.array(arrangement.background, np.float32),
+            "matrix": matrix,
+        }
+        rows = []
+        for part, place, side in zip(canvas.parts, arrangement.places, arrangement.eyes, strict=True):
+            region, divider = part.region, part.divider
+            left, top = place.x + region.x * divider, place.y + region.y * divider
+            right = min(left + region.width * divider, place.x + place.width)
+            bottom = min(top + region.height * divider, place.y + place.height)
+            rows.append(
+                {
+                    "offset": part.offset,
+                    "width": region.width,
+                    "height": region.height,
+                    "divider": divider,
+                    "left": left,
+                    "top": top,
+                    "right": right,
+                    "bottom": bottom,
+                    "eye": side,
+                }
+            )
+        return SHOW.array("float32", [values]), SHOWN_VIEW.array("float32", rows)
+
+    def _sent(self, data: npt.NDArray[Any]) -> cl.Buffer:
+        buffer = self.device.buffer(data.nbytes, "a table", read_only=True)
+        with self.device.failures("uploading constants"):
+            cl.enqueue_copy(self.queue, buffer, data)
+        return buffer
+
+
+def _way(look: Look) -> tuple[int, int, npt.NDArray[np.float32]]:
+    """The mode's number, the eye that is shown first, and the matrices."""
+    matrix = np.zeros(18, np.float32)
+    if look.stereo is None:
+        return MODES.index("ONE"), 0, matrix
+    stereo = _joined(look.stereo)
+    mode, first = stereo.mode, int(stereo.swap)
+    if mode in ("left", "right"):
+        return MODES.index("ONE"), int(mode == "right"), matrix
+    if mode in BESIDE:
+        return MODES.index("BESIDE"), first, matrix
+    if mode in BELOW:
+        return MODES.index("BELOW"), first, matrix
+    if mode == "anaglyph":
+        left, right = matrices(stereo.method, stereo.glasses)
+        matrix[:] = np.concatenate([left, right], axis=1).astype(np.float32).ravel()
+        return MODES.index("ANAGLYPH"), first, matrix
+    if mode == "anaglyph_chessboard":
+        matrix[:6] = np.array(stereo.colors, np.float32).ravel()
+    return _PICKED[mode], first, matrix

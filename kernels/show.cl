@@ -1,0 +1,139 @@
+// Turns canvases into the numbers that a screen wants: two eyes into one picture, exposure, sRGB, dither.
+//
+// The arithmetic is the one of picture files, operation by operation (clfractal/pictures/compose.py, anaglyph.py and
+// clfractal/files/srgb.py), so that a window and a file show the same.
+#include "show_structs.h"
+#pragma OPENCL FP_CONTRACT OFF
+
+#if TO_IMAGE
+#define SHOWN __write_only image2d_t
+#else
+#define SHOWN __global uchar4 *
+#endif
+
+// A mixing of colours limits numbers to this, as `anaglyph.mix` does.
+#define LIGHTEST 1e30f
+
+// Comparisons instead of built-in functions: on processors a built-in may be a call (see direct.h).
+float limited(float value) {
+    if (value != value) return 0.0f;
+    return value > LIGHTEST ? LIGHTEST : value < -LIGHTEST ? -LIGHTEST : value;
+}
+
+float smaller(float a, float b) { return b < a ? b : a; }
+int lower(int a, int b) { return b < a ? b : a; }
+float4 between(float4 a, float4 b, float share) { return a + (b - a) * share; }
+
+// One view of a picture, or where there is none (between the views of a layout) the background.
+float4 view_at(__global const float4 *colors, __constant const struct ShownView *view, __constant const struct Show *show,
+               int x, int y) {
+    const int column = x - view->left, row = y - view->top;
+    __global const float4 *from = colors + view->offset;
+    if (view->divider == 1) return from[(size_t)row * view->width + column];
+    if (!show->smooth) {
+        return from[(size_t)lower(row / view->divider, view->height - 1) * view->width +
+                    lower(column / view->divider, view->width - 1)];
+    }
+    // A coarse picture's rays are those of every `divider`th pixel.
+    const float across = smaller((float)column / view->divider, view->width - 1.0f);
+    const float down = smaller((float)row / view->divider, view->height - 1.0f);
+    const int left = (int)across, upper = (int)down;
+    const int right = lower(left + 1, view->width - 1);
+    __global const float4 *above = from + (size_t)upper * view->width;
+    __global const float4 *below = from + (size_t)lower(upper + 1, view->height - 1) * view->width;
+    return between(between(above[left], above[right], across - left), between(below[left], below[right], across - left),
+                   down - upper);
+}
+
+// The pixel (x, y) of an eye's picture.
+float4 eye_at(__global const float4 *colors, __constant const struct ShownView *views, __constant const struct Show *show,
+              int eye, int x, int y) {
+    // Views that come later lie over those before.
+    for (int number = show->views - 1; number >= 0; --number) {
+        __constant const struct ShownView *view = views + number;
+        if (view->eye == eye && x >= view->left && y >= view->top && x < view->right && y < view->bottom) {
+            return view_at(colors, view, show, x, y);
+        }
+    }
+    return (float4)(show->background[0], show->background[1], show->background[2], 1.0f);
+}
+
+float mixed(__constant const float *by, float4 left, float4 right) {
+    float sum = 0.0f;
+    // Terms without a coefficient are left out: infinity times 0 is not 0.
+    if (by[0] != 0.0f) sum += limited(left.x) * by[0];
+    if (by[1] != 0.0f) sum += limited(left.y) * by[1];
+    if (by[2] != 0.0f) sum += limited(left.z) * by[2];
+    if (by[3] != 0.0f) sum += limited(right.x) * by[3];
+    if (by[4] != 0.0f) sum += limited(right.y) * by[4];
+    if (by[5] != 0.0f) sum += limited(right.z) * by[5];
+    return sum > 0.0f ? sum : 0.0f;
+}
+
+float4 composed_at(__global const float4 *colors, __constant const struct ShownView *views,
+                   __constant const struct Show *show, int x, int y) {
+    const int mode = show->mode;
+    if (mode == MODE_ONE) return eye_at(colors, views, show, show->first, x, y);
+    if (mode == MODE_BESIDE) {
+        const int second = x >= show->eye_width;
+        return eye_at(colors, views, show, second ? 1 - show->first : show->first, x - second * show->eye_width, y);
+    }
+    if (mode == MODE_BELOW) {
+        const int second = y >= show->eye_height;
+        return eye_at(colors, views, show, second ? 1 - show->first : show->first, x, y - second * show->eye_height);
+    }
+    if (mode == MODE_ANAGLYPH) {
+        const float4 left = eye_at(colors, views, show, show->first, x, y);
+        const float4 right = eye_at(colors, views, show, 1 - show->first, x, y);
+        return (float4)(mixed(show->matrix, left, right), mixed(show->matrix + 6, left, right),
+                        mixed(show->matrix + 12, left, right), left.w < right.w ? right.w : left.w);
+    }
+    const int odd = (mode == MODE_ROWS ? y : mode == MODE_COLUMNS ? x : x + y) & 1;
+    float4 found = eye_at(colors, views, show, odd ? 1 - show->first : show->first, x, y);
+    if (mode == MODE_CHESSBOARD) {
+        __constant const float *passed = show->matrix + 3 * odd;
+        found.x = passed[0] == 0.0f ? 0.0f : found.x * passed[0];
+        found.y = passed[1] == 0.0f ? 0.0f : found.y * passed[1];
+        found.z = passed[2] == 0.0f ? 0.0f : found.z * passed[2];
+    }
+    return found;
+}
+
+// Bayer's thresholds: the bits of x xor y and of y, from the last on, interleaved (see srgb.py).
+int threshold_at(int x, int y) {
+    int order = 0;
+    for (int bit = 0; bit < 4; ++bit) {
+        const int across = x >> bit & 1, down = y >> bit & 1;
+        order = order * 4 + ((across ^ down) << 1 | down);
+    }
+    return 4 + order * 248 / 256;
+}
+
+uchar coded(float linear, __global const ushort *table, int threshold) {
+    int index = as_int(linear > 0.0f ? linear : 0.0f) >> TABLE_SHIFT;  // not a number counts as 0
+    index = (index < TABLE_LOWEST ? TABLE_LOWEST : index > TABLE_ONE ? TABLE_ONE : index) - TABLE_LOWEST;
+    return (uchar)((table[index] + threshold) >> 8);
+}
+
+__kernel void show(__global const float4 *colors, __constant const struct ShownView *views,
+                   __constant const struct Show *show, __global const ushort *table, SHOWN shown) {
+    const int x = (int)get_global_id(0), y = (int)get_global_id(1);
+    if (x >= show->width || y >= show->height) return;
+    float4 found = composed_at(colors, views, show, x, y);
+    if (show->transparent && found.w < 1.0f) {
+        // Colours are premultiplied; what lies behind them is a board of two greys.
+        const float behind = ((x >> 3 ^ y >> 3) & 1) ? 0.13f : 0.10f;
+        const float seen = (found.w > 0.0f ? 1.0f - found.w : 1.0f) * behind / show->gain;
+        found.x += seen;
+        found.y += seen;
+        found.z += seen;
+    }
+    const int threshold = threshold_at(x & 15, y & 15);
+    const uchar4 pixel = (uchar4)(coded(found.x * show->gain, table, threshold), coded(found.y * show->gain, table, threshold),
+                                  coded(found.z * show->gain, table, threshold), 255);
+#if TO_IMAGE
+    write_imagef(shown, (int2)(x, y), convert_float4(pixel) / 255.0f);
+#else
+    shown[(size_t)y * show->width + x] = pixel;
+#endif
+}
