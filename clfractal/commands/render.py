@@ -78,7 +78,7 @@ def ordered_scene(order: Order) -> Scene:
     """The scene with the options folded in; errors name the option that was given."""
     given: dict[str, tuple[str, str]] = {}  # key -> option, value
     if order.size is not None:
-        width, height = _numbers("--size", order.size, "x", 2, "WIDTHxHEIGHT, such as 1920x1080")
+        width, height = numbers_of("--size", order.size, "x", 2, "WIDTHxHEIGHT, such as 1920x1080")
         given |= {"image.width": ("--size", str(width)), "image.height": ("--size", str(height))}
     if order.samples is not None:
         given["renderer.samples"] = ("--samples", str(order.samples))
@@ -100,11 +100,16 @@ def ordered_scene(order: Order) -> Scene:
 def _region(text: str | None) -> tuple[int, int, int, int] | None:
     if text is None:
         return None
-    x, y, width, height = _numbers("--region", text, ",", 4, "X,Y,WIDTH,HEIGHT, such as 0,0,640,480")
+    x, y, width, height = numbers_of("--region", text, ",", 4, "X,Y,WIDTH,HEIGHT, such as 0,0,640,480")
     return x, y, width, height
 
 
-def _numbers(option: str, text: str, separator: str, count: int, form: str) -> list[int]:
+def numbers_of(option: str, text: str, separator: str, count: int, form: str) -> list[int]:
+    """The whole numbers of an option's value.
+
+    Raises:
+        SceneError: it does not have this form.
+    """
     parts = text.lower().split(separator)
     try:
         if len(parts) == count and len(text) <= 100:

@@ -72,6 +72,20 @@ def write_png(
         )
 
 
+def write_png_pixels(
+    path: str | Path, pixels: npt.NDArray[np.uint8], texts: Mapping[str, str] | None = None
+) -> None:
+    """Writes finished 8-bit sRGB pixels of shape (height, width, 3); the file appears complete or not at all.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    height, width = pixels.shape[:2]
+    with atomic_writer(path) as beside, open(beside, "wb", buffering=1 << 20) as stream:
+        writer = _Writer(width=width, height=height, greyscale=False, bitdepth=8, compression=3, texts=texts or {})
+        writer.write_packed(stream, (row.tobytes() for row in pixels))
+
+
 def stream_png(
     stream: BinaryIO,
     bands: Iterable[Floats],

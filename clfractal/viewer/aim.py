@@ -1,0 +1,84 @@
+"""Which part of the scene a place of the picture belongs to: each view of a layout may have its own camera or plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clfractal.optics.view import View, scene_view
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.plane import Plane
+from clfractal.scene.stereo import MIDDLE
+from clfractal.viewer.picking import Pick
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Aim:
+    """What a pointer moves.
+
+    Attributes:
+        camera_path: where the camera is written in the scene.
+        plane_path: where the plane is, if the view shows one; else empty.
+        scene: of the view, as rendered.
+        x, y: the pointer's place in the view's picture, pixels.
+        size: of that picture, pixels.
+        depth: under the pointer; infinite where nothing is.
+        point: in space, under the pointer; None where nothing is.
+        view: what the eye between both eyes sees.
+        scale: pixels of the view's picture for a pixel of the window, across and down.
+    """
+
+    camera_path: str
+    plane_path: str
+    scene: Scene
+    x: float
+    y: float
+    size: tuple[int, int]
+    depth: float
+    point: tuple[float, float, float] | None
+    view: View
+    scale: tuple[float, float]
+
+    @property
+    def camera(self) -> PerspectiveCamera | OrthographicCamera:
+        """The camera that the view has."""
+        return self.scene.camera
+
+    @property
+    def plane(self) -> Plane | None:
+        """The plane that the view shows, if it shows one."""
+        renderer = self.scene.renderer
+        return renderer.plane if isinstance(renderer, CutPlaneRenderer) else None
+
+
+def aimed(scene: Scene, pick: Pick) -> Aim:
+    """What lies under a pick, in the present scene (which may be newer than the picture)."""
+    number, shown = pick.view.number, pick.view.scene
+    camera_path, plane_path, seen = "camera", "", scene
+    if scene.layout is not None and number < len(scene.layout.views):
+        own = scene.layout.views[number]
+        seen = scene.views[number][0]
+        if own.camera is not None:
+            camera_path = f"layout.views.{number}.camera"
+        if isinstance(seen.renderer, CutPlaneRenderer):
+            plane_path = (
+                f"layout.views.{number}.renderer.plane" if own.renderer is not None else "renderer.plane"
+            )
+    elif isinstance(scene.renderer, CutPlaneRenderer):
+        plane_path = "renderer.plane"
+    seen = seen.model_copy(update={"image": shown.image})
+    squeezed = (pick.view.eye.wide, pick.view.eye.high)
+    middle = scene_view(seen, MIDDLE if seen.stereo is None else pick.view.eye.__class__("middle", *squeezed))
+    return Aim(
+        camera_path,
+        plane_path,
+        seen,
+        pick.x,
+        pick.y,
+        pick.size,
+        pick.depth,
+        pick.point,
+        middle,
+        (1.0, 1.0),
+    )

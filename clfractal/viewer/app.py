@@ -1,0 +1,356 @@
+"""The window: its main loop, which only handles events and draws; everything that takes long happens in other threads."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.device import gl_sharing
+from clfractal.device.select import Device, choose, devices
+from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
+from clfractal.optics.view import scene_view, seen_by
+from clfractal.scene.stereo import MIDDLE
+from clfractal.viewer import gl, marks, window
+from clfractal.viewer.aim import Aim, aimed
+from clfractal.viewer.controls import Controls
+from clfractal.viewer.deeds import Deeds
+from clfractal.viewer.files import Files
+from clfractal.viewer.inputs import Inputs
+from clfractal.viewer.motion import Motion
+from clfractal.viewer.options import Options
+from clfractal.viewer.outputs import Outputs
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.panels import all_panels
+from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.picking import Pick
+from clfractal.viewer.places import Places, places_of
+from clfractal.viewer.recording import Event
+from clfractal.viewer.settings import Settings
+from clfractal.viewer.speed import Meter
+from clfractal.viewer.studio import Studio
+from clfractal.viewer.surface import Surface
+from clfractal.viewer.ui_renderer import UiRenderer
+from clfractal.viewer.window import Window
+
+_IDLE_SECONDS = 0.5
+"""How long the loop sleeps at most when nothing happens."""
+_REDRAWN = 3
+"""Frames that are drawn after an event: panels need some to take it in."""
+
+
+class Viewer:
+    """A window on a scene.
+
+    Args:
+        options: of the command line.
+        settings: the user's.
+        remark: what was wrong with the settings' file, or empty.
+        tell: prints a line for the user (with `--quiet` nothing).
+
+    Raises:
+        ClfractalError: no display, no OpenGL 3.3, no device, or a wrong scene.
+    """
+
+    def __init__(
+        self, options: Options, settings: Settings, remark: str, tell: Callable[[str], None]
+    ) -> None:
+        self.options, self.settings, self.tell = options, settings, tell
+        self.files = Files(options)
+        scene = self.files.first_scene()
+        device = choose(options.device)
+        self.events: deque[Event] = deque()
+        self.started = time.perf_counter()
+        window.start()
+        size = options.size or (1280, 720)
+        self.window = Window(size, self.events.append)
+        gl_version = gl.version()
+        if gl_version < (3, 3):
+            raise window.no_opengl(f"{gl_version[0]}.{gl_version[1]}")
+        self._context = imgui.create_context()
+        imgui.get_io().set_ini_filename("")
+        self.renderer = UiRenderer(self.window.handle)
+        self.pacing = Pacing(settings.frame_rate, settings.used_coarsest)
+        device, self.shared, why = self._opened(device)
+        self.studio = Studio(scene, device, self.pacing, window.wake)
+        self.motion = Motion(self.studio, settings.mouse)
+        self.controls = Controls(self.studio, settings, self.motion)
+        self.outputs = Outputs(self.window, self.events.append)
+        self.studio.screens = self.outputs.shown_stereo
+        self.meter = Meter()
+        self.small = gl.SmallTextures()
+        self.surface = self._new_surface()
+        self.ui = Ui(self.studio, settings, settings.key_map, self.small, self.act)
+        self.deeds = Deeds(self)
+        self.deeds.scene.first_stereo = self._screen
+        self.inputs = Inputs(self)
+        self.places: Places = places_of(scene.stereo, self.window.framebuffer)
+        self.pick: Pick | None = None
+        self.finished = False
+        self._hidden = False
+        self._failed: set[str] = set()
+        self._redraw = _REDRAWN
+        self._last = time.perf_counter()
+        self._drawn_at = self._last
+        for line in (remark, why, *self.files.remarks):
+            if line:
+                self.studio.tell(line, wrong=True)
+        self.files.attach(self)
+        if not options.panels:
+            self.ui.show.clear()
+        self.outputs.begin(options)
+
+    # The loop
+
+    def run(self) -> None:
+        """Until the window is closed."""
+        try:
+            while not self.finished:
+                self.turn()
+        finally:
+            self.close()
+
+    def turn(self) -> None:
+        """One round: events, motion, what has arrived, and a picture if anything changed."""
+        window.poll(self._patience())
+        now = time.perf_counter()
+        seconds, self._last = now - self._last, now
+        self.inputs.play(now - self.started)
+        while self.events:
+            self.inputs.handle(self.events.popleft(), now)
+            self._redraw = _REDRAWN
+        if self.window.closing:
+            self.window.closing = False
+            self.files.ask_to_close()
+            self._redraw = _REDRAWN
+        if self.motion.step(now, seconds, window.gamepad(), window.plain_joystick()):
+            self._redraw = _REDRAWN
+        self.controls.rest(now)
+        self.files.tick(now)
+        self._follow()
+        if self.surface.update():
+            self._redraw = max(self._redraw, 1)
+            self.meter.shown(self.surface.shown, now)
+        if self._redraw > 0 and not self.window.minimised:
+            self._redraw -= 1
+            self.draw(now)
+        limit = self.options.seconds
+        if limit is not None and now - self.started > limit:
+            self.finished = True
+
+    def act(self, name: str) -> None:
+        """Does an action; see `Deeds`."""
+        self.deeds.do(name)
+        self._redraw = _REDRAWN
+
+    @property
+    def now(self) -> float:
+        """Seconds, of the loop's clock."""
+        return time.perf_counter()
+
+    def redraw(self) -> None:
+        """Something that is drawn has changed."""
+        self._redraw = _REDRAWN
+
+    def set_settings(self, settings: Settings) -> None:
+        """The user's settings have changed."""
+        self.settings = settings
+        self.ui.settings = self.controls.settings = self.deeds.scene.settings = settings
+        self.ui.keys = settings.key_map
+        self.motion.sensitivity = settings.mouse
+        self.pacing.rate, self.pacing.coarsest = settings.frame_rate, settings.used_coarsest
+
+    def use_device(self, device: Device) -> None:
+        """Goes on with another device."""
+        self.surface.close()
+        device, self.shared, why = self._opened(device)
+        self.studio.use_device(device)
+        self.surface = self._new_surface()
+        if why:
+            self.studio.tell(why)
+        self.studio.tell(f"device: {device.info.name}")
+
+    # The picture
+
+    def _opened(self, device: Device) -> tuple[Device, bool, str]:
+        """The device with a context for this window, whether textures are shared, and why not if that is a surprise."""
+        if self.options.share and device.info.gl_sharing:
+            try:
+                handles = gl_sharing.current_handles()
+                if gl_sharing.shares_with(device, handles):
+                    return gl_sharing.opened_with(device, handles), True, ""
+            except ClfractalError as error:
+                return device.reopened(), False, f"pictures are copied, not shared: {error.message}"
+        return device.reopened(), False, ""
+
+    def _new_surface(self) -> Surface:
+        session = self.studio.session
+        return Surface(
+            session.device,
+            session.pool,
+            shared=self.shared,
+            woken=window.wake,
+            remark=lambda line: self.studio.tell(line, wrong=True),
+        )
+
+    def _follow(self) -> None:
+        """The studio learns the window's size, the surface what to show."""
+        if not self.window.minimised:
+            width, height = self.outputs.picture_size(self.studio.scene.stereo)
+            self.studio.resize(width, height)
+            self._rest(False)
+        else:
+            self._rest(True)
+        self._mind_device()
+        self.studio.tick()
+        self.surface.want(self.studio.frame, self.studio.look)
+        shown = self.surface.shown
+        self.motion.depth = self.meter.nearest(shown)
+
+    def _rest(self, hidden: bool) -> None:
+        """A window that nobody sees gathers no samples."""
+        session = self.studio.session
+        if hidden != self._hidden:
+            self._hidden = hidden
+            if hidden and not session.paused:
+                session.pause()
+            elif not hidden:
+                session.pause(False)
+
+    def _screen(self) -> dict[str, Any]:
+        wide = window.physical_width(self.window.monitor(), self.window.size[0])
+        return {} if wide is None else {"screen_width": round(wide, 4)}
+
+    def _mind_device(self) -> None:
+        """A device that fails gives way to another one; the last picture stays until then."""
+        session = self.studio.session
+        problem = session.problem
+        if not isinstance(problem, DeviceError) or problem.status != STATUS_DEVICE_FAILED:
+            return
+        failed = session.device.info
+        if isinstance(problem, KernelBuildError) or failed.index in self._failed:
+            return
+        self._failed.add(failed.index)
+        others = [each for each in devices() if each.index not in self._failed]
+        if others:
+            self.studio.tell(f"{problem.message}; going on with {others[0].name}", wrong=True)
+            self.use_device(choose(others[0].index))
+
+    def aim(self) -> Aim | None:
+        """What is under the pointer; else under the middle of the picture."""
+        found = self.aim_at(*self.inputs.pointer)
+        if found is not None:
+            return found
+        width, height = self.window.framebuffer
+        return self.aim_at(width / 2, height / 2)
+
+    def aim_at(self, x: float, y: float) -> Aim | None:
+        """What lies at a place of the window, framebuffer pixels from the top left."""
+        pick = self.pick_at(x, y)
+        return aimed(self.studio.shown_scene, pick) if pick is not None else None
+
+    def pick_at(self, x: float, y: float) -> Pick | None:
+        """The same of the picture that is shown, which may be older than the scene."""
+        shown = self.surface.shown
+        if shown is None:
+            return None
+        width, height = self.surface.size
+        wide, high = self.window.framebuffer
+        if width < 1 or height < 1 or wide < 1 or high < 1:
+            return None
+        across, down = self.outputs.to_picture(x, y, (width, height))
+        return self.studio.pick(across, down, shown)
+
+    def draw(self, now: float) -> None:
+        """Draws the picture and the panels, and shows them."""
+        self.window.use()
+        framebuffer = self.window.framebuffer
+        scene = self.studio.scene
+        self.places = places_of(self.outputs.panel_stereo(scene.stereo), framebuffer)
+        scale = self.window.scale * self.settings.panel_scale
+        size = (self.places.ui_size[0] / scale, self.places.ui_size[1] / scale)
+        self.renderer.begin(size, (scale, scale), now - self._drawn_at)
+        self._drawn_at = now
+        self.pick = None if imgui.get_io().want_capture_mouse else self.pick_at(*self.inputs.pointer)
+        imgui.new_frame()
+        ui = self.ui
+        ui.size, ui.scale, ui.pick = size, scale, self.pick
+        ui.speed = replace(self.meter.speed, way="shared" if self.surface.shared else "copied")
+        self._draw_marks(scale)
+        all_panels.draw(ui)
+        imgui.render()
+        if imgui.get_io().want_text_input or imgui.is_any_item_active():
+            self._redraw = max(self._redraw, 1)
+        self.outputs.draw(
+            self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
+        )
+        self._redraw_while_busy()
+        self.files.after_draw(framebuffer)
+        self.outputs.swap()
+        self.meter.swapped(time.perf_counter())
+
+    def _draw_ui(self, by: UiRenderer | None, data: Any) -> None:
+        (by or self.renderer).draw(data, list(self.places.ui))
+
+    def _draw_marks(self, scale: float) -> None:
+        scene = self.studio.shown_scene
+        if scene.layout is not None:
+            return
+        eye = MIDDLE
+        if scene.stereo is not None:
+            seen, named = seen_by(scene, "left")
+            eye = replace(named, name="middle")
+            scene = seen
+        size = (scene.image.width * eye.wide, scene.image.height * eye.high)
+        marks.draw(
+            scene,
+            scene_view(scene, eye),
+            self.controls,
+            size,
+            scale,
+            lights="lights" in self.ui.show,
+        )
+
+    def _redraw_while_busy(self) -> None:
+        """A spinner turns while something compiles or is rendered beside the picture."""
+        session = self.studio.session
+        if session.progress or any(not still.finished for still in self.studio.stills):
+            self._wake_at = time.perf_counter() + 0.1
+
+    _wake_at = 0.0
+
+    def _patience(self) -> float:
+        """How long the loop may sleep, seconds."""
+        if self._redraw > 0 or self.motion.active or self.events:
+            return 0.0
+        wait = _IDLE_SECONDS
+        due = self.inputs.next_due
+        if due is not None:
+            wait = min(wait, max(self.started + due - time.perf_counter(), 0.0))
+        if self._wake_at:
+            left = self._wake_at - time.perf_counter()
+            if left <= 0:
+                self._wake_at = 0.0
+                self._redraw = 1
+                return 0.0
+            wait = min(wait, left)
+        if window.gamepad() or window.plain_joystick():
+            wait = min(wait, 1 / 60)
+        return max(min(wait, self.files.patience), 0.001)
+
+    def close(self) -> None:
+        """Ends everything; the order matters: OpenCL's images before OpenGL's textures, and those before the window."""
+        self.inputs.close()
+        self.files.close()
+        self.studio.session.pause()
+        self.surface.close()
+        self.studio.close()
+        self.small.close()
+        self.renderer.shutdown()
+        imgui.destroy_context(self._context)
+        self.outputs.close()
+        window.stop()

@@ -1,0 +1,159 @@
+"""Work beside the picture of a window, on its device: small pictures for panels, and stills of any size."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.cancel import CancelToken
+from clfractal.errors import ClfractalError
+from clfractal.files.srgb import encode8
+from clfractal.pictures.film import Film
+from clfractal.scene.model import Scene
+from clfractal.work.films import JobFilms
+from clfractal.work.job import Job
+from clfractal.work.local import LocalExecutor
+from clfractal.work.prepare import prepare
+from clfractal.work.run import Progress, run
+from clfractal.work.save import save_job
+
+Pixels = npt.NDArray[np.uint8]
+Tell = Callable[[str], None]
+
+
+class Task(Protocol):
+    """Work that is done bit by bit, whenever the window's own picture leaves time."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing is left to do: it is done, was cancelled, or has failed."""
+
+    def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
+        """Goes on with it until it is finished, or the token is set (Stopped).
+
+        Raises:
+            Stopped: the token was set.
+        """
+
+
+def prepared(scene: Scene, executor: LocalExecutor, tell: Tell, *, colors: bool) -> Job:
+    """The job of a scene's picture; `colors`: with the colour channels alone."""
+    from clfractal.work.comfort import Look, fitted
+
+    channels = ("R", "G", "B", "A") if colors else None
+    if scene.stereo is not None and scene.stereo.fit is not None:
+        scene = fitted(scene, Look(executor.device, executor))
+    return prepare(scene, executor.device, channels=channels, on_start=tell)
+
+
+class Thumbnail:
+    """A small picture of a scene, 8-bit RGBA.
+
+    Attributes:
+        pixels: shape (height, width, 4), when it is finished.
+        problem: why there is none.
+    """
+
+    def __init__(self, load: Callable[[], Scene], size: tuple[int, int]) -> None:
+        self._load, self.size = load, size
+        self.pixels: Pixels | None = None
+        self.film: Film | None = None
+        self.problem = ""
+        self._films: JobFilms | None = None
+        self._cancelled = False
+
+    @property
+    def finished(self) -> bool:
+        """See `Task`."""
+        return self.pixels is not None or bool(self.problem) or self._cancelled
+
+    def cancel(self) -> None:
+        """It is not needed any more."""
+        self._cancelled = True
+
+    def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
+        """See `Task`."""
+        try:
+            if self._films is None:
+                self._films = JobFilms(prepared(self._scene(), executor, tell, colors=True))
+            run(self._films.job, self._films.films, executor, token=token)
+            film = self._films.picture()
+        except ClfractalError as error:
+            if token.cancelled:
+                raise
+            self.problem = error.message
+            return
+        gain = np.float32(2.0 ** self._films.job.scene.output.exposure)
+        colors = np.stack([film[name] * gain for name in "RGB"], axis=-1)
+        opaque = np.full((*colors.shape[:2], 1), 255, np.uint8)
+        self.film = film
+        self.pixels = np.concatenate([encode8(colors), opaque], axis=-1)
+
+    def _scene(self) -> Scene:
+        scene = self._load()
+        from clfractal.scene.parts import Image
+
+        renderer = scene.renderer.model_copy(update={"samples": 1, "noise": None, "min_samples": None})
+        image = Image(width=self.size[0], height=self.size[1])
+        return scene.model_copy(update={"image": image, "renderer": renderer, "stereo": None})
+
+
+class Still:
+    """A picture of any size, rendered in the background and written to files.
+
+    Attributes:
+        share: how much of it is done, 0 to 1.
+        problem: why it failed, or empty.
+        written: the files, when it is done.
+    """
+
+    def __init__(self, scene: Scene, paths: tuple[Path, ...], header: dict[str, Any] | None = None) -> None:
+        self.scene, self.paths = scene, paths
+        self.share = 0.0
+        self.problem = ""
+        self.written: tuple[Path, ...] = ()
+        self.remaining: float | None = None
+        self._header = header or {}
+        self._films: JobFilms | None = None
+        self._cancelled = threading.Event()
+
+    @property
+    def finished(self) -> bool:
+        """See `Task`."""
+        return bool(self.written) or bool(self.problem) or self._cancelled.is_set()
+
+    def cancel(self) -> None:
+        """Ends it; nothing is written."""
+        self._cancelled.set()
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether it was cancelled."""
+        return self._cancelled.is_set()
+
+    def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
+        """See `Task`."""
+        if self.cancelled:
+            return
+        try:
+            if self._films is None:
+                self._films = JobFilms(prepared(self.scene, executor, tell, colors=False))
+            job, films = self._films.job, self._films.films
+            run(job, films, executor, token=token, progress=lambda state: self._told(state, token))
+            save_job(job, films, self.paths, {**job.header(), **self._header})
+            self.written = self.paths
+        except ClfractalError as error:
+            if self.cancelled or token.cancelled:
+                raise
+            self.problem = str(error)
+
+    def _told(self, state: Progress, token: CancelToken) -> None:
+        self.share = state.tiles_done / max(state.tiles, 1)
+        self.remaining = state.remaining
+        if self.cancelled:
+            token.cancel()

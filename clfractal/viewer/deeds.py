@@ -1,0 +1,184 @@
+"""Does the actions of the table of keys, also for buttons of panels: those of the window here, those of the scene there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clfractal.device.select import choose, devices
+from clfractal.errors import ClfractalError
+from clfractal.viewer.flying import Key
+from clfractal.viewer.scene_deeds import SceneDeeds
+
+if TYPE_CHECKING:
+    from clfractal.viewer.app import Viewer
+
+HELD: dict[str, Key] = {
+    "fly_forward": "forward",
+    "fly_back": "back",
+    "fly_left": "left",
+    "fly_right": "right",
+    "fly_up": "up",
+    "fly_down": "down",
+    "roll_left": "roll_left",
+    "roll_right": "roll_right",
+}
+"""Actions that go on while their key is down, as keys of flying."""
+
+# Parts that keys open and close, by the names that panels know.
+_PARTS = {
+    "help": "help",
+    "panels": "panels",
+    "overlay": "overlay",
+    "gallery": "gallery",
+    "variations": "variations",
+    "formula": "formula_editor",
+    "lights": "lights",
+    "parallax": "parallax",
+    "history": "history",
+}
+
+
+class Deeds:
+    """The actions of a window, by their names.
+
+    Attributes:
+        scene: those that change the scene.
+        chart_shown: whether the alignment chart is shown.
+        flying: whether the pointer is hidden and turns the head.
+    """
+
+    def __init__(self, viewer: Viewer) -> None:
+        self.viewer = viewer
+        self.scene = SceneDeeds(
+            viewer.studio,
+            viewer.controls,
+            viewer.motion,
+            viewer.settings,
+            viewer.aim,
+            lambda: viewer.now,
+        )
+        self.chart_shown = False
+        self.flying = False
+        files = viewer.files
+        self._deeds: dict[str, Callable[[], None]] = {
+            **self.scene.deeds,
+            **{name: self._switch(part) for name, part in _PARTS.items()},
+            "next_device": self._next_device,
+            "full_screen": viewer.outputs.full_screen,
+            "span_monitors": viewer.outputs.span,
+            "window_per_monitor": self._second_window,
+            "cancel": self.cancel,
+            "quit": files.ask_to_close,
+            "open": self._switch("open"),
+            "save": files.save,
+            "save_as": self._switch("save"),
+            "reload": files.reload,
+            "copy": self._copy,
+            "screenshot": files.screenshot,
+            "export": files.export,
+            "render_still": self._switch("stills"),
+            "pause": self._pause,
+            "coarse": self._coarse,
+            "orbit_style": self._orbit_style,
+            "fly": self.fly,
+            "chart": self._chart,
+        }
+
+    def do(self, name: str) -> None:
+        """Does an action by its name; `device:1:0` changes the device, `open:PATH` opens a scene.
+
+        What goes wrong becomes a message.
+        """
+        try:
+            kind, colon, rest = name.partition(":")
+            if colon and kind == "device":
+                self.viewer.use_device(choose(rest))
+            elif colon and kind == "open":
+                self.viewer.files.open(Path(rest))
+            elif name in self._deeds:
+                self._deeds[name]()
+        except ClfractalError as error:
+            self.viewer.studio.tell(str(error), wrong=True)
+
+    @property
+    def names(self) -> set[str]:
+        """All actions that can be done."""
+        return set(self._deeds) | set(HELD)
+
+    def cancel(self) -> None:
+        """Escape: ends what is under way, then closes what is open, then stops rendering."""
+        viewer = self.viewer
+        if self.flying:
+            self.fly()
+        elif viewer.controls.cancel():
+            return
+        elif self.chart_shown:
+            self.chart_shown = False
+        elif viewer.ui.show & _CLOSED_BY_ESCAPE:
+            viewer.ui.show -= _CLOSED_BY_ESCAPE
+        elif any(not still.finished for still in viewer.studio.stills):
+            for still in viewer.studio.stills:
+                still.cancel()
+            viewer.studio.tell("stills are cancelled")
+        else:
+            viewer.motion.stop()
+            viewer.studio.session.pause()
+            viewer.studio.tell("stopped; Space goes on")
+
+    def fly(self) -> None:
+        """Hides the pointer, which then turns the head; or shows it again."""
+        self.flying = not self.flying
+        self.viewer.window.hide_pointer(self.flying)
+        if not self.flying:
+            self.viewer.motion.stop()
+            self.viewer.studio.end_gesture()
+
+    def _switch(self, part: str) -> Callable[[], None]:
+        def switch() -> None:
+            self.viewer.ui.show ^= {part}
+
+        return switch
+
+    def _next_device(self) -> None:
+        there = devices()
+        now = self.viewer.studio.session.device.info
+        place = next((n for n, info in enumerate(there) if info.index == now.index), -1)
+        if len(there) < 2:
+            self.viewer.studio.tell("there is no other device")
+            return
+        self.viewer.use_device(choose(there[(place + 1) % len(there)].index))
+
+    def _second_window(self) -> None:
+        if self.viewer.studio.scene.stereo is None:
+            self.scene.stereo_mode(2)
+        self.viewer.outputs.open_second()
+
+    def _copy(self) -> None:
+        self.viewer.window.clipboard(self.viewer.files.text())
+        self.viewer.studio.tell("the scene is in the clipboard")
+
+    def _pause(self) -> None:
+        session = self.viewer.studio.session
+        session.pause(not session.paused)
+        self.viewer.studio.tell("paused" if session.paused else "gathering samples")
+
+    def _coarse(self) -> None:
+        settings = replace(self.viewer.settings, coarse=not self.viewer.settings.coarse)
+        self.viewer.set_settings(settings)
+        self.viewer.studio.tell(
+            "moving pictures may be coarse" if settings.coarse else "moving pictures are never coarse"
+        )
+
+    def _orbit_style(self) -> None:
+        free = self.viewer.settings.orbit == "free"
+        self.viewer.set_settings(replace(self.viewer.settings, orbit="turntable" if free else "free"))
+        self.viewer.studio.tell(f"orbit: {self.viewer.settings.orbit}")
+
+    def _chart(self) -> None:
+        self.chart_shown = not self.chart_shown
+
+
+_CLOSED_BY_ESCAPE = {"help", "gallery", "variations", "save", "open", "stills", "history", "formula_editor"}

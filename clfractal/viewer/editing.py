@@ -1,0 +1,148 @@
+"""Edits of a scene by dotted paths, as `--set` has them, on the checked scene instead of its text."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from pydantic import ValidationError
+
+from clfractal.errors import SceneError, Where
+from clfractal.files.marks import Document, node_from_plain
+from clfractal.scene.load import check_scene
+from clfractal.scene.messages import first_error
+from clfractal.scene.model import Scene
+
+
+def plain_section(scene: Scene, key: str) -> Any:
+    """A section (or another top-level value) of a scene as plain data."""
+    value = getattr(scene, key)
+    if key == "formula":
+        return value.mapping()
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    return _plain(value)
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump(mode="json") if hasattr(value, "model_dump") else value
+
+
+def value_at(scene: Scene, path: str) -> Any:
+    """The plain value at a dotted path, such as `lights.0.intensity`; None if there is none."""
+    first, *parts = path.split(".")
+    if first not in Scene.model_fields:
+        return None
+    value = plain_section(scene, first)
+    for part in parts:
+        if isinstance(value, list) and part.isdecimal() and int(part) < len(value):
+            value = value[int(part)]
+        elif isinstance(value, dict):
+            value = value.get(part)
+        else:
+            return None
+    return value
+
+
+def edited(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """A scene with other values, checked as a scene file is; what was read of files is kept where it still applies.
+
+    Args:
+        values: dotted path -> plain value. A path of one part replaces a section; an index just behind a list's end
+            appends to it.
+
+    Raises:
+        SceneError, FormulaError, FileError: a value is wrong; `where.path` says which.
+    """
+    sections: dict[str, Any] = {}
+    for path, value in values.items():
+        first, *parts = path.split(".")
+        if first not in Scene.model_fields:
+            raise SceneError("there is no such key", Where(path=path))
+        if first not in sections:
+            sections[first] = plain_section(scene, first)
+        if not parts:
+            sections[first] = value
+        else:
+            if sections[first] is None:
+                sections[first] = {}
+            _put(sections[first], parts, value, path)
+    fields: dict[str, Any] = {name: getattr(scene, name) for name in Scene.model_fields}
+    try:
+        checked = Scene.model_validate({**fields, **sections})
+    except ValidationError as error:
+        document = Document(node_from_plain({**scene.resolved(), **sections}, None))
+        raise first_error(error, document) from error
+    result = scene.model_copy(update={name: getattr(checked, name) for name in sections})
+    check_scene(result)
+    return result
+
+
+def _put(value: Any, parts: list[str], new: Any, path: str) -> None:
+    for part, after in zip(parts[:-1], parts[1:], strict=True):
+        made: Any = [] if after.isdecimal() else {}
+        value = _child(value, part, path, made)
+    last = parts[-1]
+    if isinstance(value, list):
+        index = _index(value, last, path, most=len(value))
+        value[index : index + 1] = [new]
+    elif isinstance(value, dict):
+        value[last] = new
+    else:
+        raise SceneError("there is no such key", Where(path=path))
+
+
+def _child(value: Any, part: str, path: str, made: Any) -> Any:
+    if isinstance(value, list):
+        return value[_index(value, part, path, most=len(value) - 1)]
+    if isinstance(value, dict):
+        if value.get(part) is None:
+            value[part] = made
+        return value[part]
+    raise SceneError("there is no such key", Where(path=path))
+
+
+def _index(value: list[Any], part: str, path: str, most: int) -> int:
+    if not part.isdecimal() or int(part) > most:
+        raise SceneError("there is no such entry", Where(path=path))
+    return int(part)
+
+
+@cache
+def _defaults() -> dict[str, Any]:
+    least = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}}
+    return Scene.model_validate(least).model_dump(mode="json")
+
+
+def differing(scene: Scene, *, keys: tuple[str, ...] | None = None) -> dict[str, tuple[Any, Any]]:
+    """What differs from the defaults: dotted path -> (value, default).
+
+    Args:
+        keys: the sections to look at; None: all but the version and bookmarks.
+    """
+    defaults = _defaults()
+    found: dict[str, tuple[Any, Any]] = {}
+    for key in keys if keys is not None else tuple(Scene.model_fields):
+        if key in ("version", "bookmarks"):
+            continue
+        before = {"iterations": 30} if key == "formula" else defaults[key]
+        _differences(key, plain_section(scene, key), before, found)
+    return found
+
+
+def _differences(path: str, now: Any, before: Any, found: dict[str, tuple[Any, Any]]) -> None:
+    if isinstance(now, dict) and isinstance(before, dict):
+        for name, value in now.items():
+            _differences(f"{path}.{name}", value, before.get(name), found)
+    elif isinstance(now, list) and isinstance(before, list) and len(now) == len(before):
+        if all(not isinstance(each, (dict, list)) for each in now):
+            if now != before:
+                found[path] = (now, before)
+            return
+        for number, (value, other) in enumerate(zip(now, before, strict=True)):
+            _differences(f"{path}.{number}", value, other, found)
+    elif now != before:
+        found[path] = (now, before)

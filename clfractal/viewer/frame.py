@@ -1,0 +1,78 @@
+"""What the renderer of a window gives to its display."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+
+from clfractal.device.select import Device
+from clfractal.renderers.plan import PlannedView
+from clfractal.scene.model import Scene
+from clfractal.work.canvas import Canvas
+from clfractal.work.job import Job
+from clfractal.work.show import Arrangement
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A picture on the device, coarse or whole, perhaps still growing.
+
+    Attributes:
+        number: rises from frame to frame.
+        request: number of the request that it answers.
+        scene: as it was rendered, with the size of the viewport.
+        job: all that was decided of it; its views are those of the whole picture.
+        views: as rendered (coarse ones, while it is coarse).
+        canvas: where it is.
+        divider: pixels, in each direction, that one ray stands for.
+        samples: that every pixel has.
+        finished: whether it has the bits of the shell's picture.
+        seconds: that rendering took so far, without compiling.
+        frame_seconds: that the last pass took.
+    """
+
+    number: int
+    request: int
+    scene: Scene
+    job: Job
+    views: tuple[PlannedView, ...]
+    canvas: Canvas
+    divider: int
+    samples: int
+    finished: bool
+    seconds: float
+    frame_seconds: float
+
+    @property
+    def arrangement(self) -> Arrangement:
+        """Where its views lie."""
+        return Arrangement.of(self.job)
+
+
+class CanvasPool:
+    """Canvases of one device: one is shown, one is drawn on, and the display may still read a third."""
+
+    def __init__(self, device: Device) -> None:
+        self.device = device
+        self._lock = threading.Lock()
+        self._canvases: list[Canvas] = []
+        self._held: dict[int, int] = {}
+
+    def take(self, *busy: Canvas | None) -> Canvas:
+        """A canvas that nobody reads, and that is none of `busy`."""
+        with self._lock:
+            for canvas in self._canvases:
+                if canvas not in busy and not self._held.get(id(canvas)):
+                    return canvas
+            self._canvases.append(Canvas(self.device))
+            return self._canvases[-1]
+
+    def hold(self, canvas: Canvas) -> None:
+        """Keeps a canvas from being drawn on anew."""
+        with self._lock:
+            self._held[id(canvas)] = self._held.get(id(canvas), 0) + 1
+
+    def release(self, canvas: Canvas) -> None:
+        """Takes one `hold` back."""
+        with self._lock:
+            self._held[id(canvas)] -= 1

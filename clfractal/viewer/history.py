@@ -1,0 +1,86 @@
+"""Undo and redo, with a stack for the camera and one for everything else: undoing a colour does not move the camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from clfractal.scene.model import Scene
+
+Kind = Literal["camera", "scene"]
+MOST_STEPS = 500
+
+
+def kind_of(sections: Mapping[str, Any]) -> Kind:
+    """The stack that an edit of these sections belongs to."""
+    return "camera" if set(sections) == {"camera"} else "scene"
+
+
+@dataclass(slots=True)
+class _Step:
+    """Sections before and after an edit."""
+
+    before: dict[str, Any]
+    after: dict[str, Any]
+    gesture: str | None
+
+
+@dataclass(slots=True)
+class _Stack:
+    done: list[_Step] = field(default_factory=list)
+    undone: list[_Step] = field(default_factory=list)
+
+
+class History:
+    """The steps of both stacks. A step keeps only the sections that it changed, so the stacks do not disturb each other."""
+
+    def __init__(self) -> None:
+        self._stacks: dict[Kind, _Stack] = {"camera": _Stack(), "scene": _Stack()}
+
+    def add(self, before: Scene, after: Scene, gesture: str | None = None) -> None:
+        """Remembers an edit. Edits of one gesture in a row (a drag) are one step; a new edit forgets what was undone."""
+        changed = [name for name in Scene.model_fields if getattr(before, name) != getattr(after, name)]
+        if not changed:
+            return
+        old = {name: getattr(before, name) for name in changed}
+        new = {name: getattr(after, name) for name in changed}
+        stack = self._stacks[kind_of(new)]
+        stack.undone.clear()
+        last = stack.done[-1] if stack.done else None
+        if gesture is not None and last is not None and last.gesture == gesture:
+            last.before = {**old, **last.before}
+            last.after = {**last.after, **new}
+            return
+        stack.done.append(_Step(old, new, gesture))
+        del stack.done[:-MOST_STEPS]
+
+    def seal(self) -> None:
+        """Ends a gesture: the next edit is a step of its own, whatever it is called."""
+        for stack in self._stacks.values():
+            if stack.done:
+                stack.done[-1].gesture = None
+
+    def undo(self, kind: Kind) -> dict[str, Any] | None:
+        """The sections to put back, or None if there is no step."""
+        stack = self._stacks[kind]
+        if not stack.done:
+            return None
+        step = stack.done.pop()
+        step.gesture = None
+        stack.undone.append(step)
+        return step.before
+
+    def redo(self, kind: Kind) -> dict[str, Any] | None:
+        """The sections of the step that was undone last, or None."""
+        stack = self._stacks[kind]
+        if not stack.undone:
+            return None
+        step = stack.undone.pop()
+        stack.done.append(step)
+        return step.after
+
+    def depth(self, kind: Kind) -> tuple[int, int]:
+        """How many steps can be undone and redone."""
+        stack = self._stacks[kind]
+        return len(stack.done), len(stack.undone)

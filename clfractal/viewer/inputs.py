@@ -1,0 +1,192 @@
+"""Events of the window, brought to the panels, the keys and the pointer's controls; recorded and played."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from imgui_bundle import imgui
+
+from clfractal.errors import ClfractalError
+from clfractal.viewer import window
+from clfractal.viewer.deeds import HELD
+from clfractal.viewer.flying import Key
+from clfractal.viewer.keys import Context, KeyEvent
+from clfractal.viewer.recording import Event, Player, Recorder, read_recording
+
+if TYPE_CHECKING:
+    from clfractal.viewer.app import Viewer
+
+RELEASE, PRESS, REPEAT = 0, 1, 2
+# Degrees that the head turns for a pixel of the mouse.
+_LOOK = 0.15
+# Actions that a held key repeats.
+_REPEATED = (
+    "orbit_",
+    "pan_",
+    "zoom_in",
+    "zoom_out",
+    "move_",
+    "turn_",
+    "spin_",
+    "exposure_",
+    "eyes_",
+    "screen_",
+)
+_RECORDED = ("key", "char", "button", "move", "scroll", "resize", "focus", "leave", "drop")
+
+
+class Inputs:
+    """Handles events one by one.
+
+    Attributes:
+        pointer: framebuffer pixels from the window's top left.
+    """
+
+    def __init__(self, viewer: Viewer) -> None:
+        self.viewer = viewer
+        self.pointer = (-1.0, -1.0)
+        self._before: tuple[float, float] | None = None
+        self._held: dict[int, Key] = {}
+        self._player: Player | None = None
+        self._recorder: Recorder | None = None
+        options = viewer.options
+        if options.play is not None:
+            self._player = Player(read_recording(options.play))
+        if options.record is not None:
+            self._recorder = Recorder(options.record, viewer.window.size)
+
+    @property
+    def next_due(self) -> float | None:
+        """When the next event of a recording is due, seconds since the start."""
+        return self._player.next_seconds if self._player is not None else None
+
+    @property
+    def played(self) -> bool:
+        """Whether nothing of a recording is left."""
+        return self._player is None or self._player.done
+
+    def play(self, seconds: float) -> None:
+        """Queues the events of a recording whose time has come."""
+        if self._player is not None:
+            for event in self._player.due(seconds):
+                # The window has its own size now.
+                if event.kind != "resize":
+                    self.viewer.events.append(event)
+
+    def close(self) -> None:
+        """Ends a recording."""
+        if self._recorder is not None:
+            self._recorder.close()
+
+    def handle(self, event: Event, now: float) -> None:
+        """One event."""
+        viewer = self.viewer
+        if self._recorder is not None and event.kind in _RECORDED:
+            self._recorder.add(event, now - viewer.started)
+        before = viewer.studio.session.newest
+        values: Any = event.values
+        handler = getattr(self, f"_{event.kind}", None)
+        if handler is not None:
+            try:
+                handler(now, *values)
+            except ClfractalError as error:
+                viewer.studio.tell(str(error), wrong=True)
+        after = viewer.studio.session.newest
+        if after != before:
+            viewer.meter.asked(after, now)
+
+    def _move(self, now: float, x: float, y: float) -> None:
+        viewer = self.viewer
+        size, framebuffer = viewer.window.size, viewer.window.framebuffer
+        self.pointer = (
+            x * framebuffer[0] / max(size[0], 1),
+            y * framebuffer[1] / max(size[1], 1),
+        )
+        if viewer.deeds.flying:
+            if self._before is not None:
+                dx, dy = x - self._before[0], y - self._before[1]
+                viewer.motion.turn(_LOOK * dx * viewer.settings.mouse, _LOOK * dy * viewer.settings.mouse)
+            self._before = (x, y)
+            return
+        self._before = None
+        across, down = viewer.places.to_ui(*self.pointer)
+        io = imgui.get_io()
+        io.add_mouse_pos_event(across / viewer.ui.scale, down / viewer.ui.scale)
+        if viewer.controls.dragging:
+            viewer.controls.move(self._in_picture())
+
+    def _leave(self, now: float) -> None:
+        if not self.viewer.controls.dragging:
+            imgui.get_io().add_mouse_pos_event(-1e6, -1e6)
+
+    def _button(self, now: float, button: int, action: int, mods: int) -> None:
+        viewer, io = self.viewer, imgui.get_io()
+        if action == RELEASE and viewer.controls.dragging:
+            viewer.controls.release(self._in_picture())
+        # Panels see every release, and what was not pressed in the picture.
+        over_panels = io.want_capture_mouse and not viewer.deeds.flying
+        if 0 <= button < 5:
+            io.add_mouse_button_event(button, action == PRESS)
+        if action == PRESS and not over_panels and not viewer.deeds.flying:
+            imgui.set_window_focus(None)  # type: ignore[arg-type]
+            aim = viewer.aim_at(*self.pointer)
+            viewer.controls.press(button, mods, self._in_picture(), aim, now)
+
+    def _scroll(self, now: float, dx: float, dy: float) -> None:
+        viewer, io = self.viewer, imgui.get_io()
+        if viewer.deeds.flying:
+            viewer.motion.fly.faster(dy)
+            return
+        if io.want_capture_mouse:
+            io.add_mouse_wheel_event(dx, dy)
+            return
+        viewer.controls.wheel(dy, _mods(), viewer.aim_at(*self.pointer), now)
+
+    def _key(self, now: float, key: int, scancode: int, action: int, mods: int) -> None:
+        viewer, io = self.viewer, imgui.get_io()
+        viewer.renderer.keyboard_callback(viewer.window.handle, key, scancode, action, mods)
+        if action == RELEASE:
+            held = self._held.pop(key, None)
+            if held is not None:
+                viewer.motion.keys.discard(held)
+            return
+        context: Context = "text" if io.want_text_input else "fly" if viewer.deeds.flying else "picture"
+        event = KeyEvent(key, scancode, mods, window.key_name(key, scancode))
+        found = viewer.ui.keys.matches(event, context)
+        if found is None:
+            return
+        if found.name in HELD:
+            self._held[key] = HELD[found.name]
+            viewer.motion.keys.add(HELD[found.name])
+        elif action == PRESS or found.name.startswith(_REPEATED):
+            viewer.act(found.name)
+
+    def _char(self, now: float, code: int) -> None:
+        if 0 < code < 0x110000:
+            imgui.get_io().add_input_character(code)
+
+    def _focus(self, now: float, focused: int) -> None:
+        imgui.get_io().add_focus_event(bool(focused))
+        if not focused:
+            self._held.clear()
+            self.viewer.motion.keys.clear()
+            self.viewer.motion.fly.stop()
+
+    def _drop(self, now: float, *paths: str) -> None:
+        if paths:
+            self.viewer.act(f"open:{paths[0]}")
+
+    def _in_picture(self) -> tuple[float, float]:
+        viewer = self.viewer
+        size = viewer.surface.size
+        if 0 in size:
+            return self.pointer
+        x, y = viewer.outputs.to_picture(*self.pointer, size)
+        return (x, y) if math.isfinite(x) and math.isfinite(y) else (0.0, 0.0)
+
+
+def _mods() -> int:
+    """GLFW's bits of the modifiers that are down."""
+    io = imgui.get_io()
+    return int(io.key_shift) | int(io.key_ctrl) << 1 | int(io.key_alt) << 2

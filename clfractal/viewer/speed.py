@@ -1,0 +1,75 @@
+"""Measures what a user feels: frames a second while something moves, and the time from an input to its picture."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from clfractal.viewer.display import Shown
+from clfractal.viewer.panels.ui import Speed
+
+_WINDOW_SECONDS = 1.0
+
+
+class Meter:
+    """Takes note of inputs, of frames that arrive, and of swaps.
+
+    Attributes:
+        latencies: of the last inputs, seconds from the input to the swap that shows it.
+    """
+
+    def __init__(self) -> None:
+        self.latencies: deque[float] = deque(maxlen=10_000)
+        self._asked: deque[tuple[int, float]] = deque()
+        self._arrived: deque[float] = deque()
+        self._waiting: list[float] = []
+        self._depth: tuple[Shown | None, float] = (None, float("inf"))
+        self._shown: Shown | None = None
+
+    def asked(self, request: int, now: float) -> None:
+        """An input led to a request of this number."""
+        if not self._asked or self._asked[-1][0] != request:
+            self._asked.append((request, now))
+
+    def shown(self, shown: Shown | None, now: float) -> None:
+        """A frame has arrived and is drawn next."""
+        if shown is None:
+            return
+        if self._shown is None or self._shown.frame is not shown.frame:
+            self._arrived.append(now)
+        self._shown = shown
+        while self._asked and self._asked[0][0] <= shown.frame.request:
+            # Requests that a newer one has replaced were answered by it.
+            self._waiting.append(self._asked.popleft()[1])
+
+    def swapped(self, now: float) -> None:
+        """What was drawn is on the screen."""
+        self.latencies.extend(now - asked for asked in self._waiting)
+        self._waiting.clear()
+        while self._arrived and now - self._arrived[0] > _WINDOW_SECONDS:
+            self._arrived.popleft()
+
+    @property
+    def speed(self) -> Speed:
+        """The newest figures."""
+        times = self._arrived
+        frames = 0.0
+        if len(times) > 2 and times[-1] > times[0]:
+            frames = (len(times) - 1) / (times[-1] - times[0])
+        return Speed(frames, self.latencies[-1] if self.latencies else 0.0)
+
+    def nearest(self, shown: Shown | None) -> float:
+        """Depth of the nearest surface in the picture, scene units; infinite if none is in sight."""
+        if shown is None:
+            return float("inf")
+        if self._depth[0] is not shown:
+            nearest = float("inf")
+            for depths in shown.depths:
+                # Every fourth pixel is enough, and does not take a frame's time.
+                some = depths[::4, ::4] if depths.size > 100_000 else depths
+                finite = some[np.isfinite(some) & (some > 0)]
+                if finite.size:
+                    nearest = min(nearest, float(finite.min()))
+            self._depth = (shown, nearest)
+        return self._depth[1]

@@ -1,0 +1,150 @@
+"""Views that a key chooses: the six sides, all of the object, and the other projection."""
+
+from __future__ import annotations
+
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import ValidationError
+
+from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.viewer.pointer import Floats, Size
+from clfractal.viewer.pose import LARGEST, NEAREST, AnyCamera, C, pose_of, stood
+
+Side: TypeAlias = Literal["front", "back", "left", "right", "top", "bottom"]
+
+# The direction of view and what is up, from each side. From the front one looks along y, as a new scene does.
+SIDES: dict[Side, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
+    "front": ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    "back": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
+    "left": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    "right": ((-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+    "top": ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
+    "bottom": ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
+}
+# Part of the picture's smaller side that a framed object fills.
+FILLED = 0.9
+# An orthographic camera stands so many radii before the middle of what it frames.
+_CLEAR = 2.0
+_LENS = ("f_number", "focus_distance", "sensor_height")
+_LEAST_HEIGHT, _LEAST_FOV, _MOST_FOV = 1e-12, 1e-6, 179.9
+
+
+@np.errstate(all="ignore")
+def frame_all(camera: C, center: npt.ArrayLike, radius: float, size: Size) -> C:
+    """The camera, moved without a turn so that a ball fills 90 % of the picture's smaller side; its middle is the target.
+
+    Where the ball is too large for the range of coordinates, the camera is as far away as it can be.
+    """
+    pose, middle = pose_of(camera), np.asarray(center, float)
+    width, height = size
+    narrow = FILLED * min(1.0, width / height)
+    if isinstance(camera, OrthographicCamera):
+        shown = float(np.clip(2 * radius / narrow, _LEAST_HEIGHT, LARGEST))
+        distance = min(max(_CLEAR * radius, _least(middle)), _room(middle, -pose.axis))
+        return stood(camera, middle - distance * pose.axis, middle, height=shown)
+    # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
+    tangent = narrow * float(np.tan(np.radians(camera.fov) / 2))
+    distance = radius * float(np.hypot(1.0, 1.0 / tangent))
+    distance = min(max(distance, _least(middle)), _room(middle, -pose.axis))
+    return stood(camera, middle - distance * pose.axis, middle)
+
+
+@np.errstate(all="ignore")
+def axis_view(
+    camera: C, side: Side, size: Size, center: npt.ArrayLike | None = None, radius: float | None = None
+) -> C:
+    """The camera, looking at `center` from one of the six sides.
+
+    Args:
+        center: the new target; None: the camera's own.
+        radius: of the ball that is framed (see `frame_all`); None: the target's distance stays.
+    """
+    axis, up = (np.array(vector) for vector in SIDES[side])
+    middle = np.array(camera.target if center is None else center, float)
+    # The old `up` may lie along the new axis, so both change at once.
+    turned = stood(camera, middle - pose_of(camera).distance * axis, middle, up)
+    return turned if radius is None else frame_all(turned, middle, radius, size)
+
+
+@np.errstate(all="ignore")
+def to_orthographic(
+    camera: AnyCamera, bounds: tuple[npt.ArrayLike, float] | None = None
+) -> OrthographicCamera:
+    """The same view by parallel rays; what is at the target's depth keeps its size.
+
+    Args:
+        bounds: middle and radius of a ball that shall lie behind the camera's plane as a whole: the camera steps back as
+            far as that needs. None: it stays where it is, and shows nothing of what is beside or behind it.
+    """
+    if isinstance(camera, OrthographicCamera):
+        return camera
+    pose = pose_of(camera)
+    height = 2 * pose.distance * float(np.tan(np.radians(camera.fov) / 2))
+    position = pose.position
+    if bounds is not None:
+        nearest = float((np.asarray(bounds[0], float) - position) @ pose.axis) - bounds[1]
+        back = min(max(-nearest, 0.0), _room(position, -pose.axis))
+        position = position - back * pose.axis if np.isfinite(back) else position
+    height = float(np.clip(height, _LEAST_HEIGHT, LARGEST))
+    try:
+        return OrthographicCamera(
+            position=_plain(position), target=camera.target, up=camera.up, height=height
+        )
+    except ValidationError:  # `up` was nearly along the view, and is so now
+        return OrthographicCamera(
+            position=_plain(position), target=camera.target, up=_plain(pose.up), height=height
+        )
+
+
+@np.errstate(all="ignore")
+def to_perspective(
+    camera: AnyCamera, fov: float = 45.0, like: PerspectiveCamera | None = None
+) -> PerspectiveCamera:
+    """The same view from an eye; what is at the target's depth keeps its size.
+
+    The target stays. Where the eye would be beyond the range of coordinates, the angle of view grows instead.
+
+    Args:
+        fov: vertical angle of view, degrees, unless `like` has it.
+        like: a camera whose angle of view and lens are taken over, for example the one before `to_orthographic`.
+    """
+    if isinstance(camera, PerspectiveCamera):
+        return camera
+    pose = pose_of(camera)
+    wanted = like.fov if like is not None else fov
+    half = camera.height / 2
+    # The eye may be where the camera is, so there always is room for it.
+    room = max(_room(pose.target, -pose.axis), pose.distance)
+    distance = min(max(half / float(np.tan(np.radians(wanted) / 2)), _least(pose.target)), room)
+    position = pose.target - distance * pose.axis
+    if distance == room:
+        position = np.clip(position, -LARGEST, LARGEST)
+    used = float(np.degrees(2 * np.arctan(half / distance)))
+    if abs(used - wanted) <= 1e-9 * wanted:
+        used = wanted
+    lens = {} if like is None else {name: getattr(like, name) for name in _LENS}
+    lens["fov"] = float(np.clip(used, _LEAST_FOV, _MOST_FOV))
+    try:
+        return PerspectiveCamera(position=_plain(position), target=camera.target, up=camera.up, **lens)
+    except ValidationError:  # as above
+        return PerspectiveCamera(position=_plain(position), target=camera.target, up=_plain(pose.up), **lens)
+
+
+def _plain(vector: Floats) -> tuple[float, float, float]:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _least(target: Floats) -> float:
+    """The least distance from a target that leaves the direction of view its digits."""
+    return 2 * max(NEAREST * float(np.abs(target).max()), 1e-15)
+
+
+def _room(start: Floats, direction: Floats) -> float:
+    """How far one can go from a point within the range of coordinates, a little less than to its end."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = (np.where(direction > 0, LARGEST, -LARGEST) - start) / direction
+    room = float(np.min(np.where(direction != 0, ends, np.inf)))
+    return room * (1 - 1e-9)

@@ -1,0 +1,302 @@
+"""What the window shows and edits, without a window: the scene, its history, its picture, and work beside it.
+
+Panels, keys and pointers change the scene only through this class; so all of them can be undone, saved and tested alike.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from clfractal.device.select import Device
+from clfractal.errors import ClfractalError
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
+from clfractal.scene.stereo import Stereo
+from clfractal.viewer.background import Still, Thumbnail
+from clfractal.viewer.editing import edited, value_at
+from clfractal.viewer.frame import Frame
+from clfractal.viewer.history import History, Kind
+from clfractal.viewer.live import with_live
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.picking import Pick, picked
+from clfractal.viewer.session import Session
+from clfractal.viewer.viewport import image_of, render_key
+from clfractal.work.show import Look
+
+Camera = PerspectiveCamera | OrthographicCamera
+MESSAGE_SECONDS = 6.0
+MOST_MESSAGES = 200
+MOST_THUMBNAILS = 300
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A line for the user: what was done, or what went wrong."""
+
+    text: str
+    wrong: bool
+    time: float
+
+
+class Studio:
+    """A scene that is looked at and edited.
+
+    Args:
+        scene: the first one.
+        device: where it is rendered.
+        pacing: how coarse moving pictures may be.
+        woken: called from any thread when the window has something new to show.
+
+    Attributes:
+        scene: as it is now; `image` is what files of it say, not the window's size.
+        problems: dotted path -> what was wrong with the value that was last tried there.
+        viewport: width and height of what the window shows, pixels.
+        messages: lines for the user, the newest last.
+        screens: how the screens show a scene's pair; eyes with a screen each have another way than the scene's.
+    """
+
+    def __init__(self, scene: Scene, device: Device, pacing: Pacing, woken: Callable[[], None]) -> None:
+        self.scene, self.pacing, self.woken = scene, pacing, woken
+        self.saved = scene
+        self.history = History()
+        self.problems: dict[str, str] = {}
+        self.messages: list[Message] = []
+        self.viewport = (1280, 720)
+        self.screens: Callable[[Stereo | None], Stereo | None] = lambda stereo: stereo
+        self.region: tuple[int, int, int, int] | None = None
+        self.smooth = True
+        self.stills: list[Still] = []
+        self._thumbnails: dict[Hashable, Thumbnail] = {}
+        self._requested: Any = None
+        self._live: tuple[str, ...] = ()
+        self._moving_until = 0.0
+        self.session = Session(device, pacing, woken)
+        self.session.start()
+
+    # The scene
+
+    def edit(self, values: Mapping[str, Any], gesture: str | None = None) -> bool:
+        """Sets values at dotted paths, as in a scene file (`{"lights.0.intensity": 2.0}`); whether they were valid.
+
+        Args:
+            values: see `editing.edited`. A path of one part, such as `coloring`, replaces a whole section.
+            gesture: a name for edits that follow each other, as while a slider is dragged: they are one step of undo, and
+                the picture may be coarse meanwhile. Call `end_gesture` when it is let go.
+
+        On a mistake the scene stays as it was, and `problems` tells what is wrong with each path.
+        """
+        try:
+            changed = edited(self.scene, values)
+        except ClfractalError as error:
+            for path in values:
+                self.problems[path] = error.message
+            return False
+        for path in values:
+            self.problems.pop(path, None)
+        if gesture is not None:
+            self._live = tuple(
+                path.rsplit(".", 1)[1] for path in values if path.startswith("formula.parameters.")
+            )
+        self._replace(changed, gesture)
+        return True
+
+    def set_camera(self, camera: Camera, gesture: str | None = None) -> None:
+        """Moves the camera; it is a step of the camera's own undo."""
+        self._replace(self.scene.model_copy(update={"camera": camera}), gesture)
+
+    def set_scene(self, scene: Scene, gesture: str | None = None) -> None:
+        """Another scene in the place of this one, as a step that can be undone (a variation, for example)."""
+        self._replace(scene, gesture)
+
+    def open(self, scene: Scene) -> None:
+        """Shows a scene that was loaded; its history begins anew."""
+        self.scene = self.saved = scene
+        self.history = History()
+        self.problems.clear()
+        self.region = None
+        self.refresh()
+
+    def open_file(self, path: Path, overrides: tuple[str, ...] = ()) -> bool:
+        """Loads a scene; on a mistake the present one stays, and a message tells what is wrong."""
+        try:
+            scene = load_scene(path, overrides=overrides)
+        except ClfractalError as error:
+            self.tell(str(error), wrong=True)
+            return False
+        self.open(scene)
+        return True
+
+    def value(self, path: str) -> Any:
+        """The plain value at a dotted path."""
+        return value_at(self.scene, path)
+
+    def end_gesture(self) -> None:
+        """A drag has ended: the next edit is a new step, and the picture goes to full resolution."""
+        self.history.seal()
+        self._live = ()
+        self._moving_until = 0.0
+        self.refresh()
+
+    def undo(self, kind: Kind = "scene") -> bool:
+        """Takes back the last step of one stack; whether there was one."""
+        return self._restore(self.history.undo(kind))
+
+    def redo(self, kind: Kind = "scene") -> bool:
+        """Repeats the step that was taken back last."""
+        return self._restore(self.history.redo(kind))
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether the scene differs from its file."""
+        return self.scene is not self.saved and self.scene != self.saved
+
+    # The picture
+
+    @property
+    def frame(self) -> Frame | None:
+        """The newest picture on the device."""
+        return self.session.frame
+
+    @property
+    def look(self) -> Look:
+        """How the picture is shown at the moment."""
+        scene = self.scene
+        return Look(
+            scene.output.exposure,
+            self.screens(scene.stereo),
+            self.smooth,
+            transparent=scene.background == "transparent",
+        )
+
+    @property
+    def shown_scene(self) -> Scene:
+        """The scene as the window renders it: with an image of the viewport's size."""
+        stereo = self.screens(self.scene.stereo)
+        width, height = image_of(stereo, self.viewport)
+        return self.scene.model_copy(update={"image": Image(width=width, height=height), "stereo": stereo})
+
+    def resize(self, width: int, height: int) -> None:
+        """The window has another size, pixels; nothing happens if it is the same."""
+        if (width, height) == self.viewport or width <= 0 or height <= 0:
+            return
+        before = self.viewport
+        self.viewport = (width, height)
+        self.region = None
+        if self._requested is not None:
+            self._follow_width(before)
+            self.refresh()
+
+    def _follow_width(self, before: tuple[int, int]) -> None:
+        """A window of another width is another screen: `stereo.screen_width` follows, and what it shows keeps its depth."""
+        stereo = self.screens(self.scene.stereo)
+        if stereo is None:
+            return
+        ratio = image_of(stereo, self.viewport)[0] / image_of(stereo, before)[0]
+        wide = float(f"{self.value('stereo.screen_width') * ratio:.6g}")
+        with suppress(ClfractalError):
+            changed = edited(self.scene, {"stereo.screen_width": wide})
+            if self.saved is self.scene:
+                self.saved = changed
+            self.scene = changed
+
+    def refresh(self, *, again: bool = False) -> None:
+        """Asks for a picture of what is wanted now, unless it is there or under way already.
+
+        Args:
+            again: render even what is there (the device has changed, or the user insists).
+        """
+        moving = time.perf_counter() < self._moving_until
+        live = self._live if moving else ()
+        key = (render_key(self.shown_scene), self.region, live)
+        if not again and key == self._requested and not (self.session.frame is None and not moving):
+            return
+        self._requested = key
+        wanted = with_live(key[0], live) if live else key[0]
+        self.session.request(wanted, moving=moving, region=self.region)
+
+    def tick(self) -> None:
+        """Asks for the first picture, and renders a drag that pauses with the scene's own program; called every turn."""
+        if self._requested is None or (self._live and time.perf_counter() >= self._moving_until):
+            self.refresh()
+
+    def set_region(self, region: tuple[int, int, int, int] | None) -> None:
+        """Refines only a part of the picture: x, y, width, height, pixels of each eye's picture; None: all again."""
+        self.region = region
+        self.refresh()
+
+    def pick(self, x: float, y: float, depths: Any) -> Pick | None:
+        """What lies under a pixel of the window; None if nothing was rendered there yet. See `picking.picked`."""
+        return picked(depths, self.screens(self.scene.stereo), x, y) if depths is not None else None
+
+    def use_device(self, device: Device) -> None:
+        """Goes on with another device; the last picture stays until the new one is there."""
+        self.session.close()
+        self.session = Session(device, self.pacing, self.woken)
+        self.session.start()
+        self._requested = None
+        self.refresh()
+
+    # Beside the picture
+
+    def thumbnail(self, key: Hashable, load: Callable[[], Scene], size: tuple[int, int]) -> Thumbnail:
+        """A small picture that is rendered in the background, once for a key; ask again until it is `finished`."""
+        found = self._thumbnails.get(key)
+        if found is None:
+            found = self._thumbnails[key] = Thumbnail(load, size)
+            self.session.add(found)
+            while len(self._thumbnails) > MOST_THUMBNAILS:
+                self._thumbnails.pop(next(iter(self._thumbnails))).cancel()
+        return found
+
+    def forget_thumbnails(self, belongs: Callable[[Hashable], bool]) -> None:
+        """Drops thumbnails that nobody wants any more."""
+        for key in [key for key in self._thumbnails if belongs(key)]:
+            self._thumbnails.pop(key).cancel()
+
+    def render_still(
+        self, paths: tuple[Path, ...], size: tuple[int, int] | None = None, samples: int | None = None
+    ) -> Still:
+        """Renders the present scene to files in the background; see `Still` for its progress and result.
+
+        Args:
+            size: of the scene's image, pixels; None: as the window shows it.
+            samples: None: the scene's.
+        """
+        width, height = size if size is not None else image_of(self.scene.stereo, self.viewport)
+        scene = self.scene.model_copy(update={"image": Image(width=width, height=height)})
+        if samples is not None:
+            scene = edited(scene, {"renderer.samples": samples})
+        still = Still(scene, paths)
+        self.stills.append(still)
+        self.session.add(still)
+        return still
+
+    def tell(self, text: str, *, wrong: bool = False) -> None:
+        """A line for the user."""
+        self.messages.append(Message(" ".join(text.split()), wrong, time.perf_counter()))
+        del self.messages[:-MOST_MESSAGES]
+        self.woken()
+
+    def close(self) -> None:
+        """Ends all work."""
+        self.session.close()
+
+    def _replace(self, scene: Scene, gesture: str | None) -> None:
+        self.history.add(self.scene, scene, gesture)
+        self.scene = scene
+        self._moving_until = time.perf_counter() + 0.4 if gesture is not None else 0.0
+        self.refresh()
+
+    def _restore(self, sections: dict[str, Any] | None) -> bool:
+        if sections is None:
+            return False
+        self.scene = self.scene.model_copy(update=sections)
+        self._moving_until = 0.0
+        self.refresh()
+        return True

@@ -1,0 +1,390 @@
+"""GLFW windows: made for OpenGL 3.3, placed on monitors, and asked for their events."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import glfw
+
+from clfractal.errors import STATUS_DEVICE_FAILED, DeviceError
+from clfractal.viewer.recording import Event
+
+TITLE = "clfractal"
+_SMALLEST = (320, 200)
+
+
+@dataclass(frozen=True, slots=True)
+class Monitor:
+    """A screen of the desktop.
+
+    Attributes:
+        number: from 1, as `--monitors` counts.
+        name: the driver's.
+        x, y, width, height: its place on the desktop, screen coordinates.
+        metres: its physical width; 0 if it is unknown.
+    """
+
+    number: int
+    name: str
+    x: int
+    y: int
+    width: int
+    height: int
+    metres: float
+
+
+def start() -> None:
+    """Connects to the display.
+
+    Raises:
+        DeviceError: status 3, there is none.
+    """
+    problems: list[str] = []
+    glfw.set_error_callback(lambda _, text: problems.append(_text(text)))
+    glfw.init_hint(glfw.COCOA_CHDIR_RESOURCES, False)
+    if not glfw.init():
+        told = f" ({problems[-1]})" if problems else ""
+        raise DeviceError(
+            f"clfractal view needs a display, and there is none{told}", status=STATUS_DEVICE_FAILED
+        )
+    # PyOpenGL has to look for functions where GLFW made the context; it decides when it is imported.
+    if _platform_is_wayland():
+        os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
+    elif os.environ.get("XDG_SESSION_TYPE") == "wayland":
+        os.environ.setdefault("PYOPENGL_PLATFORM", "x11")
+
+
+def stop() -> None:
+    """Leaves the display; all windows are gone."""
+    glfw.set_error_callback(None)
+    glfw.terminate()
+
+
+def _platform_is_wayland() -> bool:
+    ask = getattr(glfw, "get_platform", None)
+    return ask is not None and ask() == getattr(glfw, "PLATFORM_WAYLAND", -1)
+
+
+def _text(text: Any) -> str:
+    return " ".join((text.decode(errors="replace") if isinstance(text, bytes) else str(text)).split())[:200]
+
+
+def monitors() -> list[Monitor]:
+    """The screens of the desktop, from left to right."""
+    found = []
+    for each in glfw.get_monitors():
+        mode = glfw.get_video_mode(each)
+        x, y = glfw.get_monitor_pos(each)
+        wide, _ = glfw.get_monitor_physical_size(each)
+        found.append((x, y, _text(glfw.get_monitor_name(each)), mode.size.width, mode.size.height, wide))
+    found.sort()
+    return [
+        Monitor(number, name, x, y, width, height, 1e-3 * wide)
+        for number, (x, y, name, width, height, wide) in enumerate(found, start=1)
+    ]
+
+
+class Window:
+    """One window with an OpenGL context of its own.
+
+    Args:
+        size: of its content, screen coordinates.
+        on_event: given every event.
+        share: another window whose textures it can use.
+        quad: whether to ask for a buffer for each eye.
+        visible: whether it is shown at once.
+
+    Raises:
+        DeviceError: status 3, there is no OpenGL 3.3.
+    """
+
+    def __init__(
+        self,
+        size: tuple[int, int],
+        on_event: Callable[[Event], None],
+        *,
+        share: Window | None = None,
+        quad: bool = False,
+    ) -> None:
+        self.on_event = on_event
+        self._before: tuple[int, int, int, int] | None = None
+        problems: list[str] = []
+        glfw.set_error_callback(lambda _, text: problems.append(_text(text)))
+        self.handle = self._made(size, share, quad) or (quad and self._made(size, share, False)) or None
+        glfw.set_error_callback(lambda _, text: None)
+        if self.handle is None:
+            told = f" ({problems[-1]})" if problems else ""
+            raise DeviceError(
+                f"clfractal view needs OpenGL 3.3, and this display has none{told}",
+                status=STATUS_DEVICE_FAILED,
+            )
+        glfw.make_context_current(self.handle)
+        glfw.set_window_size_limits(self.handle, *_SMALLEST, glfw.DONT_CARE, glfw.DONT_CARE)
+        self._listen()
+
+    def _made(self, size: tuple[int, int], share: Window | None, quad: bool) -> Any:
+        glfw.default_window_hints()
+        for hint, value in (
+            (glfw.CONTEXT_VERSION_MAJOR, 3),
+            (glfw.CONTEXT_VERSION_MINOR, 3),
+            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+            (glfw.OPENGL_FORWARD_COMPAT, True),
+            (glfw.DEPTH_BITS, 0),
+            (glfw.STENCIL_BITS, 0),
+            (glfw.SCALE_TO_MONITOR, True),
+            (glfw.STEREO, quad),
+            (glfw.FOCUS_ON_SHOW, share is None),
+        ):
+            glfw.window_hint(hint, value)
+        for hint, text in ((glfw.X11_CLASS_NAME, TITLE), (glfw.X11_INSTANCE_NAME, TITLE)):
+            glfw.window_hint_string(hint, text)
+        return glfw.create_window(*size, TITLE, None, share.handle if share is not None else None)
+
+    def _listen(self) -> None:
+        window, tell = self.handle, self.on_event
+
+        def key(_: Any, key: int, scancode: int, action: int, mods: int) -> None:
+            tell(Event("key", (key, scancode, action, mods)))
+
+        def char(_: Any, code: int) -> None:
+            tell(Event("char", (code,)))
+
+        def button(_: Any, button: int, action: int, mods: int) -> None:
+            tell(Event("button", (button, action, mods)))
+
+        def move(_: Any, x: float, y: float) -> None:
+            tell(Event("move", (x, y)))
+
+        def scroll(_: Any, dx: float, dy: float) -> None:
+            tell(Event("scroll", (dx, dy)))
+
+        def resize(_: Any, width: int, height: int) -> None:
+            tell(Event("resize", (width, height)))
+
+        def focus(_: Any, focused: int) -> None:
+            tell(Event("focus", (int(bool(focused)),)))
+
+        def enter(_: Any, entered: int) -> None:
+            if not entered:
+                tell(Event("leave", ()))
+
+        def drop(_: Any, paths: Sequence[str]) -> None:
+            tell(Event("drop", tuple(str(path) for path in paths)))
+
+        def refresh(_: Any) -> None:
+            tell(Event("refresh", ()))
+
+        glfw.set_key_callback(window, key)
+        glfw.set_char_callback(window, char)
+        glfw.set_mouse_button_callback(window, button)
+        glfw.set_cursor_pos_callback(window, move)
+        glfw.set_scroll_callback(window, scroll)
+        glfw.set_framebuffer_size_callback(window, resize)
+        glfw.set_window_focus_callback(window, focus)
+        glfw.set_cursor_enter_callback(window, enter)
+        glfw.set_drop_callback(window, drop)
+        glfw.set_window_refresh_callback(window, refresh)
+
+    def use(self) -> None:
+        """Makes its OpenGL context current."""
+        glfw.make_context_current(self.handle)
+
+    @property
+    def framebuffer(self) -> tuple[int, int]:
+        """Size in pixels; (0, 0) while it is minimised."""
+        width, height = glfw.get_framebuffer_size(self.handle)
+        return int(width), int(height)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Size in screen coordinates."""
+        width, height = glfw.get_window_size(self.handle)
+        return int(width), int(height)
+
+    @property
+    def scale(self) -> float:
+        """Framebuffer pixels for a point of the panels."""
+        if _platform_is_wayland() or self.framebuffer != self.size:
+            return max(self.framebuffer[0] / max(self.size[0], 1), 0.5)
+        return float(max(glfw.get_window_content_scale(self.handle)[0], 0.5))
+
+    @property
+    def minimised(self) -> bool:
+        """Whether nothing of it can be seen."""
+        return bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED)) or 0 in self.framebuffer
+
+    @property
+    def closing(self) -> bool:
+        """Whether the user asked to close it."""
+        return bool(glfw.window_should_close(self.handle))
+
+    @closing.setter
+    def closing(self, wanted: bool) -> None:
+        glfw.set_window_should_close(self.handle, wanted)
+
+    def title(self, text: str) -> None:
+        """Sets the text after the program's name."""
+        glfw.set_window_title(self.handle, f"{TITLE} - {text}" if text else TITLE)
+
+    def swap(self) -> None:
+        """Shows what was drawn."""
+        glfw.swap_buffers(self.handle)
+
+    def close(self) -> None:
+        """Destroys it."""
+        glfw.destroy_window(self.handle)
+
+    def monitor(self) -> Monitor | None:
+        """The screen that holds most of it."""
+        try:
+            x, y = glfw.get_window_pos(self.handle)
+        except glfw.GLFWError:
+            x = y = 0  # Wayland does not tell
+        width, height = self.size
+
+        def overlap(each: Monitor) -> int:
+            across = min(x + width, each.x + each.width) - max(x, each.x)
+            down = min(y + height, each.y + each.height) - max(y, each.y)
+            return max(across, 0) * max(down, 0)
+
+        return max(monitors(), key=overlap, default=None)
+
+    @property
+    def fullscreen(self) -> bool:
+        """Whether it fills a screen."""
+        return self._before is not None
+
+    def fill(self, wanted: Sequence[Monitor]) -> None:
+        """Becomes a borderless window over all of some screens."""
+        if self._before is None:
+            try:
+                self._before = (*glfw.get_window_pos(self.handle), *self.size)
+            except glfw.GLFWError:
+                self._before = (0, 0, *self.size)
+        left, top = min(each.x for each in wanted), min(each.y for each in wanted)
+        right, bottom = (
+            max(each.x + each.width for each in wanted),
+            max(each.y + each.height for each in wanted),
+        )
+        if len(wanted) == 1 and _platform_is_wayland():
+            # There a window has no place of its own.
+            found = _handle_of(wanted[0])
+            glfw.set_window_monitor(
+                self.handle, found, 0, 0, wanted[0].width, wanted[0].height, glfw.DONT_CARE
+            )
+            return
+        glfw.set_window_attrib(self.handle, glfw.DECORATED, False)
+        glfw.set_window_attrib(self.handle, glfw.FLOATING, True)
+        glfw.set_window_monitor(self.handle, None, left, top, right - left, bottom - top, glfw.DONT_CARE)
+
+    def unfill(self) -> None:
+        """Becomes the window that it was before `fill`."""
+        if self._before is None:
+            return
+        x, y, width, height = self._before
+        self._before = None
+        glfw.set_window_attrib(self.handle, glfw.FLOATING, False)
+        glfw.set_window_attrib(self.handle, glfw.DECORATED, True)
+        glfw.set_window_monitor(self.handle, None, x, y, width, height, glfw.DONT_CARE)
+
+    def pointer(self) -> tuple[float, float]:
+        """The pointer's place, screen coordinates from the window's top left."""
+        x, y = glfw.get_cursor_pos(self.handle)
+        return float(x), float(y)
+
+    def hide_pointer(self, hidden: bool) -> None:
+        """While flying the pointer is neither shown nor stopped by rims."""
+        glfw.set_input_mode(self.handle, glfw.CURSOR, glfw.CURSOR_DISABLED if hidden else glfw.CURSOR_NORMAL)
+
+    def clipboard(self, text: str) -> None:
+        """Puts a text into the clipboard."""
+        glfw.set_clipboard_string(self.handle, text)
+
+    def raise_to_front(self) -> None:
+        """Asks for the keyboard."""
+        glfw.focus_window(self.handle)
+
+
+def _handle_of(wanted: Monitor) -> Any:
+    for each in glfw.get_monitors():
+        if glfw.get_monitor_pos(each) == (wanted.x, wanted.y):
+            return each
+    return glfw.get_primary_monitor()
+
+
+def chosen_monitors(text: str) -> list[Monitor]:
+    """The screens that `--monitors 1,2` names.
+
+    Raises:
+        ClfractalError: status 2, a number that is no screen's.
+    """
+    there = monitors()
+    found = []
+    for part in text.split(","):
+        number = int(part) if part.strip().isdecimal() else 0
+        if not 1 <= number <= len(there):
+            listed = ", ".join(f"{each.number} {each.name} {each.width}x{each.height}" for each in there)
+            raise DeviceError(f"--monitors: no monitor {part.strip()[:40]!r}; available: {listed}", status=2)
+        found.append(there[number - 1])
+    return found
+
+
+def physical_width(here: Monitor | None, pixels: int) -> float | None:
+    """Width of so many pixels on a screen, metres; None if the screen does not tell its size."""
+    if here is None or here.metres <= 0 or here.width <= 0:
+        return None
+    return here.metres * pixels / here.width
+
+
+def wake() -> None:
+    """Makes a waiting main loop go on; from any thread."""
+    glfw.post_empty_event()
+
+
+def poll(timeout: float) -> None:
+    """Handles events; waits for the first at most so many seconds."""
+    if timeout > 0:
+        glfw.wait_events_timeout(timeout)
+    else:
+        glfw.poll_events()
+
+
+def no_wait() -> None:
+    """Swaps of the current context do not wait for its screen: another window's do."""
+    glfw.swap_interval(0)
+
+
+def no_opengl(found: str) -> DeviceError:
+    """The error of a display whose OpenGL is too old."""
+    return DeviceError(
+        f"clfractal view needs OpenGL 3.3, and this display has {found}", status=STATUS_DEVICE_FAILED
+    )
+
+
+def key_name(key: int, scancode: int) -> str | None:
+    """The letter that the present keyboard layout has on a key."""
+    name = glfw.get_key_name(key, scancode)
+    return _text(name) if name else None
+
+
+def gamepad() -> tuple[list[float], list[int]] | None:
+    """Axes (left x, left y, right x, right y, left and right trigger; -1 to 1) and buttons of the first gamepad."""
+    for number in range(glfw.JOYSTICK_1, glfw.JOYSTICK_LAST + 1):
+        if glfw.joystick_present(number) and glfw.joystick_is_gamepad(number):
+            state = glfw.get_gamepad_state(number)
+            if state:
+                return list(state.axes), list(state.buttons)
+    return None
+
+
+def plain_joystick() -> list[float] | None:
+    """The six axes of a 3D mouse (moves x, y, z; turns x, y, z), which is a joystick without a gamepad's layout."""
+    for number in range(glfw.JOYSTICK_1, glfw.JOYSTICK_LAST + 1):
+        if glfw.joystick_present(number) and not glfw.joystick_is_gamepad(number):
+            pointer, count = glfw.get_joystick_axes(number)
+            if count >= 6:
+                return [float(pointer[index]) for index in range(6)]
+    return None
