@@ -112,8 +112,9 @@ def _place(location: Sequence[str | int]) -> _Place:
             place.types = _options(model.model_fields[part].annotation)
             place.path.append(part)
         elif any(get_origin(t) is dict for t in place.types):
+            values = [get_args(t)[1] for t in place.types if get_origin(t) is dict]
+            place.types = [option for value in values for option in _options(value)]
             place.path.append(part)
-            place.types = []
         else:
             place.types = [m for m in place.models if m.tag == part] or place.types
     return place

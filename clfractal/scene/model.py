@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 from pydantic import Field, PrivateAttr
 
 from clfractal.scene.base import Section
+from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
@@ -58,6 +59,7 @@ class Scene(Section):
     layout: Layout | None = Field(None, description="several views in one picture; null: one view")
     stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; null: one picture")
     output: Output = Field(default_factory=dict, validate_default=True)
+    bookmarks: Bookmarks = Field({}, description="cameras kept under names; they do not change the picture")
 
     # Not fields: they are not part of the scene's values, and not compared.
     _folder: Path = PrivateAttr(default_factory=Path)

@@ -66,7 +66,7 @@ def _colormap(name: str, path: str = "coloring.palette") -> Colormap:
     try:
         return Colormap(name)
     except Exception as error:  # cmap raises many kinds for a name it does not know
-        guess = nearest(name, _names())
+        guess = nearest(name, names())
         hint = (
             f"; did you mean {guess!r}?"
             if guess
@@ -75,7 +75,8 @@ def _colormap(name: str, path: str = "coloring.palette") -> Colormap:
         raise SceneError(f"unknown palette {name[:60]!r}{hint}", Where(path=path)) from error
 
 
-def _names() -> list[str]:
+def names() -> list[str]:
+    """All names of palettes: our own first, then those of cmap's catalog, in full and short."""
     from cmap import Catalog
 
     return [*PALETTES, *{key for full in Catalog() for key in (full, full.split(":")[-1])}]

@@ -217,6 +217,7 @@ SECTIONS = [
     "layout",
     "stereo",
     "output",
+    "bookmarks",
 ]
 
 

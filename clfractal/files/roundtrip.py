@@ -1,0 +1,332 @@
+"""Writes changed values into a YAML text and leaves everything else in it as it is: comments, order, style, spaces.
+
+A round-trip library that writes a whole document sets its own line breaks, indents and spaces. Here its parser tells
+where each value stands, and only those pieces of the text are replaced. The result is read back; if it does not hold
+what it should, because the text is written in a rare way, the whole text is written anew below its first comment.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from clfractal.errors import SceneError
+from clfractal.files import spans
+from clfractal.files.document import read_document
+from clfractal.files.edits import Edits
+from clfractal.files.fragments import block_lines, fits, flow_text, number_text, same, text_scalar
+from clfractal.files.marks import Node
+from clfractal.files.spans import UnusualError
+
+_NONE = object()
+
+
+def updated(
+    text: str, before: Mapping[str, Any], after: Mapping[str, Any], sparse: Mapping[str, Any] | None = None
+) -> str:
+    """The text with the values of `after`; what is equal in `before` and `after` is not touched.
+
+    A changed number or word is replaced in its place. A new key comes behind the others of its mapping (in front if it
+    is the first one of `sparse`), a removed one goes with its comment. Entries of a list are matched by their values. A
+    value that becomes its default stays, and is written. An alias whose value changes, or the anchor of which does,
+    becomes a value of its own.
+
+    Args:
+        text: YAML of a mapping that `read_document` accepts; or JSON, which it then stays.
+        before: the plain data that the text stands for, with the defaults of keys that it does not have.
+        after: the same of what it shall stand for.
+        sparse: `after` without defaults; what is not in the text yet is written as it is here. None: as in `after`.
+
+    Raises:
+        SceneError: the text is not YAML.
+    """
+    root = read_document(text).root
+    shorter = after if sparse is None else sparse
+    if same(before, after):
+        return text
+    try:
+        found = _Editor(text, root, sparse is not None).edited(before, after, shorter)
+        if _stands_for(read_document(found).plain(), before, after, shorter):
+            return found
+    except (UnusualError, SceneError):
+        pass
+    return written(shorter, text)
+
+
+def written(data: Mapping[str, Any], head: str = "") -> str:
+    """A mapping as YAML text, below the comments that the text `head` begins with."""
+    lines = []
+    for line in head.splitlines():
+        if line.strip() and not line.startswith("#"):
+            break
+        lines.append(line)
+    return "\n".join([*lines, *block_lines(data, 0)]) + "\n"
+
+
+def _stands_for(found: Any, before: Any, after: Any, sparse: Any) -> bool:
+    """Whether data that were read stand for `after`: what they lack must be a default, or as it was."""
+    if isinstance(after, Mapping):
+        if not isinstance(found, Mapping) or any(found[key] for key in found.keys() - after.keys()):
+            return False
+        return all(
+            _stands_for(found[key], _child(before, key), after[key], _child(sparse, key))
+            if key in found
+            else _child(sparse, key) is _NONE or same(_child(before, key), after[key])
+            for key in after
+        )
+    if isinstance(after, list):
+        if not isinstance(found, list) or len(found) != len(after):
+            return False
+        return all(
+            _stands_for(found[i], _child(before, i), after[i], _child(sparse, i)) for i in range(len(after))
+        )
+    return same(found, after)
+
+
+def _child(value: Any, key: str | int) -> Any:
+    if isinstance(value, Mapping):
+        return value.get(str(key), _NONE)
+    if isinstance(value, list) and isinstance(key, int) and key < len(value):
+        return value[key]
+    return _NONE
+
+
+class _Editor:
+    """Finds the edits that a text needs.
+
+    Attributes:
+        text: the text as it is.
+        tree: its values and where they stand.
+        root: the same values as `read_document` reads them, aliases resolved.
+        has_sparse: whether defaults are known, so that they need not be written.
+        broken: anchors whose value changes or goes away, so that their aliases become values.
+    """
+
+    def __init__(self, text: str, root: Node, has_sparse: bool) -> None:
+        self.text = text
+        self.tree = spans.parse(text)
+        self.root = root
+        self.has_sparse = has_sparse
+        self.json_only = _is_json(text)
+        self.broken: set[str] = set()
+        self.edits = Edits(text)
+
+    def edited(self, before: Any, after: Any, sparse: Any) -> str:
+        """The text with all edits made.
+
+        Raises:
+            UnusualError: it is written in a way that is not edited in place.
+        """
+        while True:
+            known = set(self.broken)
+            self.edits = Edits(self.text)
+            self._mapping(self.tree, self.root, before, after, sparse)
+            if self.broken == known:
+                return self.edits.applied()
+
+    def _flow(self, value: Any) -> str:
+        return flow_text(value, json_only=self.json_only)
+
+    def _value(self, node: spans.Node, read: Node, before: Any, after: Any, sparse: Any) -> bool:
+        """Edits a value inside its place; False if it has to be replaced as a whole."""
+        if isinstance(node, spans.Alias):
+            if same(before, after) and node.name not in self.broken:
+                return True
+            self.edits.replace(node.start, node.end, self._flow(_written_value(before, after, sparse, read)))
+            return True
+        changed = not same(before, after)
+        if changed and node.anchor:
+            self.broken.add(node.anchor)
+        if isinstance(node, spans.Mapping) and isinstance(after, Mapping):
+            return self._mapping(node, read, before, after, sparse)
+        if isinstance(node, spans.Sequence) and isinstance(after, list):
+            return self._sequence(node, read, before, after, sparse)
+        if changed and isinstance(node, spans.Scalar) and not isinstance(after, (Mapping, list)):
+            return self._scalar(node, after)
+        return not changed
+
+    def _scalar(self, node: spans.Scalar, after: Any) -> bool:
+        if node.start == node.end or node.style in ("|", ">"):
+            return False
+        if isinstance(after, str):
+            new = text_scalar(after, json_only=self.json_only, quote=node.style)
+        elif isinstance(after, float):
+            new = number_text(after, node.value)
+        else:
+            new = self._flow(after)
+        self.edits.replace(node.start, node.end, new)
+        return True
+
+    def _mapping(self, node: spans.Mapping, read: Node, before: Any, after: Any, sparse: Any) -> bool:
+        old = before if isinstance(before, Mapping) else {}
+        names = [key.value for key in node.keys]
+        # (A key that means nothing, such as `julia: null`, may be in neither of the two.)
+        kept = [name in after or name not in old for name in names]
+        new = {
+            key: _child(sparse, key) if _child(sparse, key) is not _NONE else after[key]
+            for key in after
+            if key not in names and self._needed(key, old, after, sparse)
+        }
+        if not names or not any(kept):
+            return not names and not new
+        for index, name in enumerate(names):
+            child = read.child(name)
+            assert child is not None
+            values = (_child(old, name), after.get(name, _NONE), _child(sparse, name))
+            if not kept[index]:
+                self._lost(node.values[index])
+            elif name in after and not self._value(node.values[index], child, *values):
+                self._whole(node, index, _written_value(*values, child))
+        first = next(iter(sparse if isinstance(sparse, Mapping) and sparse else after), "")
+        if node.flow:
+            self._flow_mapping(node, kept, new, first)
+        else:
+            self._block_mapping(node, kept, new, first)
+        return True
+
+    def _needed(self, key: str, before: Mapping[str, Any], after: Mapping[str, Any], sparse: Any) -> bool:
+        """Whether a key that the text lacks has to be written."""
+        changed = not same(before.get(key, _NONE), after[key])
+        if not self.has_sparse:
+            return changed
+        # Another kind of section may have other defaults, so that an equal value is no longer the default.
+        return _child(sparse, key) is not _NONE and (changed or before.keys() != after.keys())
+
+    def _flow_mapping(
+        self, node: spans.Mapping, kept: list[bool], new: Mapping[str, Any], first: str
+    ) -> None:
+        cores = [(key.start, value.end) for key, value in zip(node.keys, node.values, strict=True)]
+        pairs = {
+            key: f"{text_scalar(key, json_only=self.json_only)}: {self._flow(value)}"
+            for key, value in new.items()
+        }
+        waiting = list(pairs)
+        if first in pairs:
+            waiting.remove(first)
+            self.edits.flow_insert(node, cores, 0, [pairs[first]])
+        gone = [index for index, keep in enumerate(kept) if not keep]
+        while gone and waiting:
+            self.edits.replace(*cores[gone.pop(0)], pairs[waiting.pop(0)])
+        self.edits.flow_remove(node, cores, gone)
+        self.edits.flow_insert(node, cores, len(cores), [pairs[key] for key in waiting])
+
+    def _block_mapping(
+        self, node: spans.Mapping, kept: list[bool], new: Mapping[str, Any], first: str
+    ) -> None:
+        starts = [key.start for key in node.keys]
+        ends = [value.end for value in node.values]
+        column = self.edits.column(starts[0])
+        lines = {key: block_lines({key: value}, column) for key, value in new.items()}
+        self.edits.block_remove(starts, ends, [i for i, keep in enumerate(kept) if not keep], listed=False)
+        if first in lines:
+            self.edits.insert_before(starts[0], lines.pop(first))
+        for inserted in lines.values():
+            self.edits.insert_lines_after(ends[-1], inserted)
+
+    def _sequence(self, node: spans.Sequence, read: Node, before: Any, after: list[Any], sparse: Any) -> bool:
+        old = before if isinstance(before, list) else []
+        if len(old) != len(node.entries):
+            raise UnusualError("the text and its data differ in the length of a list")
+        if not after or not old:
+            return not after and not old
+        pairs, gone, new = _matched(old, after)
+        texts = {j: _written_value(None, after[j], _child(sparse, j), None) for j in range(len(after))}
+        for i in gone:
+            self._lost(node.entries[i])
+        for i, j in pairs:
+            child = read.child(i)
+            assert child is not None
+            entry = node.entries[i]
+            if not self._value(entry, child, old[i], after[j], _child(sparse, j)):
+                self._lost(entry)
+                self.edits.replace(entry.start, entry.end, self._flow(texts[j]))
+        if not node.flow:
+            self._block_sequence(
+                node, gone, {place: [texts[j] for j in added] for place, added in new.items()}
+            )
+            return True
+        cores = [(entry.start, entry.end) for entry in node.entries]
+        self.edits.flow_remove(node, cores, gone)
+        for place, added in new.items():
+            self.edits.flow_insert(node, cores, place, [self._flow(texts[j]) for j in added])
+        return True
+
+    def _block_sequence(self, node: spans.Sequence, gone: list[int], new: dict[int, list[Any]]) -> None:
+        ends = [entry.end for entry in node.entries]
+        column = self.edits.column(node.dashes[0])
+        self.edits.block_remove(node.dashes, ends, gone, listed=True)
+        for place, values in new.items():
+            lines = block_lines(values, column)
+            if place == 0:
+                self.edits.insert_before(node.dashes[0], lines)
+            else:
+                self.edits.insert_lines_after(ends[place - 1], lines)
+
+    def _whole(self, node: spans.Mapping, index: int, value: Any) -> None:
+        """Replaces all of a mapping's value."""
+        old, colon = node.values[index], node.colons[index]
+        self._lost(old)
+        text = self._flow(value)
+        if node.flow or colon < 0:
+            self.edits.replace(old.start, old.end, text if old.start < old.end else ": "[colon >= 0 :] + text)
+            return
+        column = self.edits.column(node.keys[index].start)
+        on_line = "\n" not in self.text[colon : old.start] and "\r" not in self.text[colon : old.start]
+        one_line = not value or fits(value, self.edits.column(colon) + 2)
+        lines = [] if one_line else block_lines(value, column + 2)
+        if on_line:
+            self.edits.replace(colon + 1, old.end, f" {text}" if one_line else "")
+            self.edits.insert_lines_after(old.end, lines)
+        else:
+            self.edits.replace(colon + 1, colon + 1, f" {text}" if one_line else "")
+            self.edits.insert_lines_after(colon, lines)
+            self.edits.remove(self.edits.next_line(colon), self.edits.next_line(old.end))
+
+    def _lost(self, node: spans.Node) -> None:
+        """Remembers the anchors of a value that goes away."""
+        if isinstance(node, spans.Alias):
+            return
+        if node.anchor:
+            self.broken.add(node.anchor)
+        inner = node.entries if isinstance(node, spans.Sequence) else ()
+        for child in node.values if isinstance(node, spans.Mapping) else inner:
+            self._lost(child)
+
+
+def _written_value(before: Any, after: Any, sparse: Any, read: Node | None) -> Any:
+    """What is written for a value: as the text had it if it has not changed, else without defaults."""
+    if read is not None and same(before, after):
+        return read.plain()
+    return after if sparse is _NONE else sparse
+
+
+def _matched(
+    before: Sequence[Any], after: Sequence[Any]
+) -> tuple[list[tuple[int, int]], list[int], dict[int, list[int]]]:
+    """Which entries of two lists belong together, which go, and which come before an index of the first list."""
+    if len(before) == len(after) and not any(isinstance(each, (Mapping, list)) for each in before):
+        return [(i, i) for i in range(len(before))], [], {}
+    matcher = difflib.SequenceMatcher(None, list(map(repr, before)), list(map(repr, after)), autojunk=False)
+    pairs: list[tuple[int, int]] = []
+    gone: list[int] = []
+    new: dict[int, list[int]] = {}
+    for _, i, i_end, j, j_end in matcher.get_opcodes():
+        both = min(i_end - i, j_end - j)
+        pairs += zip(range(i, i + both), range(j, j + both), strict=True)
+        gone += range(i + both, i_end)
+        if j + both < j_end:
+            new[i_end] = list(range(j + both, j_end))
+    if len(before) == len(after) and len(pairs) * 2 < len(before):
+        return [(i, i) for i in range(len(before))], [], {}
+    return pairs, gone, new
+
+
+def _is_json(text: str) -> bool:
+    import json
+
+    try:
+        json.loads(text)
+    except ValueError:
+        return False
+    return True

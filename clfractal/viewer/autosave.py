@@ -1,0 +1,277 @@
+"""Keeps unsaved changes on the disk, so that the next window can offer them if this one ends without saving them.
+
+Every window has three files in one folder: the scene's text, a note about it, and a lock that the system gives back
+when the window's process ends, however it ends.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import secrets
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from clfractal.device import cache
+from clfractal.errors import ClfractalError
+from clfractal.files.document import read_document
+from clfractal.files.regular import read_text_file
+from clfractal.scene.load import SceneText, load_scene
+from clfractal.scene.model import Scene
+from clfractal.viewer.saving import SceneSource, open_source, scene_text
+
+_VERSION = 1
+
+
+class Autosave:
+    """The unsaved changes of one window; a context manager that leaves nothing behind when it is left without error.
+
+    A disk that is full or cannot be written is no reason to end: the work is then not kept, and `write` returns False.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        """Args: folder: by default `autosave` in the user's cache folder."""
+        self._folder = folder if folder is not None else default_folder()
+        self._name = f"{os.getpid()}-{secrets.token_hex(4)}"
+        self._lock: int | None = None
+        self._written: str | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.close()
+        else:
+            self._release()
+
+    def write(self, source: SceneSource, present: Scene) -> bool:
+        """Keeps the present scene, in place of what was kept before; False if that is not possible.
+
+        It takes some 10 ms, and does not wait for the disk: the text survives the process, but not a power failure.
+        """
+        try:
+            text = scene_text(source, present)
+            if text == self._written:
+                return True
+            self._folder.mkdir(parents=True, exist_ok=True)
+            if self._lock is None:
+                self._lock = _locked_file(self._folder / f"{self._name}.lock")
+            note = {
+                "version": _VERSION,
+                "pid": os.getpid(),
+                "started": _process_start(os.getpid()),
+                "time": time.time(),
+                "path": str(source.path.absolute()) if source.path is not None else None,
+                "folder": str(present.folder.absolute()),
+            }
+            _replace(self._folder / f"{self._name}.yaml", text)
+            _replace(self._folder / f"{self._name}.json", json.dumps(note, indent=1))
+        except (OSError, ClfractalError):
+            return False
+        self._written = text
+        return True
+
+    def clear(self) -> None:
+        """Forgets what was kept, because it has been saved or given up."""
+        _remove(self._folder, self._name)
+        self._written = None
+
+    def close(self) -> None:
+        """The same, when the window closes."""
+        self.clear()
+        if self._lock is not None:
+            with suppress(OSError):
+                (self._folder / f"{self._name}.lock").unlink()
+        self._release()
+
+    def _release(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def found(self) -> list[Recovered]:
+        """What windows that have ended left behind, the newest first; damaged files are removed.
+
+        Each belongs to this process until it is discarded or released: another window that starts now does not find it.
+        """
+        found = []
+        try:
+            locks = sorted(self._folder.glob("*.lock"))
+        except OSError:
+            return []
+        for path in locks:
+            if path.stem == self._name or (lock := _taken(path)) is None:
+                continue
+            recovered = _read(self._folder, path.stem, lock)
+            if recovered is None:
+                _remove(self._folder, path.stem)
+                with suppress(OSError):
+                    path.unlink()
+                os.close(lock)
+            else:
+                found.append(recovered)
+        return sorted(found, key=lambda each: each.time, reverse=True)
+
+
+@dataclass
+class Recovered:
+    """Unsaved changes of a window that has ended.
+
+    Attributes:
+        time: when they were kept, seconds since 1970.
+        path: the file that the scene came from; None if from nowhere.
+        folder: where the files that the scene names are looked for.
+        text: the scene as YAML.
+    """
+
+    time: float
+    path: Path | None
+    folder: Path
+    text: str
+    _store: Path
+    _name: str
+    _lock: int | None
+
+    def scene(self) -> Scene:
+        """The scene with the changes.
+
+        Raises:
+            SceneError, FormulaError, FileError: a file that it names is gone or has changed.
+        """
+        shown = self.path.name if self.path is not None else "scene"
+        return load_scene(SceneText(read_document(self.text, shown), self.folder))
+
+    def source(self) -> SceneSource:
+        """Where the scene came from, to be saved there; if that cannot be read any more, the text itself."""
+        if self.path is not None:
+            with suppress(ClfractalError):
+                return open_source(self.path)
+        return SceneSource("none", None, self.text, self.scene())
+
+    def discard(self) -> None:
+        """Removes them: they have been given up, or are kept by this window now."""
+        _remove(self._store, self._name)
+        with suppress(OSError):
+            (self._store / f"{self._name}.lock").unlink()
+        self.release()
+
+    def release(self) -> None:
+        """Leaves them for the next window."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+def default_folder() -> Path:
+    """`autosave` in the user's cache folder."""
+    return cache.folder() / "autosave"
+
+
+def _read(folder: Path, name: str, lock: int) -> Recovered | None:
+    """What a note and its text say; None if there is none, or it is damaged."""
+    try:
+        note: Any = json.loads(read_text_file(folder / f"{name}.json"))
+        text = read_text_file(folder / f"{name}.yaml")
+        if not isinstance(note, dict) or note.get("version") != _VERSION:
+            return None
+        if not isinstance(read_document(text).root.value, dict):
+            return None
+        path = note["path"]
+        return Recovered(
+            float(note["time"]),
+            Path(path) if path is not None else None,
+            Path(note["folder"]),
+            text,
+            folder,
+            name,
+            lock,
+        )
+    except (ClfractalError, ValueError, TypeError, KeyError):
+        return None
+
+
+def _locked_file(path: Path) -> int:
+    """A descriptor of a new file that this process holds locked; OSError if that is not possible."""
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        # (Where files cannot be locked, the note's process number has to do.)
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        # Another window may have taken the new file for a left one and removed it before it was locked.
+        if _is_at(descriptor, path):
+            return descriptor
+        os.close(descriptor)
+
+
+def _taken(path: Path) -> int | None:
+    """A descriptor of the lock of a window that has ended, now held by this process; None if it is held elsewhere."""
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        gone = _is_at(descriptor, path)
+    except BlockingIOError:
+        gone = False
+    except OSError:
+        # A file system without locks: the note tells whose it is.
+        gone = not _runs(path.with_suffix(".json"))
+    if gone:
+        return descriptor
+    os.close(descriptor)
+    return None
+
+
+def _is_at(descriptor: int, path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+    except OSError:
+        return False
+
+
+def _runs(note: Path) -> bool:
+    """Whether the process that wrote a note still runs; a number that another process has by now does not count."""
+    try:
+        told = json.loads(note.read_text(encoding="utf-8"))
+        started = _process_start(int(told["pid"]))
+        return started is not None and started == told["started"]
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+
+
+def _process_start(pid: int) -> str | None:
+    """When a process started, in the system's ticks since it was booted; None if there is no such process."""
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    # The second field, the program's name in parentheses, may hold anything.
+    return status.rpartition(")")[2].split()[19]
+
+
+def _replace(path: Path, text: str) -> None:
+    beside = path.with_name(f".{path.name}.new")
+    beside.write_bytes(text.encode())
+    os.replace(beside, path)
+
+
+def _remove(folder: Path, name: str) -> None:
+    for path in _files(folder, name):
+        with suppress(OSError):
+            path.unlink()
+
+
+def _files(folder: Path, name: str) -> Iterator[Path]:
+    for ending in (".json", ".yaml"):
+        yield folder / f"{name}{ending}"
+        yield folder / f".{name}{ending}.new"

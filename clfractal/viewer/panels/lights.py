@@ -1,0 +1,126 @@
+"""Lights: a list, and all settings of the one that is chosen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.scene.checks import used_bounds
+from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.color_button import shown
+from clfractal.viewer.panels.metadata import plain
+from clfractal.viewer.panels.ui import Ui
+
+
+def summary(ui: Ui) -> str:
+    """For the heading."""
+    return str(len(ui.studio.scene.lights))
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel."""
+    lights = ui.studio.scene.lights
+    chosen = min(int(ui.memory.get("light", 0)), max(len(lights) - 1, 0))
+    if w.filtering(ui):
+        for index in range(len(lights)):
+            _light(ui, index)
+        return
+    for index, light in enumerate(lights):
+        if _line(index, light, index == chosen):
+            chosen = index
+    ui.memory["light"] = chosen
+    _buttons(ui, chosen)
+    w.problem(ui, "lights")
+    if lights and chosen < len(ui.studio.scene.lights):
+        _light(ui, chosen)
+    if not lights:
+        w.hint(ui, "No light: only an environment lights the scene.")
+
+
+def _line(index: int, light: Any, chosen: bool) -> bool:
+    """One light of the list; whether it was clicked."""
+    corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
+    wide = imgui.get_content_region_avail().x
+    clicked = imgui.invisible_button(f"##light{index}", imgui.ImVec2(wide, height))
+    draw = imgui.get_window_draw_list()
+    if chosen or imgui.is_item_hovered():
+        back = theme.ACCENT_FAINT if chosen else theme.FRAME
+        far = imgui.ImVec2(corner.x + wide, corner.y + height)
+        draw.add_rect_filled(corner, far, theme.packed(back), 5.0)
+    codes, _ = shown(light.color)
+    middle = imgui.ImVec2(corner.x + 17, corner.y + height / 2)
+    draw.add_circle_filled(middle, 6.0, theme.packed((*codes, 1.0)))
+    draw.add_circle(middle, 6.0, theme.packed((1, 1, 1, 0.25)))
+    y = corner.y + (height - imgui.get_font_size()) / 2
+    name = "Directional" if isinstance(light, DirectionalLight) else "Point"
+    draw.add_text(imgui.ImVec2(corner.x + 31, y), theme.packed(theme.TEXT), f"{name} {index + 1}")
+    text = f"{light.intensity:.3g}"
+    place = imgui.ImVec2(corner.x + wide - imgui.calc_text_size(text).x - 8, y)
+    draw.add_text(place, theme.packed(theme.DIM), text)
+    return bool(clicked)
+
+
+def _buttons(ui: Ui, chosen: int) -> None:
+    lights = [plain(light) for light in ui.studio.scene.lights]
+    room = len(lights) < MAX_LIGHTS
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    if w.button("Directional", icon=theme.PLUS, enabled=room, about="Add light from infinitely far away"):
+        _set(ui, [*lights, {"type": "directional"}], len(lights))
+    w.in_row(4)
+    if w.button("Point", icon=theme.PLUS, enabled=room, about="Add light from a point"):
+        _set(ui, [*lights, {"type": "point", "position": _free_place(ui)}], len(lights))
+    w.in_row(4)
+    if w.icon_button(theme.COPY, "Duplicate", enabled=bool(lights) and room):
+        _set(ui, [*lights, lights[chosen]], len(lights))
+    w.in_row(4)
+    if w.icon_button(theme.TRASH, "Remove", enabled=bool(lights)):
+        _set(ui, [*lights[:chosen], *lights[chosen + 1 :]], max(chosen - 1, 0))
+    w.in_row(4)
+    on = "lights" in ui.show
+    if w.icon_button(theme.ARROWS, f"Drag lights in the picture ({ui.keys.hint('lights')})", on=on):
+        ui.act("lights")
+
+
+def _set(ui: Ui, lights: list[Any], chosen: int) -> None:
+    if ui.studio.edit({"lights": lights}):
+        ui.memory["light"] = chosen
+
+
+def _free_place(ui: Ui) -> list[float]:
+    """Outside the bounds, on the camera's side and above."""
+    scene = ui.studio.scene
+    center, radius = used_bounds(scene)
+    away = [p - c for p, c in zip(scene.camera.position, center, strict=True)]
+    size = max(sum(x * x for x in away) ** 0.5, 1e-9)
+    return [
+        float(f"{c + 2 * radius * x / size + (radius if axis == 2 else 0):.4g}")
+        for axis, (c, x) in enumerate(zip(center, away, strict=True))
+    ]
+
+
+def _light(ui: Ui, index: int) -> None:
+    path, light = f"lights.{index}", ui.studio.scene.lights[index]
+    width = w.row(ui, "Type", path=f"{path}.type", tip="from infinitely far away, or from a point")
+    if width is not None:
+        words = {"directional": "Directional", "point": "Point"}
+        found = w.segments(f"{path}.type", words, light.type, width)
+        if found is not None:
+            common = {name: plain(getattr(light, name)) for name in ("color", "intensity", "shadow")}
+            more = {"position": _free_place(ui)} if found == "point" else {}
+            ui.studio.edit({path: {"type": found, **common, **more}})
+            return
+    w.fields(ui, path, ("color", "intensity"))
+    if isinstance(light, DirectionalLight):
+        w.field(ui, f"{path}.direction", step=0.01)
+    else:
+        radius = used_bounds(ui.studio.scene)[1]
+        w.field(ui, f"{path}.position", step=0.01 * radius)
+        w.field(ui, f"{path}.falloff")
+    w.field(ui, f"{path}.shadow")
+    if light.shadow:
+        w.field(ui, f"{path}.angular_size", "Softness", unit="°")
+        if light.angular_size > 0:
+            w.field(ui, f"{path}.rays", start=8, auto="8")

@@ -1,0 +1,104 @@
+"""The surface's material, and what is around it: background, fog, environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from clfractal.scene.checks import used_bounds
+from clfractal.scene.environment import names
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.metadata import metas
+from clfractal.viewer.panels.ui import Ui
+
+
+def draw(ui: Ui) -> None:
+    """Draws the material."""
+    if ui.studio.scene.coloring.by == "solid":
+        w.field(ui, "material.color")
+    elif not w.filtering(ui):
+        w.hint(ui, f"The colour comes from the colouring by {w.word(ui.studio.scene.coloring.by).lower()}.")
+    w.fields(ui, "material", ("ambient", "diffuse", "specular", "shininess", "reflection"))
+
+
+def summary(ui: Ui) -> str:
+    """For the heading of the surroundings."""
+    scene = ui.studio.scene
+    parts = [scene.environment.name or "map"] if scene.environment is not None else []
+    return ", ".join([*parts, *(["fog"] if scene.fog is not None else [])])
+
+
+def draw_surroundings(ui: Ui) -> None:
+    """Draws background, fog and environment."""
+    w.group(ui, "Background")
+    _background(ui)
+    w.group(ui, "Fog")
+    radius = used_bounds(ui.studio.scene)[1]
+    if _switch(ui, "fog", "Fog", {"density": float(f"{0.25 / radius:.2g}")}):
+        w.fields(ui, "fog", ("color", "density", "background"), background={"label": "Covers background"})
+    w.group(ui, "Environment")
+    if _switch(ui, "environment", "Environment", {"name": names()[0]}):
+        _map(ui)
+        w.fields(
+            ui,
+            "environment",
+            ("intensity", "rotation", "background", "rays"),
+            rotation={"unit": "°"},
+            background={"label": "Is background"},
+        )
+
+
+def _background(ui: Ui) -> None:
+    transparent = ui.studio.scene.background == "transparent"
+    width = w.row(
+        ui,
+        "Kind",
+        path="background",
+        tip="a gradient from top to bottom, or nothing",
+        differs=transparent,
+        reset=lambda: _put(ui, "background", {}),
+    )
+    if width is not None:
+        words = {False: "Gradient", True: "Transparent"}
+        found = w.segments("background", words, transparent, width)
+        if found is not None:
+            kept = ui.memory.setdefault("background.kept", {})
+            if found:
+                kept.update(top=list(w.value(ui, "background.top")), bottom=list(w.value(ui, "background.bottom")))
+            _put(ui, "background", "transparent" if found else dict(kept))
+    if ui.studio.scene.background != "transparent":
+        w.fields(ui, "background", ("top", "bottom"))
+
+
+def _switch(ui: Ui, key: str, label: str, first: dict[str, Any]) -> bool:
+    """The switch of a section that may be null; whether it is there. Its values come back when it is switched on again."""
+    given = getattr(ui.studio.scene, key) is not None
+    width = w.row(
+        ui, label, path=key, tip=w.value_tip(ui, key), differs=given, reset=lambda: _put(ui, key, None)
+    )
+    if width is not None and w.toggle(key, given):
+        kept = ui.memory.setdefault("kept", {})
+        if given:
+            kept[key] = ui.studio.value(key)
+        _put(ui, key, None if given else kept.get(key, first))
+    w.problem(ui, key)
+    return getattr(ui.studio.scene, key) is not None
+
+
+def _map(ui: Ui) -> None:
+    environment = ui.studio.scene.environment
+    assert environment is not None
+    if environment.file is not None:
+        w.field(ui, "environment.file")
+        return
+    about = metas(type(environment))["name"].description
+    width = w.row(ui, "Map", path="environment.name", tip=about)
+    if width is None:
+        return
+    found = w.choose("environment.name", {name: w.word(name) for name in names()}, environment.name or "", width)
+    if found is not None:
+        _put(ui, "environment.name", found)
+    w.problem(ui, "environment.name")
+
+
+def _put(ui: Ui, path: str, value: Any) -> None:
+    ui.studio.edit({path: value})

@@ -1,0 +1,281 @@
+"""What the schema says of a scene's values: kind, bounds, default and description; the source of all widgets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from clfractal.scene.base import Section
+from clfractal.scene.model import Scene
+
+Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
+
+
+@dataclass(frozen=True, slots=True)
+class Meta:
+    """One field of a section.
+
+    Attributes:
+        name: the field's.
+        kind: what its values are; `other` for lists, mappings and values of several kinds.
+        size: numbers in a vector or colour.
+        low, high: the bounds of a number, or of each of a vector's; None: unbounded.
+        open: whether the bounds themselves are not allowed: (low, high).
+        choices: the words (or numbers) of a choice.
+        sections: the classes that a section may be.
+        optional: whether it may be null.
+        default: plain; None where it has to be given, too.
+        description: the schema's.
+        usual: (low, high) in which it usually lies, for a slider; None: no usual range.
+        log: whether a slider is divided by magnitudes.
+    """
+
+    name: str
+    kind: Kind
+    size: int
+    low: float | None
+    high: float | None
+    open: tuple[bool, bool]
+    choices: tuple[Any, ...]
+    sections: tuple[type[Section], ...]
+    optional: bool
+    default: Any
+    description: str
+    usual: tuple[float, float] | None
+    log: bool
+
+
+# Where values usually lie, for those whose bounds are too wide for a slider.
+_USUAL: dict[str, tuple[float, float]] = {
+    "Material.ambient": (0, 1),
+    "Material.diffuse": (0, 1),
+    "Material.specular": (0, 1),
+    "Material.shininess": (1, 1000),
+    "DirectionalLight.intensity": (0, 4),
+    "PointLight.intensity": (0, 4),
+    "DirectionalLight.angular_size": (0, 45),
+    "PointLight.angular_size": (0, 45),
+    "DirectionalLight.rays": (1, 64),
+    "PointLight.rays": (1, 64),
+    "Environment.intensity": (0, 4),
+    "Environment.rotation": (-180, 180),
+    "Environment.rays": (0, 64),
+    "Fog.density": (0.001, 10),
+    "PerspectiveCamera.fov": (5, 120),
+    "PerspectiveCamera.f_number": (0.5, 64),
+    "SurfaceRenderer.detail": (0.1, 10),
+    "SurfaceRenderer.max_steps": (50, 20000),
+    "SurfaceRenderer.step_scale": (0.05, 1),
+    "SurfaceRenderer.over_relaxation": (1, 1.99),
+    "SurfaceRenderer.firefly_limit": (0.5, 100),
+    "AmbientOcclusion.rays": (1, 64),
+    "Sampled.samples": (1, 1024),
+    "Sampled.noise": (0.001, 0.1),
+    "Sampled.min_samples": (4, 256),
+    "Sampled.filter_width": (0.5, 6),
+    "VolumeRenderer.resolution": (32, 2048),
+    "VolumeRenderer.step": (0.1, 2),
+    "VolumeRenderer.opacity_limit": (0.5, 1),
+    "FormulaSpec.iterations": (1, 1000),
+    "FormulaSpec.bailout": (1, 1000),
+    "FormulaSpec.distance_bailout": (1, 1e6),
+    "ChainLink.count": (1, 10),
+    "CutPlane.iterations": (1, 1000),
+    "CutPlaneRenderer.iterations": (1, 1000),
+    "CutPlane.count": (1, 32),
+    "Coloring.scale": (-2, 2),
+    "Coloring.offset": (-1, 1),
+    "Coloring.layer": (1, 64),
+    "EscapeColors.scale": (-4, 4),
+    "EscapeColors.offset": (-1, 1),
+    "Output.exposure": (-5, 5),
+    "Stereo.screen_width": (0.1, 10),
+    "Stereo.screen_distance": (0.2, 20),
+    "Stereo.interpupillary_distance": (0.02, 0.1),
+    "Stereo.separation": (0, 3),
+    "Stereo.budget": (0.1, 3),
+}
+# A range over more than this factor is divided by magnitudes.
+_DECADES = 40.0
+# Bounds farther apart than this are no range for a slider.
+_WIDEST = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A value of a scene: the section (or list, or mapping) that holds it, its name there, and the value."""
+
+    holder: Any
+    name: str
+    value: Any
+
+    @property
+    def meta(self) -> Meta | None:
+        """What the schema says of it; None for entries of lists and mappings."""
+        return meta_of(type(self.holder), self.name) if isinstance(self.holder, Section) else None
+
+
+def find(scene: Scene, path: str) -> Target | None:
+    """The value at a dotted path; None where a section on the way is null or missing."""
+    holder: Any = scene
+    *parts, last = path.split(".")
+    for part in parts:
+        holder = _child(holder, part)
+        if holder is None:
+            return None
+    return Target(holder, last, _child(holder, last))
+
+
+def plain(value: Any) -> Any:
+    """A value of a scene as plain data: lists, mappings, numbers, words."""
+    if isinstance(value, Section):
+        return value.model_dump(mode="json")
+    if isinstance(value, (tuple, list)):
+        return [plain(each) for each in value]
+    if isinstance(value, dict):
+        return {name: plain(each) for name, each in value.items()}
+    return value
+
+
+@cache
+def metas(section: type[Section]) -> dict[str, Meta]:
+    """What the schema says of all fields of a section, in its order."""
+    return {name: _meta(section, name, field) for name, field in section.model_fields.items()}
+
+
+def meta_of(section: type[Section], name: str) -> Meta | None:
+    """What the schema says of one field; None if there is none of that name."""
+    return metas(section).get(name)
+
+
+def all_sections() -> list[type[Section]]:
+    """Every class of section that a scene may hold, the scene's own first."""
+    found: list[type[Section]] = [Scene]
+    for section in found:
+        for name in section.model_fields:
+            inner = _sections_in(section.model_fields[name].annotation)
+            found += [each for each in dict.fromkeys(inner) if each not in found]
+    return found
+
+
+def _child(holder: Any, name: str) -> Any:
+    if isinstance(holder, Section):
+        return getattr(holder, name, None)
+    if isinstance(holder, dict):
+        return holder.get(name)
+    if isinstance(holder, (tuple, list)) and name.isdecimal() and int(name) < len(holder):
+        return holder[int(name)]
+    return None
+
+
+def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
+    optional, options = _options(field.annotation)
+    bounds = _bounds(field.metadata)
+    if len(options) == 1:
+        kind, size, choices, inner = _kind(options[0])
+        bounds = {**inner, **bounds}
+    else:
+        kind, size, choices = "other", 0, ()
+    sections = tuple(each for each in options if isinstance(each, type) and issubclass(each, Section))
+    if sections and len(sections) == len(options):
+        kind = "section"
+    low, high = bounds.get("low"), bounds.get("high")
+    if kind == "vector" and size == 3 and low == 0:
+        kind = "color"
+    usual = _usual(section, name, kind, low, high)
+    log = usual is not None and usual[0] > 0 and usual[1] / usual[0] > _DECADES
+    return Meta(
+        name,
+        kind,
+        size,
+        low,
+        high,
+        ("low_open" in bounds, "high_open" in bounds),
+        choices,
+        sections,
+        optional,
+        _default(field),
+        field.description or "",
+        usual,
+        log,
+    )
+
+
+def _usual(
+    section: type[Section], name: str, kind: Kind, low: float | None, high: float | None
+) -> tuple[float, float] | None:
+    for each in section.__mro__:
+        if f"{each.__name__}.{name}" in _USUAL:
+            return _USUAL[f"{each.__name__}.{name}"]
+    if kind in ("number", "whole") and low is not None and high is not None and high - low <= _WIDEST:
+        return low, high
+    return None
+
+
+def _kind(option: Any) -> tuple[Kind, int, tuple[Any, ...], dict[str, float]]:
+    """Kind, size, choices and bounds of a type without null."""
+    bounds: dict[str, float] = {}
+    if get_origin(option) is Annotated:
+        option, *more = get_args(option)
+        bounds = _bounds(more)
+    if get_origin(option) is Annotated:
+        kind, size, choices, inner = _kind(option)
+        return kind, size, choices, {**inner, **bounds}
+    if get_origin(option) is Literal:
+        return "choice", 0, get_args(option), {}
+    if get_origin(option) is tuple and ... not in get_args(option):
+        entries = [_kind(each) for each in get_args(option)]
+        if all(entry[0] == "number" for entry in entries):
+            return "vector", len(entries), (), entries[0][3]
+        return "other", 0, (), {}
+    plain_kinds: dict[Any, Kind] = {bool: "flag", int: "whole", float: "number", str: "text"}
+    return plain_kinds.get(option, "other"), 0, (), bounds
+
+
+def _options(annotation: Any) -> tuple[bool, list[Any]]:
+    """Whether a type may be null, and its other members, each as it is decorated."""
+    if get_origin(annotation) in (Union, UnionType):
+        members = [_options(each) for each in get_args(annotation)]
+        return any(found[0] for found in members), [each for found in members for each in found[1]]
+    if annotation is NoneType:
+        return True, []
+    if get_origin(annotation) is Annotated and get_origin(get_args(annotation)[0]) in (Union, UnionType):
+        return _options(get_args(annotation)[0])
+    if get_origin(annotation) is Annotated and isinstance(get_args(annotation)[0], type):
+        inner = get_args(annotation)[0]
+        return False, [inner if issubclass(inner, Section) else annotation]
+    return False, [annotation]
+
+
+def _bounds(decorations: Iterable[Any]) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for each in decorations:
+        if isinstance(each, FieldInfo):
+            found.update(_bounds(each.metadata))
+            continue
+        for ours, theirs in (("low", ("ge", "gt")), ("high", ("le", "lt"))):
+            for name in theirs:
+                value = getattr(each, name, None)
+                if isinstance(value, (int, float)):
+                    found[ours] = float(value)
+                    if name in ("gt", "lt"):
+                        found[f"{ours}_open"] = 1.0
+    return found
+
+
+def _default(field: FieldInfo) -> Any:
+    value = field.get_default(call_default_factory=True, validated_data={})
+    return None if value is PydanticUndefined else plain(value)
+
+
+def _sections_in(annotation: Any) -> Iterator[type[Section]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield annotation
+    for each in get_args(annotation):
+        yield from _sections_in(each)

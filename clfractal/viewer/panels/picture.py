@@ -1,0 +1,20 @@
+"""The picture itself: exposure, size of files, what they hold."""
+
+from __future__ import annotations
+
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.ui import Ui
+
+
+def summary(ui: Ui) -> str:
+    """For the heading."""
+    image = ui.studio.scene.image
+    return f"{image.width} x {image.height}"
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel."""
+    w.field(ui, "output.exposure", unit=" stops")
+    w.group(ui, "Files")
+    w.fields(ui, "image", ("width", "height"), width={"unit": " px"}, height={"unit": " px"})
+    w.field(ui, "output.png_bits", segmented=True)

@@ -1,0 +1,162 @@
+"""How the picture is rendered: which of the three renderers, its search, its samples."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.sampled import Sampled
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.metadata import metas, plain
+from clfractal.viewer.panels.ui import Ui
+
+KINDS = {"surface": "Surface", "volume": "Volume", "cut_plane": "Cut plane"}
+# A volume's grid takes a moment to fill, so the first one is small.
+_FIRST_RESOLUTION = 192
+
+
+def summary(ui: Ui) -> str:
+    """For the heading."""
+    return KINDS[ui.studio.scene.renderer.type].lower()
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel."""
+    scene = ui.studio.scene
+    width = w.row(ui, "Show", path="renderer.type", tip="a surface, a grid of voxels, or a plane that cuts")
+    if width is not None:
+        found = w.segments("renderer.type", KINDS, scene.renderer.type, width)
+        if found is not None:
+            switch(ui, found)
+    w.problem(ui, "renderer")
+    _samples(ui)
+    if isinstance(ui.studio.scene.renderer, SurfaceRenderer):
+        _surface(ui, ui.studio.scene.renderer)
+    if not w.filtering(ui):
+        _region(ui)
+
+
+def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
+    """Goes to another kind of renderer, with the samples of this one and what that kind had before.
+
+    Args:
+        changes: its values at paths, set along with it.
+    """
+    scene = ui.studio.scene
+    now = plain(scene.renderer)
+    kept = ui.memory.setdefault("renderer.kept", {})
+    kept[now["type"]] = {"renderer": now, "cut_planes": plain(scene.cut_planes)}
+    known = kept.get(kind, {})
+    first: dict[str, Any] = {"type": kind, **({"resolution": _FIRST_RESOLUTION} if kind == "volume" else {})}
+    common = {name: now[name] for name in Sampled.model_fields}
+    edits: dict[str, Any] = {"renderer": {**known.get("renderer", first), **common}}
+    if kind == "cut_plane":
+        edits["cut_planes"] = []
+    elif now["type"] == "cut_plane" and not scene.cut_planes and known.get("cut_planes"):
+        edits["cut_planes"] = known["cut_planes"]
+    if kind == "volume" and scene.coloring.by not in ("solid", "normal"):
+        edits["coloring.by"] = "solid"
+    done = ui.studio.edit({**edits, **(changes or {})})
+    if not done:
+        ui.studio.tell(ui.studio.problems.get("renderer", "not possible"), wrong=True)
+    return done
+
+
+def _samples(ui: Ui) -> None:
+    renderer = ui.studio.scene.renderer
+    w.group(ui, "Samples")
+    w.field(ui, "renderer.samples", "At most" if renderer.noise is not None else "Samples")
+    w.field(ui, "renderer.noise", "Until noise is", start=0.02, auto="all samples")
+    if renderer.noise is not None:
+        w.field(
+            ui, "renderer.min_samples", start=renderer.used_min_samples, auto=f"{renderer.used_min_samples}"
+        )
+    w.field(ui, "renderer.filter")
+    width = {"box": 1, "tent": 2, "blackman_harris": 3}[renderer.filter]
+    w.field(ui, "renderer.filter_width", unit=" px", start=float(width), auto=f"{width} px")
+    w.field(ui, "renderer.seed")
+
+
+def _surface(ui: Ui, renderer: SurfaceRenderer) -> None:
+    scene = ui.studio.scene
+    radius = renderer.bounds.radius if renderer.bounds is not None else scene.chain.radius
+    w.group(ui, "Search")
+    w.field(ui, "renderer.search", segmented=True)
+    if renderer.search == "steps":
+        w.field(ui, "renderer.step", start=radius / 100, auto=f"{radius / 100:.3g}")
+    else:
+        w.field(ui, "renderer.detail", unit=" px")
+        w.field(ui, "renderer.over_relaxation")
+        own = scene.chain.step_scale
+        w.field(ui, "renderer.step_scale", start=own, auto=f"{own:.3g}, the formula's")
+    w.field(ui, "renderer.max_steps")
+    _bounds(ui, renderer)
+    w.group(ui, "Normals")
+    # Normals of a grid need its points, so one choice would not do without the other.
+    w.field(ui, "renderer.normal", keep={"renderer.points": None})
+    _points(ui, renderer)
+    w.group(ui, "Light")
+    w.fields(ui, "renderer", ("bounces", "firefly_limit"), firefly_limit={"auto": "no limit"})
+    _section(ui, "renderer.ambient_occlusion", "Occlusion", {})
+    if renderer.ambient_occlusion is not None:
+        w.field(ui, "renderer.ambient_occlusion.rays")
+        half = radius / 2
+        w.field(ui, "renderer.ambient_occlusion.distance", start=half, auto=f"{half:.3g}")
+
+
+def _bounds(ui: Ui, renderer: SurfaceRenderer) -> None:
+    chain = ui.studio.scene.chain
+    first = {"center": list(chain.center), "radius": float(f"{chain.radius:.4g}")}
+    _section(ui, "renderer.bounds", "Own bounds", first)
+    if renderer.bounds is not None:
+        w.fields(ui, "renderer.bounds", ("center", "radius"))
+
+
+def _points(ui: Ui, renderer: SurfaceRenderer) -> None:
+    used = renderer.used_points
+    _section(ui, "renderer.points", "Points", {"pattern": used.pattern, "count": used.count})
+    if renderer.points is None:
+        return
+    w.field(ui, "renderer.points.pattern", segmented=True)
+    if renderer.points.pattern == "stochastic":
+        w.field(ui, "renderer.points.count")
+        return
+    width = w.row(ui, "Count", path="renderer.points.count", tip="number of points per pixel")
+    if width is not None:
+        words = {n * n: f"{n} x {n}" for n in (1, 2, 3, 4, 5, 6, 7, 8)}
+        found = w.choose("renderer.points.count", words, renderer.points.count, width)
+        if found is not None:
+            ui.studio.edit({"renderer.points.count": found})
+        w.problem(ui, "renderer.points.count")
+
+
+def _section(ui: Ui, path: str, label: str, first: dict[str, Any]) -> None:
+    """The switch of a section that may be null."""
+    given = w.value(ui, path) is not None
+    meta = metas(type(ui.studio.scene.renderer))[path.rsplit(".", 1)[1]]
+    reset = (lambda: _put(ui, path, None)) if given else None
+    width = w.row(ui, label, path=path, tip=meta.description, differs=given, reset=reset)
+    if width is not None and w.toggle(path, given):
+        _put(ui, path, None if given else first)
+    w.problem(ui, path)
+
+
+def _put(ui: Ui, path: str, value: Any) -> None:
+    ui.studio.edit({path: value})
+
+
+def _region(ui: Ui) -> None:
+    if isinstance(ui.studio.scene.renderer, CutPlaneRenderer):
+        w.field(ui, "renderer.periodicity")
+    region = ui.studio.region
+    imgui.dummy(imgui.ImVec2(0, 2))
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    if region is None:
+        if w.button("Refine a rectangle", icon=theme.CROP, width=-1, about="Then drag it in the picture"):
+            ui.act("region")
+    elif w.button(f"Refine all (now {region[2]} x {region[3]} px)", icon=theme.CROP, width=-1):
+        ui.act("region_clear")

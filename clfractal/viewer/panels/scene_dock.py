@@ -1,0 +1,119 @@
+"""The dock at the window's left: every setting of the scene, in panels that open and close."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from imgui_bundle import imgui
+
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.viewer.panels import (
+    camera,
+    coloring,
+    cut_planes,
+    device,
+    differences,
+    formula,
+    formula_editor,
+    lights,
+    material,
+    picture,
+    renderer,
+    stereo,
+    theme,
+    transfer,
+    volume,
+)
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.ui import Ui
+
+
+@dataclass(frozen=True, slots=True)
+class _Panel:
+    """A panel of the dock: its heading, what draws it, a summary for the heading's right, and whether it is open at first."""
+
+    key: str
+    title: str
+    icon: str
+    draw: Callable[[Ui], None]
+    summary: Callable[[Ui], str] = lambda ui: ""
+    opened: bool = False
+    shown: Callable[[Ui], bool] = lambda ui: True
+
+
+def _is_volume(ui: Ui) -> bool:
+    return isinstance(ui.studio.scene.renderer, VolumeRenderer)
+
+
+_PANELS = (
+    _Panel("formula", "Formula", theme.MAGIC, formula.draw, formula.summary, opened=True),
+    _Panel("renderer", "Renderer", theme.CUBE, renderer.draw, renderer.summary, opened=True),
+    _Panel("volume", "Volume", theme.CUBES, volume.draw, volume.summary, opened=True, shown=_is_volume),
+    _Panel("transfer", "Transfer function", theme.SLIDERS, transfer.draw, transfer.summary, shown=_is_volume),
+    _Panel("coloring", "Colouring", theme.PALETTE, coloring.draw, coloring.summary),
+    _Panel("material", "Material", theme.BRUSH, material.draw),
+    _Panel("lights", "Lights", theme.LIGHT, lights.draw, lights.summary),
+    _Panel("surroundings", "Surroundings", theme.CLOUD, material.draw_surroundings, material.summary),
+    _Panel("camera", "Camera", theme.CAMERA, camera.draw, camera.summary),
+    _Panel("cut_planes", "Cut planes", theme.SCISSORS, cut_planes.draw, cut_planes.summary),
+    _Panel("stereo", "Stereo", theme.EYE, stereo.draw, stereo.summary),
+    _Panel("picture", "Picture", theme.PICTURE, picture.draw, picture.summary),
+    _Panel("device", "Device", theme.CHIP, device.draw, device.summary),
+    _Panel("differences", "Changed settings", theme.PENCIL, differences.draw, differences.summary),
+)
+
+KEYS = tuple(panel.key for panel in _PANELS)
+"""Names of the panels, in their order."""
+
+
+def draw(ui: Ui) -> None:
+    """Draws the dock, if panels are shown, and the formula editor, if it is open."""
+    if "panels" in ui.show:
+        _dock(ui)
+    formula_editor.draw(ui)
+
+
+def _dock(ui: Ui) -> None:
+    width = min(theme.DOCK_LEFT, ui.size[0] - 2 * theme.MARGIN)
+    imgui.set_next_window_pos(imgui.ImVec2(theme.MARGIN, theme.MARGIN))
+    imgui.set_next_window_size(imgui.ImVec2(width, ui.size[1] - 2 * theme.MARGIN))
+    flags = (
+        imgui.WindowFlags_.no_title_bar
+        | imgui.WindowFlags_.no_resize
+        | imgui.WindowFlags_.no_move
+        | imgui.WindowFlags_.no_collapse
+        | imgui.WindowFlags_.no_saved_settings
+        | imgui.WindowFlags_.no_scrollbar
+        | imgui.WindowFlags_.no_scroll_with_mouse
+        | imgui.WindowFlags_.no_bring_to_front_on_focus
+    )
+    imgui.begin("##scene", None, flags)
+    _top(ui)
+    # A gutter at the right, so that the scroll bar never covers or moves a widget.
+    imgui.begin_child("##panels", imgui.ImVec2(0, 0), 0, imgui.WindowFlags_.always_vertical_scrollbar)
+    for panel in _PANELS:
+        if not panel.shown(ui):
+            continue
+        if w.header(
+            ui, panel.key, panel.title, panel.icon, summary=panel.summary(ui), opened=panel.opened
+        ):
+            imgui.push_id(panel.key)
+            panel.draw(ui)
+            imgui.pop_id()
+            imgui.dummy(imgui.ImVec2(0, 3))
+    imgui.end_child()
+    imgui.end()
+
+
+def _top(ui: Ui) -> None:
+    """Undo, redo, and the line to search with."""
+    history = ui.studio.history
+    done, undone = history.depth("scene")
+    if w.icon_button(theme.UNDO, f"Undo ({ui.keys.hint('undo')})", name="undo", enabled=done > 0):
+        ui.act("undo")
+    w.in_row(3)
+    if w.icon_button(theme.REDO, f"Redo ({ui.keys.hint('redo')})", name="redo", enabled=undone > 0):
+        ui.act("redo")
+    w.in_row()
+    w.search(ui, "filter", "Find a setting")

@@ -1,0 +1,196 @@
+"""Stereo: the mode, the real screen and its viewer, and the parallax under the pointer."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from clfractal.errors import ClfractalError
+from clfractal.optics import stereo as geometry
+from clfractal.optics.view import View
+from clfractal.scene.base import length, minus
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import OrthographicCamera
+from clfractal.scene.stereo import Stereo
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.ui import Ui
+
+MODES = {
+    "split": "Side by side",
+    "split_half": "Side by side, half width",
+    "over_under": "Top and bottom",
+    "over_under_half": "Top and bottom, half height",
+    "anaglyph": "Anaglyph",
+    "anaglyph_chessboard": "Anaglyph chessboard",
+    "rows": "Rows",
+    "columns": "Columns",
+    "checkerboard": "Checkerboard",
+    "left": "Left eye",
+    "right": "Right eye",
+    "pair": "Two files",
+    "multi_view": "One EXR, two views",
+}
+_CENTIMETRES = {"unit": " cm", "factor": 100.0}
+_MILLIMETRES = {"unit": " mm", "factor": 1000.0}
+
+
+def summary(ui: Ui) -> str:
+    """For the heading."""
+    stereo = ui.studio.scene.stereo
+    return MODES[stereo.mode].lower() if stereo is not None else "off"
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel."""
+    if not _switch(ui):
+        return
+    stereo = ui.studio.scene.stereo
+    assert stereo is not None
+    w.field(ui, "stereo.mode", words=MODES)
+    if stereo.mode == "anaglyph":
+        w.field(ui, "stereo.glasses")
+        w.field(ui, "stereo.method")
+    if stereo.mode == "anaglyph_chessboard":
+        _filters(ui, stereo)
+    w.field(ui, "stereo.swap", "Swap eyes")
+    w.group(ui, "Screen and viewer")
+    w.field(ui, "stereo.screen_width", "Screen width", **_CENTIMETRES)  # type: ignore[arg-type]
+    w.field(ui, "stereo.screen_distance", "Distance", **_CENTIMETRES)  # type: ignore[arg-type]
+    w.field(ui, "stereo.interpupillary_distance", "Between the eyes", **_MILLIMETRES)  # type: ignore[arg-type]
+    w.group(ui, "Depth")
+    w.field(ui, "stereo.separation", unit=" x")
+    w.field(ui, "stereo.convergence")
+    _fit(ui, stereo)
+    _plane(ui, stereo)
+    if not w.filtering(ui):
+        _parallax(ui)
+
+
+def _switch(ui: Ui) -> bool:
+    scene = ui.studio.scene
+    on = scene.stereo is not None
+    about = "a pair of pictures for two eyes"
+    width = w.row(ui, "Stereo", path="stereo", tip=about, differs=on, reset=lambda: _put(ui, None))
+    if width is not None and w.toggle("stereo", on):
+        if on:
+            ui.memory["stereo.kept"] = ui.studio.value("stereo")
+            _put(ui, None)
+        elif isinstance(scene.camera, OrthographicCamera) and scene.layout is None:
+            ui.studio.tell("stereo needs a perspective camera", wrong=True)
+        else:
+            _put(ui, ui.memory.get("stereo.kept", {"mode": "anaglyph"}))
+    w.problem(ui, "stereo")
+    return ui.studio.scene.stereo is not None
+
+
+def _put(ui: Ui, value: object) -> None:
+    ui.studio.edit({"stereo": value})
+
+
+def _filters(ui: Ui, stereo: Stereo) -> None:
+    """The colours of the two filters, which a path in the scene leads to one by one."""
+    for index, label in enumerate(("Left filter", "Right filter")):
+        width = w.row(ui, label, path=f"stereo.colors.{index}", tip="linear Rec. 709")
+        if width is not None:
+            w.color_button(ui, f"stereo.colors.{index}", stereo.colors[index], width)
+
+
+def _fit(ui: Ui, stereo: Stereo) -> None:
+    about = "plane and separation are chosen so that all of the depth is comfortable"
+    width = w.row(ui, "Fit the depth", path="stereo.fit", tip=about, differs=stereo.fit is not None)
+    if width is not None:
+        text = "Fitted: switch off" if stereo.fit else "Fit now"
+        hint = ui.keys.hint("fit_stereo")
+        if w.button(text, icon=theme.MAGIC, width=width, about=f"{about} ({hint})"):
+            ui.act("fit_stereo")
+    w.field(ui, "stereo.budget", unit="°")
+
+
+def _plane(ui: Ui, stereo: Stereo) -> None:
+    camera = ui.studio.scene.camera
+    towards = minus(camera.position, camera.target)
+    distance = length(towards)
+    start = {
+        "center": list(camera.target),
+        "normal": [each / distance for each in towards],
+        "up": list(camera.up),
+        "width": float(f"{distance * stereo.screen_width / stereo.screen_distance:.5g}"),
+    }
+    about = "the plane in space that lies on the screen; else it goes through the camera's target"
+    given = stereo.plane is not None
+    width = w.row(ui, "Own screen plane", path="stereo.plane", tip=about, differs=given)
+    if width is not None and w.toggle("stereo.plane", given):
+        ui.studio.edit({"stereo.plane": None if given else start})
+    w.problem(ui, "stereo.plane")
+    plane = ui.studio.scene.stereo.plane if ui.studio.scene.stereo is not None else None
+    if plane is not None:
+        step = {"step": plane.width / 1000}
+        w.fields(
+            ui,
+            "stereo.plane",
+            ("center", "normal", "up", "width", "height"),
+            center=step,
+            normal={"step": 0.01},
+            up={"step": 0.01},
+        )
+
+
+def _parallax(ui: Ui) -> None:
+    """The parallax of what the pointer is on; on the screen, and as an angle."""
+    w.group(ui, "Under the pointer")
+    found = under_pointer(ui)
+    if found is None:
+        w.hint(ui, "Point at the object to see its parallax.")
+        return
+    distance, angle = found
+    where = "in front of" if distance < 0 else "behind"
+    text = f"{1000 * distance:+.1f} mm, {angle:+.2f}°".replace("-", "\u2212")
+    stereo = ui.studio.scene.stereo
+    assert stereo is not None
+    too_much = abs(angle) > stereo.budget
+    w.reading(ui, "Parallax", text, theme.WARNING if too_much else theme.TEXT)
+    w.hint(ui, f"{where} the screen{', beyond the budget' if too_much else ''}")
+
+
+def under_pointer(ui: Ui) -> tuple[float, float] | None:
+    """Horizontal parallax of the point under the pointer: on the screen (metres), and as an angle (degrees).
+
+    None without stereo, or where nothing is.
+    """
+    scene, pick = ui.studio.shown_scene, ui.pick
+    if scene.stereo is None or pick is None or pick.point is None:
+        return None
+    views = _views(scene)
+    if views is None:
+        return None
+    point = np.array([pick.point])
+    on_screen = float(geometry.parallax(scene.stereo, views, point)[0, 0])
+    return on_screen, float(geometry.degrees(scene.stereo, on_screen))
+
+
+def _views(scene: Scene) -> dict[geometry.EyeName, View] | None:
+    return _eye_views(_Same(scene))
+
+
+class _Same:
+    """A scene as a key that is equal for the same camera, stereo and size only."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.key = (scene.camera, scene.stereo, scene.image)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.scene.image.width)
+
+
+@lru_cache(maxsize=4)
+def _eye_views(same: _Same) -> dict[geometry.EyeName, View] | None:
+    try:
+        return geometry.eye_views(same.scene)
+    except ClfractalError:
+        return None

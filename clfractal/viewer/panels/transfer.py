@@ -1,0 +1,322 @@
+"""The transfer function of a volume: opacity and colour of values, edited by dragging points over their histogram."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from imgui_bundle import imgui
+
+from clfractal.files.srgb import encode
+from clfractal.scene.sampled import Sampled
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.viewer.histogram import Histogram, HistogramTask, histogram_of
+from clfractal.viewer.panels import theme, volume
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.color_button import shown
+from clfractal.viewer.panels.metadata import plain
+from clfractal.viewer.panels.ui import Ui
+
+Stops = list[dict[str, Any]]
+_HEIGHT, _STRIP, _REACH = 120.0, 16.0, 9.0
+_OPACITY, _COLOR = "renderer.transfer.opacity", "renderer.transfer.color"
+_FAR = 60.0
+_SEGMENTS = 64
+
+
+def summary(ui: Ui) -> str:
+    """For the heading."""
+    return "surface" if w.value(ui, _OPACITY) is None else "all values"
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel."""
+    low, high = volume.limits(ui)
+    opacity, color = plain(w.value(ui, _OPACITY)), plain(w.value(ui, _COLOR))
+    width = w.row(ui, "Show", path=_OPACITY, tip="a surface at one value, or all values by their opacity")
+    if width is not None:
+        found = w.segments("opacity", {False: "Surface", True: "All values"}, opacity is not None, width)
+        if found is not None:
+            _switch_opacity(ui, found, low, high)
+            return
+    w.problem(ui, _OPACITY)
+    if opacity is not None and not w.filtering(ui):
+        _graph(ui, opacity, color, low, high)
+    about = "colours by value; else the material's colour"
+    width = w.row(ui, "Own colours", path=_COLOR, tip=about, differs=color is not None)
+    if width is not None and w.toggle(_COLOR, color is not None):
+        _switch_color(ui, color is None, low, high)
+        return
+    w.problem(ui, _COLOR)
+    if color is not None and not w.filtering(ui):
+        _strip(ui, color, low, high)
+
+
+def _switch_opacity(ui: Ui, on: bool, low: float, high: float) -> None:
+    kept = ui.memory.setdefault("transfer.kept", {})
+    if not on:
+        kept["opacity"] = plain(w.value(ui, _OPACITY))
+        ui.studio.edit({_OPACITY: None})
+        return
+    span = high - low
+    first = [
+        {"at": low, "opacity": 0.0},
+        {"at": low + 0.25 * span, "opacity": 0.0},
+        {"at": high, "opacity": 0.6},
+    ]
+    ui.studio.edit({_OPACITY: kept.get("opacity") or first, "renderer.level": None})
+
+
+def _switch_color(ui: Ui, on: bool, low: float, high: float) -> None:
+    kept = ui.memory.setdefault("transfer.kept", {})
+    if not on:
+        kept["color"] = plain(w.value(ui, _COLOR))
+    first = [
+        {"at": low, "color": [0.05, 0.1, 0.35]},
+        {"at": (low + high) / 2, "color": [0.85, 0.3, 0.06]},
+        {"at": high, "color": [1.0, 0.9, 0.6]},
+    ]
+    ui.studio.edit({_COLOR: (kept.get("color") or first) if on else None})
+
+
+# Opacity
+
+
+def _graph(ui: Ui, stops: Stops, colors: Stops | None, low: float, high: float) -> None:
+    """The graph of opacity over the histogram; its points are dragged, added and removed."""
+    low, high = _range(stops, low, high)
+    state = ui.memory.setdefault("transfer.graph", {"chosen": 0, "held": False})
+    state["chosen"] = min(state["chosen"], len(stops) - 1)
+    indent = 11.0
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
+    corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    imgui.invisible_button("##graph", imgui.ImVec2(wide, _HEIGHT))
+    area = _Area(corner.x + 6, corner.y + 6, wide - 12, _HEIGHT - 12, low, high)
+    stops = _graph_events(ui, stops, area, state)
+    _draw_graph(ui, area, stops, colors, state["chosen"])
+    if imgui.is_item_hovered() and not imgui.is_item_active():
+        w.tip("Drag a point; double click adds one; drag it far off to remove it")
+    one = stops[state["chosen"]]
+    _place_row(ui, stops, state, area, _OPACITY)
+    width = w.row(ui, "Opacity", path=f"{_OPACITY}.{state['chosen']}.opacity", tip="over a voxel's side")
+    if width is not None:
+        change = w.number_box(w.boxes(ui), "transfer.opacity", one["opacity"], width, w.Scale(0, 1, (0, 1)))
+        w.apply(ui, f"{_OPACITY}.{state['chosen']}.opacity", change)
+
+
+class _Area:
+    """Where the graph is, points of the screen, and the values that it goes over."""
+
+    def __init__(self, x: float, y: float, width: float, height: float, low: float, high: float) -> None:
+        self.x, self.y, self.width, self.height, self.low, self.high = x, y, width, height, low, high
+
+    def place(self, at: float, opacity: float) -> Any:
+        part = (at - self.low) / (self.high - self.low)
+        return imgui.ImVec2(self.x + part * self.width, self.y + (1 - opacity) * self.height)
+
+    def value(self, x: float) -> float:
+        part = min(max((x - self.x) / self.width, 0.0), 1.0)
+        return float(f"{self.low + part * (self.high - self.low):.5g}")
+
+    def opacity(self, y: float) -> float:
+        return round(min(max(1 - (y - self.y) / self.height, 0.0), 1.0), 3)
+
+
+def placed(stops: Stops, index: int, at: float, **values: Any) -> Stops:
+    """The stops with one at another place, no farther than its neighbours."""
+    least = stops[index - 1]["at"] if index else -1e12
+    most = stops[index + 1]["at"] if index + 1 < len(stops) else 1e12
+    one = {**stops[index], **values, "at": min(max(at, least), most)}
+    return [*stops[:index], one, *stops[index + 1 :]]
+
+
+def inserted(stops: Stops, at: float, **values: Any) -> tuple[Stops, int]:
+    """The stops with one more, and its index."""
+    index = sum(stop["at"] <= at for stop in stops)
+    return [*stops[:index], {"at": at, **values}, *stops[index:]], index
+
+
+def _graph_events(ui: Ui, stops: Stops, area: _Area, state: dict[str, Any]) -> Stops:
+    mouse = imgui.get_mouse_pos()
+    places = [area.place(stop["at"], stop["opacity"]) for stop in stops]
+    if imgui.is_item_activated():
+        distances = [(each.x - mouse.x) ** 2 + (each.y - mouse.y) ** 2 for each in places]
+        near = min(range(len(stops)), key=distances.__getitem__)
+        if distances[near] <= _REACH**2:
+            state.update(chosen=near, held=True)
+        elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
+            stops, state["chosen"] = inserted(stops, area.value(mouse.x), opacity=area.opacity(mouse.y))
+            ui.studio.edit({_OPACITY: stops})
+    held, far = state["held"], not -_FAR < mouse.y - area.y < area.height + _FAR
+    if imgui.is_item_active() and held and imgui.is_mouse_dragging(0, 2.0):
+        stops = placed(stops, state["chosen"], area.value(mouse.x), opacity=area.opacity(mouse.y))
+        ui.studio.edit({_OPACITY: stops}, gesture=_OPACITY)
+    if imgui.is_item_deactivated() and held:
+        state["held"] = False
+        if far and len(stops) > 1:
+            stops = _without(stops, state["chosen"])
+            ui.studio.edit({_OPACITY: stops}, gesture=_OPACITY)
+            state["chosen"] = max(state["chosen"] - 1, 0)
+        ui.studio.end_gesture()
+    return stops
+
+
+def _draw_graph(ui: Ui, area: _Area, stops: Stops, colors: Stops | None, chosen: int) -> None:
+    draw = imgui.get_window_draw_list()
+    low = imgui.ImVec2(area.x - 6, area.y - 6)
+    far = imgui.ImVec2(area.x + area.width + 6, area.y + area.height + 6)
+    draw.add_rect_filled(low, far, theme.packed(theme.FRAME), 5.0)
+    _draw_histogram(ui, area, draw)
+    line = [
+        imgui.ImVec2(area.x, area.place(stops[0]["at"], stops[0]["opacity"]).y),
+        *(area.place(stop["at"], stop["opacity"]) for stop in stops),
+        imgui.ImVec2(area.x + area.width, area.place(stops[-1]["at"], stops[-1]["opacity"]).y),
+    ]
+    floor = area.y + area.height
+    for first, second in zip(line[:-1], line[1:], strict=True):
+        if second.x > first.x:
+            corners = [first, second, imgui.ImVec2(second.x, floor), imgui.ImVec2(first.x, floor)]
+            draw.add_convex_poly_filled(corners, theme.packed(theme.ACCENT, 0.16))
+    draw.add_polyline(line, theme.packed(theme.ACCENT), 1.8, 0)
+    for number, stop in enumerate(stops):
+        middle = area.place(stop["at"], stop["opacity"])
+        fill = theme.packed(theme.ACCENT if number == chosen else theme.PANEL_SOLID)
+        if colors is not None:
+            codes, _ = shown(_color_at(colors, stop["at"]))
+            fill = theme.packed((*codes, 1.0))
+        draw.add_circle_filled(middle, 5.0, fill)
+        edge = theme.TEXT if number == chosen else theme.ACCENT
+        draw.add_circle(middle, 5.0, theme.packed(edge), 0, 1.8)
+
+
+def _draw_histogram(ui: Ui, area: _Area, draw: Any) -> None:
+    found = histogram(ui)
+    if found is None:
+        draw.add_text(imgui.ImVec2(area.x + 4, area.y + 2), theme.packed(theme.FAINT), "counting values…")
+        return
+    # Most voxels are outside or inside: by magnitudes the few others are seen too.
+    heights = np.log1p(found.shares * 1e5) / np.log1p(1e5)
+    step = (found.high - found.low) / len(heights)
+    color = theme.packed(theme.SECOND, 0.45)
+    for number, height in enumerate(heights):
+        if height <= 0:
+            continue
+        left = area.place(found.low + number * step, float(height))
+        right = area.place(found.low + (number + 1) * step, 0.0)
+        if right.x < area.x or left.x > area.x + area.width:
+            continue
+        draw.add_rect_filled(
+            imgui.ImVec2(max(left.x, area.x), left.y), imgui.ImVec2(min(right.x, area.x + area.width), right.y), color
+        )
+
+
+def histogram(ui: Ui) -> Histogram | None:
+    """How often the grid's values occur; None while they are counted."""
+    scene = ui.studio.scene
+    given = scene.given
+    if given is not None:
+        known = ui.memory.get("histogram.given")
+        if known is None or known[0] is not given:
+            found = histogram_of(given.values, given.low, given.high)
+            known = ui.memory["histogram.given"] = (given, found)
+        return known[1]  # type: ignore[no-any-return]
+    renderer = scene.renderer
+    assert isinstance(renderer, VolumeRenderer)
+    parts = {"box", "zoom", "value", "sub_points", "fill"}
+    key = json.dumps(
+        [scene.formula.mapping(), renderer.model_dump(mode="json", include=parts - set(Sampled.model_fields))]
+    )
+    task = ui.memory.get("histogram.task")
+    if task is None or (task[0] != key and task[1].finished):
+        task = ui.memory["histogram.task"] = (key, HistogramTask(scene))
+        ui.studio.session.add(task[1])
+    return task[1].found  # type: ignore[no-any-return]
+
+
+# Colours
+
+
+def _strip(ui: Ui, stops: Stops, low: float, high: float) -> None:
+    """The colours of values, and their stops."""
+    low, high = _range(stops, low, high)
+    state = ui.memory.setdefault("transfer.strip", {"chosen": 0, "held": False})
+    state["chosen"] = min(state["chosen"], len(stops) - 1)
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    imgui.invisible_button("##colors", imgui.ImVec2(wide, _STRIP + 14))
+    area = _Area(corner.x + 6, corner.y, wide - 12, _STRIP, low, high)
+    mouse = imgui.get_mouse_pos()
+    if imgui.is_item_activated():
+        near = min(range(len(stops)), key=lambda n: abs(area.place(stops[n]["at"], 0).x - mouse.x))
+        if abs(area.place(stops[near]["at"], 0).x - mouse.x) <= _REACH:
+            state.update(chosen=near, held=True)
+        elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
+            at = area.value(mouse.x)
+            stops, state["chosen"] = inserted(stops, at, color=_color_at(stops, at))
+            ui.studio.edit({_COLOR: stops})
+    if imgui.is_item_active() and state["held"] and imgui.is_mouse_dragging(0, 2.0):
+        stops = placed(stops, state["chosen"], area.value(mouse.x))
+        ui.studio.edit({_COLOR: stops}, gesture=_COLOR)
+    if imgui.is_item_deactivated() and state["held"]:
+        state["held"] = False
+        ui.studio.end_gesture()
+    _draw_strip(area, stops, state["chosen"])
+    w.field(ui, f"{_COLOR}.{state['chosen']}.color")
+    _place_row(ui, stops, state, area, _COLOR)
+
+
+def _draw_strip(area: _Area, stops: Stops, chosen: int) -> None:
+    draw = imgui.get_window_draw_list()
+    values = np.linspace(area.low, area.high, _SEGMENTS + 1)
+    colors = np.array([_color_at(stops, float(each)) for each in values])
+    codes = [theme.packed((*map(float, row), 1.0)) for row in encode(np.clip(colors, 0, 1))]
+    for number in range(_SEGMENTS):
+        left = area.x + area.width * number / _SEGMENTS
+        right = area.x + area.width * (number + 1) / _SEGMENTS + 0.5
+        draw.add_rect_filled_multi_color(
+            imgui.ImVec2(left, area.y),
+            imgui.ImVec2(right, area.y + _STRIP),
+            codes[number],
+            codes[number + 1],
+            codes[number + 1],
+            codes[number],
+        )
+    for number, stop in enumerate(stops):
+        x = area.place(stop["at"], 0).x
+        own, _ = shown(stop["color"])
+        edge = theme.packed(theme.ACCENT if number == chosen else theme.TEXT)
+        low, high = imgui.ImVec2(x - 5, area.y + _STRIP + 1), imgui.ImVec2(x + 5, area.y + _STRIP + 11)
+        draw.add_rect_filled(low, high, theme.packed((*own, 1.0)), 2.0)
+        draw.add_rect(low, high, edge, 2.0)
+
+
+def _place_row(ui: Ui, stops: Stops, state: dict[str, Any], area: _Area, path: str) -> None:
+    """The value of the chosen stop as a number, and a button that removes the stop."""
+    chosen = state["chosen"]
+    width = w.row(ui, "Value", path=f"{path}.{chosen}.at", tip="value of a voxel at this stop")
+    if width is None:
+        return
+    height = imgui.get_frame_height()
+    scale = w.Scale(-1e12, 1e12, (area.low, area.high))
+    change = w.number_box(w.boxes(ui), f"{path}.at", stops[chosen]["at"], width - height - 4, scale)
+    w.apply(ui, path, change, lambda new: placed(stops, chosen, new))
+    w.in_row(4)
+    if w.icon_button(theme.TRASH, "Remove this stop", name=f"{path}.remove", enabled=len(stops) > 1):
+        ui.studio.edit({path: _without(stops, chosen)})
+
+
+def _range(stops: Stops, low: float, high: float) -> tuple[float, float]:
+    """The values to show: the grid's, and all stops."""
+    at = [stop["at"] for stop in stops]
+    low, high = min(low, *at), max(high, *at)
+    return (low, high) if high > low else (low - 0.5, high + 0.5)
+
+
+def _color_at(stops: Stops, value: float) -> list[float]:
+    at = [stop["at"] for stop in stops]
+    return [float(f"{np.interp(value, at, [s['color'][axis] for s in stops]):.4g}") for axis in range(3)]
+
+
+def _without(stops: Stops, index: int) -> Stops:
+    return [stop for number, stop in enumerate(stops) if number != index]

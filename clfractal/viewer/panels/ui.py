@@ -1,0 +1,68 @@
+"""What panels are given to draw with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.viewer.keys import KeyMap
+from clfractal.viewer.picking import Pick
+from clfractal.viewer.settings import Settings
+from clfractal.viewer.studio import Studio
+
+
+class Textures(Protocol):
+    """Small pictures as textures of the window."""
+
+    def get(self, key: Hashable, pixels: npt.NDArray[np.uint8]) -> Any:
+        """The `imgui.ImTextureRef` of a picture, shape (height, width, 4), uploaded once for a key."""
+
+
+@dataclass(slots=True)
+class Speed:
+    """What the overlay tells of the picture's speed.
+
+    Attributes:
+        frames: a second, while something moves; 0 at rest.
+        latency: from the last input to the picture that answers it, seconds.
+        way: `shared` or `copied`: how pictures get from OpenCL to OpenGL.
+    """
+
+    frames: float = 0.0
+    latency: float = 0.0
+    way: str = "copied"
+
+
+@dataclass(slots=True)
+class Ui:
+    """The window as its panels see it.
+
+    Attributes:
+        studio: the scene, and all ways to change it.
+        settings: the user's, of the viewer.
+        keys: the table of keys.
+        textures: for thumbnails.
+        act: does an action of the table of keys, by its name.
+        size: of the area that panels may use, in points: the window, or one eye's half of it.
+        scale: framebuffer pixels for a point, times the user's scale of panels.
+        pick: what lies under the pointer; None over panels or outside the picture.
+        speed: see `Speed`.
+        show: names of the parts that are open: `panels`, `help`, `gallery`, `variations`, `overlay`, `save`, ...
+        memory: of panels, by their own keys.
+    """
+
+    studio: Studio
+    settings: Settings
+    keys: KeyMap
+    textures: Textures
+    act: Callable[[str], None]
+    size: tuple[float, float] = (1280.0, 720.0)
+    scale: float = 1.0
+    pick: Pick | None = None
+    speed: Speed = field(default_factory=Speed)
+    show: set[str] = field(default_factory=lambda: {"panels", "overlay"})
+    memory: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,333 @@
+"""Widgets bound to dotted paths of a scene, and what panels are laid out with.
+
+A panel is mostly a list of paths: kind, bounds, choices, default and tooltip come from the schema (`metadata`). All edits
+go through the studio, so that each can be undone; a drag is one step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels.color_button import color_button
+from clfractal.viewer.panels.layout import (
+    boxes,
+    button,
+    choose,
+    columns,
+    filtering,
+    group,
+    header,
+    hint,
+    icon_button,
+    in_row,
+    label_of,
+    problem,
+    row,
+    search,
+    segments,
+    text_box,
+    tip,
+    toggle,
+    word,
+)
+from clfractal.viewer.panels.metadata import Meta, Target, find, plain
+from clfractal.viewer.panels.number_box import Change, Scale, number_box
+from clfractal.viewer.panels.ui import Ui
+
+__all__ = [
+    "Change",
+    "Scale",
+    "apply",
+    "boxes",
+    "button",
+    "choose",
+    "color_button",
+    "columns",
+    "field",
+    "fields",
+    "filtering",
+    "group",
+    "header",
+    "hint",
+    "icon_button",
+    "in_row",
+    "label_of",
+    "number",
+    "number_box",
+    "problem",
+    "put",
+    "reading",
+    "row",
+    "search",
+    "section",
+    "segments",
+    "text_box",
+    "tip",
+    "toggle",
+    "value",
+    "value_tip",
+    "word",
+]
+
+AUTO = "automatic"
+
+
+def value(ui: Ui, path: str) -> Any:
+    """The value at a dotted path, as the scene holds it; None if there is none."""
+    found = find(ui.studio.scene, path)
+    return found.value if found is not None else None
+
+
+def put(ui: Ui, path: str, new: Any) -> bool:
+    """Sets one value, as a step of undo of its own; whether it was valid."""
+    return ui.studio.edit({path: plain(new)})
+
+
+def value_tip(ui: Ui, path: str) -> str:
+    """What the schema says of a value; of a section that it does not describe, the first sentence about its class."""
+    found = find(ui.studio.scene, path)
+    meta = found.meta if found is not None else None
+    if meta is None:
+        return ""
+    if meta.description or not meta.sections:
+        return meta.description
+    return (meta.sections[0].__doc__ or "").split("\n\n")[0].strip()
+
+
+def apply(ui: Ui, path: str, change: Change, make: Callable[[float], Any] = lambda number: number) -> None:
+    """Does what a number box returned to the value at a path; `make` turns the number into the value."""
+    if change.value is not None:
+        ui.studio.edit({path: make(change.value)}, path if change.dragging else None)
+    if change.ended:
+        ui.studio.end_gesture()
+
+
+def reading(ui: Ui, label: str, text: str, color: theme.Rgba = theme.TEXT) -> None:
+    """A row that only tells something."""
+    width = row(ui, label)
+    if width is not None:
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.vec(color), text)
+
+
+def fields(ui: Ui, prefix: str, names: Sequence[str], **options: Mapping[str, Any]) -> None:
+    """Several fields of one section; `options` of a name go to `field`."""
+    for name in names:
+        field(ui, f"{prefix}.{name}", **options.get(name, {}))
+
+
+def section(ui: Ui, path: str, *, skip: Sequence[str] = (), depth: int = 0) -> None:
+    """Every field of a section that widgets are known for, in the schema's order, sections within it as groups."""
+    found = find(ui.studio.scene, path)
+    if found is None or not hasattr(type(found.value), "model_fields"):
+        return
+    for name in type(found.value).model_fields:
+        if name in skip:
+            continue
+        inner = find(ui.studio.scene, f"{path}.{name}")
+        meta = inner.meta if inner is not None else None
+        if meta is not None and meta.kind == "section" and inner is not None and depth < 3:
+            if inner.value is not None:
+                group(ui, label_of(name))
+                section(ui, f"{path}.{name}", depth=depth + 1)
+        else:
+            field(ui, f"{path}.{name}")
+
+
+def field(
+    ui: Ui,
+    path: str,
+    label: str = "",
+    *,
+    unit: str = "",
+    factor: float = 1.0,
+    step: float | None = None,
+    usual: tuple[float, float] | None = None,
+    start: Any = None,
+    auto: str = AUTO,
+    segmented: bool = False,
+    words: Mapping[str, str] | None = None,
+    keep: Mapping[str, Any] | None = None,
+) -> bool:
+    """The widget of one value, with its label; whether the value was changed in this frame.
+
+    Args:
+        label: in front of it; else its name.
+        unit, factor, step, usual: see `Scale`, in the place of what the schema tells.
+        start: for one that may be null, its first value when it is set.
+        auto: shown where it is null.
+        segmented: choices side by side instead of in a list.
+        words: other words for choices.
+        keep: values at other paths that are set along with this one.
+    """
+    target = find(ui.studio.scene, path)
+    meta = target.meta if target is not None else None
+    if target is None or meta is None:
+        return False
+    drawer = _DRAWERS.get(meta.kind)
+    if drawer is None:
+        return False
+    before = ui.studio.scene
+    label = label or label_of(meta.name)
+    width = row(
+        ui, label, path=path, tip=meta.description, differs=differs(target, meta), reset=_reset(ui, path, meta)
+    )
+    if width is None:
+        return False
+    options = {
+        "unit": unit,
+        "factor": factor,
+        "step": step,
+        "usual": usual,
+        "segmented": segmented,
+        "words": words or {},
+        "keep": keep or {},
+    }
+    if meta.optional:
+        width = _optional(ui, path, target, meta, width, start, auto)
+    if target.value is not None or not meta.optional:
+        drawer(ui, path, target, meta, width, options)
+    problem(ui, path)
+    return ui.studio.scene is not before
+
+
+def number(ui: Ui, path: str, label: str, current: float, scale: Scale, *, default: float | None, tip: str) -> None:
+    """A number that the schema does not know of by itself (a formula's parameter): as `field`."""
+    different = default is not None and current != default
+    reset = (lambda: _set(ui, path, default)) if default is not None else None
+    width = row(ui, label, path=path, tip=tip, differs=different, reset=reset)
+    if width is None:
+        return
+    change = number_box(boxes(ui), path, current, width, scale)
+    apply(ui, path, change, (lambda each: int(each)) if scale.whole else (lambda each: each))
+    problem(ui, path)
+
+
+def differs(target: Target, meta: Meta) -> bool:
+    """Whether a value is not its default; those that have to be given have none."""
+    if meta.default is None and not meta.optional:
+        return False
+    return bool(plain(target.value) != meta.default)
+
+
+def scale_of(meta: Meta, **options: Any) -> Scale:
+    """How a field is dragged and shown."""
+    usual = options.get("usual") or meta.usual
+    log = meta.log if not options.get("usual") else usual[0] > 0 and usual[1] / usual[0] > 40
+    return Scale(
+        meta.low,
+        meta.high,
+        usual,
+        log,
+        meta.kind == "whole",
+        options.get("unit", ""),
+        options.get("factor", 1.0),
+        options.get("step"),
+        meta.open,
+    )
+
+
+def _reset(ui: Ui, path: str, meta: Meta) -> Callable[[], None] | None:
+    if meta.default is None and not meta.optional:
+        return None
+    return lambda: _set(ui, path, meta.default)
+
+
+def _set(ui: Ui, path: str, new: Any) -> None:
+    ui.studio.edit({path: new})
+
+
+def _optional(ui: Ui, path: str, target: Target, meta: Meta, width: float, start: Any, auto: str) -> float:
+    """The switch of a value that may be null; the width that is left for the value."""
+    given = target.value is not None
+    if toggle(f"{path}.given", given, "Set it by hand" if not given else f"Back to {auto}"):
+        ui.studio.edit({path: None if given else first_value(meta, start)})
+    imgui.same_line(0, 6)
+    used = 28.0 + 6
+    if not given:
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.vec(theme.FAINT), auto)
+    return width - used
+
+
+def first_value(meta: Meta, start: Any = None) -> Any:
+    """A value for a field that was null and is now to be set: `start`, its default, or the middle of its usual range."""
+    if start is not None:
+        return plain(start)
+    if meta.default is not None:
+        return meta.default
+    if meta.kind == "choice":
+        return meta.choices[0]
+    if meta.kind == "vector":
+        return [0.0, 0.0, 1.0]
+    if meta.kind == "color":
+        return [1.0, 1.0, 1.0]
+    if meta.kind == "text":
+        return ""
+    if meta.kind == "flag":
+        return True
+    middle = 1.0
+    if meta.usual is not None:
+        low, high = meta.usual
+        middle = float(f"{(low * high) ** 0.5:.2g}") if meta.log else (low + high) / 2
+    return round(middle) if meta.kind == "whole" else middle
+
+
+Options = Mapping[str, Any]
+
+
+def _number(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
+    scale = scale_of(meta, **{name: options[name] for name in ("unit", "factor", "step", "usual")})
+    change = number_box(boxes(ui), path, float(target.value), width, scale)
+    apply(ui, path, change, (lambda each: int(each)) if meta.kind == "whole" else (lambda each: each))
+
+
+def _flag(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
+    if toggle(path, bool(target.value), ""):
+        ui.studio.edit({**options["keep"], path: not target.value})
+
+
+def _choice(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
+    words = {each: options["words"].get(each, word(str(each))) for each in meta.choices}
+    show = segments if options["segmented"] else choose
+    found = show(path, words, target.value, width)
+    if found is not None:
+        ui.studio.edit({**options["keep"], path: found})
+
+
+def _text(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
+    found = text_box(ui, path, target.value or "", width)
+    if found is not None:
+        ui.studio.edit({path: found})
+
+
+def _vector(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
+    # Three numbers need the whole width of a dock, below the label.
+    wide = columns(len(target.value))
+    scale = scale_of(meta, unit=options["unit"], factor=options["factor"], step=options["step"])
+    before = list(target.value)
+    for index, each in enumerate(before):
+        if index:
+            imgui.same_line(0, 4)
+        mark = theme.AXES[index] if index < 3 else None
+        change = number_box(boxes(ui), f"{path}.{index}", float(each), wide, scale, mark=mark)
+        apply(ui, path, change, lambda new, at=index: [*before[:at], new, *before[at + 1 :]])  # type: ignore[misc]
+
+
+def _color(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
+    color_button(ui, path, target.value, width)
+
+
+_DRAWERS: dict[str, Callable[[Ui, str, Target, Meta, float, Options], None]] = {
+    "number": _number,
+    "whole": _number,
+    "flag": _flag,
+    "choice": _choice,
+    "text": _text,
+    "vector": _vector,
+    "color": _color,
+}

@@ -1,0 +1,147 @@
+"""Where a scene came from, and which files are never overwritten."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from clfractal import resources
+from clfractal.errors import ClfractalError, FileError, SceneError
+from clfractal.files.document import read_document
+from clfractal.files.regular import read_bytes
+from clfractal.scene.load import SceneText, load_scene, read_text
+from clfractal.scene.model import Scene
+from clfractal.viewer.named import formula_files
+
+Kind = Literal["scene", "picture", "shipped", "none"]
+
+_OWN_FOLDERS = ("scenes", "environments", "formulas/library", "kernels")
+_PICTURES = (b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n")
+
+
+@dataclass(frozen=True)
+class SceneSource:
+    """Where a scene came from.
+
+    Attributes:
+        kind: a scene file of the user's; a picture that holds a scene; a scene that comes with the program; nothing.
+        path: the file; None for `none`.
+        text: what was read, YAML or JSON; empty for `none`.
+        loaded: the scene that the text alone stands for, without values of `--set`; None if it stands for none.
+    """
+
+    kind: Kind = "none"
+    path: Path | None = None
+    text: str = ""
+    loaded: Scene | None = None
+
+    @property
+    def folder(self) -> Path:
+        """The folder that the names of files in the text are relative to."""
+        return self.path.parent if self.path is not None else Path()
+
+    @property
+    def formula(self) -> Any:
+        """The formula section as it was written; None if there is none."""
+        try:
+            section = read_document(self.text).root.child("formula")
+        except SceneError:
+            return None
+        return section.plain() if section is not None else None
+
+    @property
+    def watched(self) -> tuple[Path, ...]:
+        """The files whose change changes the scene's text: its own, and the formula files that it names."""
+        if self.path is None:
+            return ()
+        names = formula_files(self.formula, self.folder)
+        return (self.path, *(self.folder / name for name in names))
+
+    @property
+    def changed_on_disk(self) -> bool:
+        """Whether the file holds another text by now, or none."""
+        if self.path is None:
+            return False
+        try:
+            return read_text(self.path) != self.text
+        except ClfractalError:
+            return True
+
+
+def open_source(path: str | Path) -> SceneSource:
+    """Reads a scene file, or a picture that holds a scene, and the scene in it.
+
+    Raises:
+        SceneError, FormulaError: something in the text is wrong.
+        FileError: a file cannot be read.
+    """
+    found = Path(path)
+    text = read_text(found)
+    loaded = load_scene(SceneText(read_document(text, str(path)), found.parent))
+    kind: Kind = "picture" if is_picture(found) else "shipped" if is_own(found) else "scene"
+    return SceneSource(kind, found, text, loaded)
+
+
+def is_protected(path: Path) -> bool:
+    """Whether a file must never be overwritten: it comes with the program, or is a picture; links are followed."""
+    return is_own(path) or is_picture(path)
+
+
+def suggested_name(source: SceneSource, folder: Path) -> Path:
+    """A free name for a scene that cannot be saved where it came from, such as `mandelbulb-2.yaml`."""
+    stem, number = "scene", 1
+    if source.path is not None:
+        found = re.fullmatch(r"(.+?)(?:-(\d{1,6}))?", source.path.stem)
+        if found is not None:
+            stem, number = found[1], int(found[2] or 1) + 1
+    while True:
+        path = folder / (f"{stem}-{number}.yaml" if number > 1 else f"{stem}.yaml")
+        if not os.path.lexists(path):
+            return path
+        number += 1
+
+
+def is_own(path: Path) -> bool:
+    """Whether a file lies in one of the program's own folders, or is a link to such a file."""
+    try:
+        status = path.stat()
+    except OSError:
+        return False
+    key = (status.st_dev, status.st_ino)
+    parents = {
+        (found.st_dev, found.st_ino) for parent in path.resolve().parents if (found := _status(parent))
+    }
+    for name in _OWN_FOLDERS:
+        folder = resources.folder(name)
+        inside = _status(folder)
+        if inside is not None and (inside.st_dev, inside.st_ino) in parents:
+            return True
+        if any((found.st_dev, found.st_ino) == key for file in folder.iterdir() if (found := _status(file))):
+            return True
+    return False
+
+
+def _status(path: Path) -> os.stat_result | None:
+    try:
+        return path.stat()
+    except OSError:
+        return None
+
+
+def is_picture(path: Path) -> bool:
+    """Whether a file is a PNG or EXR picture, by its content."""
+    try:
+        return read_bytes(path, prefix=8).startswith(_PICTURES)
+    except FileError:
+        return False
+
+
+def same_file(one: Path, other: Path) -> bool:
+    """Whether two paths lead to the same file; if one does not exist, whether they are the same path."""
+    try:
+        return one.samefile(other)
+    except OSError:
+        return one.absolute() == other.absolute()
