@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 
@@ -43,17 +42,17 @@ def view(options: Options, shell: Shell) -> None:
         import ruamel.yaml  # noqa: F401
     except ImportError as error:
         raise DeviceError(f"{_EXTRA} (missing: {error.name})") from error
+    from clfractal.viewer.begin import begin
     from clfractal.viewer.settings import load_settings
 
     settings, remark = load_settings()
     if remark:
         shell.say(remark)
     sys.setswitchinterval(0.001)  # the window's thread must not wait long for the others
+    begun = begin(options)
     from clfractal.viewer.app import Viewer
 
-    viewer = Viewer(options, settings, remark, shell.say)
-    with contextlib.suppress(KeyboardInterrupt) if options.shot is None else contextlib.nullcontext():
-        viewer.run()
+    Viewer(begun, settings, remark, shell.say).run()
 
 
 def _quiet_libraries() -> None:

@@ -39,6 +39,21 @@ class Kept:
         return found
 
 
+class Borrowing(Kept):
+    """Data of its own, and those that another keeps, which it leaves alone."""
+
+    def __init__(self, lender: Kept) -> None:
+        super().__init__()
+        self._lender = lender
+
+    def once(self, key: str, make: Callable[[], T]) -> T:
+        """The other's data for this key, else its own; see `Kept`."""
+        if key in self._lender._things:
+            lent: T = self._lender._things[key]
+            return lent
+        return super().once(key, make)
+
+
 @dataclass(frozen=True, slots=True)
 class Resources:
     """Gives a renderer the data that its kernel reads.

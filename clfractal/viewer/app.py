@@ -17,15 +17,14 @@ from clfractal.optics.view import scene_view, seen_by
 from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer import gl, marks, window
 from clfractal.viewer.aim import Aim, aimed
+from clfractal.viewer.begin import Begun
 from clfractal.viewer.controls import Controls
 from clfractal.viewer.deeds import Deeds
-from clfractal.viewer.files import Files
 from clfractal.viewer.inputs import Inputs
 from clfractal.viewer.motion import Motion
-from clfractal.viewer.options import Options
 from clfractal.viewer.outputs import Outputs
 from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.panels import all_panels
+from clfractal.viewer.panels import all_panels, theme
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.places import Places, places_of
@@ -47,37 +46,37 @@ class Viewer:
     """A window on a scene.
 
     Args:
-        options: of the command line.
+        begun: the options, the scene, the device, and a display.
         settings: the user's.
         remark: what was wrong with the settings' file, or empty.
         tell: prints a line for the user (with `--quiet` nothing).
 
     Raises:
-        ClfractalError: no display, no OpenGL 3.3, no device, or a wrong scene.
+        DeviceError: no OpenGL 3.3.
+        ClfractalError: there is no such monitor.
     """
 
     def __init__(
-        self, options: Options, settings: Settings, remark: str, tell: Callable[[str], None]
+        self, begun: Begun, settings: Settings, remark: str, tell: Callable[[str], None]
     ) -> None:
-        self.options, self.settings, self.tell = options, settings, tell
-        self.files = Files(options)
-        scene = self.files.first_scene()
-        device = choose(options.device)
+        self.options, self.settings, self.tell = begun.options, settings, tell
+        options, scene, device = begun.options, begun.scene, begun.device
+        self.files = begun.files
         self.events: deque[Event] = deque()
         self.started = time.perf_counter()
-        window.start()
-        size = options.size or (1280, 720)
-        self.window = Window(size, self.events.append)
+        self.window = Window(begun.size, self.events.append)
         gl_version = gl.version()
         if gl_version < (3, 3):
             raise window.no_opengl(f"{gl_version[0]}.{gl_version[1]}")
         self._context = imgui.create_context()
         imgui.get_io().set_ini_filename("")
+        theme.setup()
         self.renderer = UiRenderer(self.window.handle)
         self.pacing = Pacing(settings.frame_rate, settings.used_coarsest)
         device, self.shared, why = self._opened(device)
         self.studio = Studio(scene, device, self.pacing, window.wake)
-        self.motion = Motion(self.studio, settings.mouse)
+        self.motion = Motion(self.studio)
+        self._set_motion(settings)
         self.controls = Controls(self.studio, settings, self.motion)
         self.outputs = Outputs(self.window, self.events.append)
         self.studio.screens = self.outputs.shown_stereo
@@ -87,7 +86,7 @@ class Viewer:
         self.ui = Ui(self.studio, settings, settings.key_map, self.small, self.act)
         self.deeds = Deeds(self)
         self.deeds.scene.first_stereo = self._screen
-        self.inputs = Inputs(self)
+        self.inputs = Inputs(self, begun.recording)
         self.places: Places = places_of(scene.stereo, self.window.framebuffer)
         self.pick: Pick | None = None
         self.finished = False
@@ -107,12 +106,22 @@ class Viewer:
     # The loop
 
     def run(self) -> None:
-        """Until the window is closed."""
+        """Until the window is closed.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C in the shell. The process has to end at once, so nothing is waited for.
+        """
         try:
             while not self.finished:
                 self.turn()
-        finally:
+        except KeyboardInterrupt:
+            self.files.keep()
+            raise
+        except BaseException:
+            self.files.keep()
             self.close()
+            raise
+        self.close()
 
     def turn(self) -> None:
         """One round: events, motion, what has arrived, and a picture if anything changed."""
@@ -161,8 +170,13 @@ class Viewer:
         self.settings = settings
         self.ui.settings = self.controls.settings = self.deeds.scene.settings = settings
         self.ui.keys = settings.key_map
-        self.motion.sensitivity = settings.mouse
+        self._set_motion(settings)
         self.pacing.rate, self.pacing.coarsest = settings.frame_rate, settings.used_coarsest
+
+    def _set_motion(self, settings: Settings) -> None:
+        self.motion.sensitivity = settings.mouse
+        self.motion.level = settings.orbit == "turntable"
+        self.motion.fly.factor = settings.fly_speed
 
     def use_device(self, device: Device) -> None:
         """Goes on with another device."""

@@ -51,7 +51,7 @@ class Autosave:
         if error is None:
             self.close()
         else:
-            self._release()
+            self.release()
 
     def write(self, source: SceneSource, present: Scene) -> bool:
         """Keeps the present scene, in place of what was kept before; False if that is not possible.
@@ -91,9 +91,10 @@ class Autosave:
         if self._lock is not None:
             with suppress(OSError):
                 (self._folder / f"{self._name}.lock").unlink()
-        self._release()
+        self.release()
 
-    def _release(self) -> None:
+    def release(self) -> None:
+        """Leaves what was kept for the next window."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None

@@ -15,6 +15,7 @@ from clfractal.errors import ClfractalError
 from clfractal.files.srgb import encode8
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
+from clfractal.viewer.fitting import Cancellable
 from clfractal.work.films import JobFilms
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
@@ -34,20 +35,24 @@ class Task(Protocol):
         """Whether nothing is left to do: it is done, was cancelled, or has failed."""
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
-        """Goes on with it until it is finished, or the token is set (Stopped).
+        """Goes on with it until nothing is left for the device, or the token is set.
 
         Raises:
-            Stopped: the token was set.
+            ClfractalError: it failed; `failed` is called next.
+            Stopped: the token was set; it is called again later, perhaps with another device's executor.
         """
 
+    def failed(self, error: ClfractalError) -> None:
+        """It cannot be done."""
 
-def prepared(scene: Scene, executor: LocalExecutor, tell: Tell, *, colors: bool) -> Job:
+
+def prepared(scene: Scene, executor: LocalExecutor, token: CancelToken, tell: Tell, *, colors: bool) -> Job:
     """The job of a scene's picture; `colors`: with the colour channels alone."""
     from clfractal.work.comfort import Look, fitted
 
     channels = ("R", "G", "B", "A") if colors else None
     if scene.stereo is not None and scene.stereo.fit is not None:
-        scene = fitted(scene, Look(executor.device, executor))
+        scene = fitted(scene, Look(executor.device, Cancellable(executor, token)))
     return prepare(scene, executor.device, channels=channels, on_start=tell)
 
 
@@ -65,6 +70,7 @@ class Thumbnail:
         self.film: Film | None = None
         self.problem = ""
         self._films: JobFilms | None = None
+        self._token: CancelToken | None = None
         self._cancelled = False
 
     @property
@@ -75,23 +81,28 @@ class Thumbnail:
     def cancel(self) -> None:
         """It is not needed any more."""
         self._cancelled = True
+        if self._token is not None:
+            self._token.cancel()
+
+    def failed(self, error: ClfractalError) -> None:
+        """See `Task`."""
+        self.problem = error.message
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
         """See `Task`."""
-        try:
-            if self._films is None:
-                self._films = JobFilms(prepared(self._scene(), executor, tell, colors=True))
-            run(self._films.job, self._films.films, executor, token=token)
-            film = self._films.picture()
-        except ClfractalError as error:
-            if token.cancelled:
-                raise
-            self.problem = error.message
+        self._token = token
+        if self._cancelled:
             return
+        if self._films is None or self._films.job.device != executor.device.info:
+            self._films = JobFilms(prepared(self._scene(), executor, token, tell, colors=True))
+        run(self._films.job, self._films.films, executor, token=token)
+        film = self._films.picture()
+        self._token = None
         gain = np.float32(2.0 ** self._films.job.scene.output.exposure)
         colors = np.stack([film[name] * gain for name in "RGB"], axis=-1)
         opaque = np.full((*colors.shape[:2], 1), 255, np.uint8)
         self.film = film
+        self._films = None
         self.pixels = np.concatenate([encode8(colors), opaque], axis=-1)
 
     def _scene(self) -> Scene:
@@ -120,6 +131,8 @@ class Still:
         self.remaining: float | None = None
         self._header = header or {}
         self._films: JobFilms | None = None
+        self._token: CancelToken | None = None
+        self._writing = False
         self._cancelled = threading.Event()
 
     @property
@@ -128,8 +141,13 @@ class Still:
         return bool(self.written) or bool(self.problem) or self._cancelled.is_set()
 
     def cancel(self) -> None:
-        """Ends it; nothing is written."""
+        """Ends it; nothing is written, unless its files are being written already."""
+        if self._writing:
+            return
         self._cancelled.set()
+        token = self._token
+        if token is not None:
+            token.cancel()
 
     @property
     def cancelled(self) -> bool:
@@ -138,22 +156,31 @@ class Still:
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
         """See `Task`."""
+        self._token = token
         if self.cancelled:
             return
+        if self._films is None or self._films.job.device != executor.device.info:
+            self._films = JobFilms(prepared(self.scene, executor, token, tell, colors=False))
+        films = self._films
+        run(films.job, films.films, executor, token=token, progress=self._told)
+        self._films = self._token = None
+        self._writing = True
+        # The device is free for the next picture meanwhile. The process waits for this thread before it ends.
+        threading.Thread(target=self._write, args=(films,), name="clfractal-still").start()
+
+    def failed(self, error: ClfractalError) -> None:
+        """See `Task`."""
+        self.problem = str(error)
+
+    def _write(self, films: JobFilms) -> None:
         try:
-            if self._films is None:
-                self._films = JobFilms(prepared(self.scene, executor, tell, colors=False))
-            job, films = self._films.job, self._films.films
-            run(job, films, executor, token=token, progress=lambda state: self._told(state, token))
-            save_job(job, films, self.paths, {**job.header(), **self._header})
+            save_job(films.job, films.films, self.paths, {**films.job.header(), **self._header})
             self.written = self.paths
         except ClfractalError as error:
-            if self.cancelled or token.cancelled:
-                raise
-            self.problem = str(error)
+            self.failed(error)
+        except Exception as error:  # a panel shows it
+            self.problem = f"internal error, please report it: {type(error).__name__}: {error}"
 
-    def _told(self, state: Progress, token: CancelToken) -> None:
+    def _told(self, state: Progress) -> None:
         self.share = state.tiles_done / max(state.tiles, 1)
         self.remaining = state.remaining
-        if self.cancelled:
-            token.cancel()

@@ -132,7 +132,7 @@ class Controls:
         self._wheeled = now
         if self.marking and self.box is not None:
             stage = zoom_box.stage_of(self.studio.scene)
-            self.box = zoom_box.scaled(self.box, stage, 1 / factor)
+            self.box = zoom_box.scaled(self.box, stage, factor)
         elif aim.plane is not None:
             self._set_plane(aim, plane_moves.zoom_to(aim.plane, aim.x, aim.y, aim.size, factor), "wheel")
         else:
@@ -211,7 +211,11 @@ class Controls:
     def _orbit(self, drag: Drag, dx: float, dy: float) -> None:
         aim, faster = drag.aim, self.settings.mouse
         pivot = aim.point if aim.point is not None else aim.camera.target
-        camera = navigation.orbit(drag.before, pivot, dx * faster, dy * faster, aim.size, self.settings.orbit)
+        style = self.settings.orbit
+        vertical = self.studio.saved.camera.up if style == "turntable" else None
+        camera = navigation.orbit(
+            drag.before, pivot, dx * faster, dy * faster, aim.size, style, vertical=vertical
+        )
         self._set_camera(aim, camera, "orbit")
 
     def _pan(self, drag: Drag, dx: float, dy: float) -> None:

@@ -13,7 +13,7 @@ import pyopencl as cl
 
 from clfractal.device.gl_sharing import SharedTexture
 from clfractal.device.select import Device
-from clfractal.errors import ClfractalError
+from clfractal.errors import ClfractalError, DeviceError
 from clfractal.pictures.tiled import Floats
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.work.show import Look, Shower
@@ -113,12 +113,14 @@ class Shown:
         frame, look: what is shown, and how.
         target: where.
         depths: of each view, arrays of shape (rows, columns) in the pixels of `frame.views`; scene units.
+        reduced: whether the target has only the frame's coarse pixels, and has to be enlarged.
     """
 
     frame: Frame
     look: Look
     target: Target
     depths: list[Floats]
+    reduced: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +128,7 @@ class _Order:
     frame: Frame
     look: Look
     target: Target
+    reduced: bool
 
 
 class Display:
@@ -156,14 +159,19 @@ class Display:
         self._thread = threading.Thread(target=self._work, name="clfractal-display", daemon=True)
         self._thread.start()
 
-    def show(self, frame: Frame, look: Look, target: Target) -> None:
-        """Asks for a frame; one that was asked for before and has not begun is forgotten."""
+    def show(self, frame: Frame, look: Look, target: Target, *, reduced: bool = False) -> bool:
+        """Asks for a frame; one that was asked for before and has not begun is forgotten.
+
+        False if the frame is not there any more: then there is a newer one, and the target stays the caller's.
+        """
         with self._changed:
+            if self._closed or not self.pool.hold(frame):
+                return False
             if self._order is not None:
                 self._drop(self._order)
-            self.pool.hold(frame.canvas)
-            self._order = _Order(frame, look, target)
+            self._order = _Order(frame, look, target, reduced)
             self._changed.notify_all()
+            return True
 
     def take(self) -> Shown | None:
         """The frame that arrived last, once; its target is the caller's until it is used again."""
@@ -204,8 +212,9 @@ class Display:
                     if self._shown is not None:
                         self._spare.append(self._shown.target)
                     self._shown = shown
-            except ClfractalError as error:
-                self.problem = error
+            except Exception as error:  # the next frame is shown again
+                told = f"internal error, please report it: {type(error).__name__}: {error}"
+                self.problem = error if isinstance(error, ClfractalError) else DeviceError(told)
                 with self._changed:
                     self._spare.append(order.target)
             finally:
@@ -219,11 +228,13 @@ class Display:
         queue = self._shower.queue
         with self.device.failures("showing the picture"):
             order.target.begin(queue)
-            self._shower.enqueue(frame.canvas, frame.arrangement, order.look, order.target.shown)
+            self._shower.enqueue(
+                frame.canvas, frame.arrangement, order.look, order.target.shown, reduced=order.reduced
+            )
             order.target.end(queue)
         if self._depths[0] != frame.number:
             self._depths = (frame.number, frame.canvas.read_depths(queue))
-        return Shown(frame, order.look, order.target, self._depths[1])
+        return Shown(frame, order.look, order.target, self._depths[1], order.reduced)
 
 
 def _nothing() -> None:

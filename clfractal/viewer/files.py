@@ -51,6 +51,7 @@ class Files:
         self._kept: Scene | None = None
         self._watched = Watched(())
         self._shot_ready = 0
+        self._stale = False
         for path, kinds in ((options.shot, (".png",)), (options.save, (".yaml", ".yml"))):
             if path is not None:
                 check_output(path, kinds)
@@ -73,10 +74,11 @@ class Files:
         path = Path(options.scene) if options.scene else resources.folder("scenes") / _FIRST_SCENE
         overrides = list(options.overrides)
         self.source = open_source(path)
-        scene = load_scene(path, overrides=overrides)
+        self._watched = Watched(self.source.watched)
+        loaded = self.source.loaded
+        scene = loaded if loaded is not None and not overrides else load_scene(path, overrides=overrides)
         if options.stereo is not None:
             scene = _with_stereo(scene, options.stereo)
-        self._watched = Watched(self.source.watched)
         return scene
 
     def attach(self, viewer: Viewer) -> None:
@@ -99,8 +101,8 @@ class Files:
             ClfractalError: it is wrong; the present one stays.
         """
         source = open_source(path)
-        scene = load_scene(path)
-        self.take(source, scene, saved=source.loaded or scene)
+        scene = source.loaded or load_scene(path)
+        self.take(source, scene, saved=scene)
         self.viewer.studio.tell(f"opened {path.name}")
 
     def take(self, source: SceneSource, scene: Scene, *, saved: Scene | None = None) -> None:
@@ -110,8 +112,9 @@ class Files:
         if saved is not None:
             self.viewer.studio.saved = saved
         self._kept = scene
-        self._watched.follow(source.watched)
-        self._watched.accept()
+        # What has changed while it was read is told with the next look.
+        self._watched = Watched(source.watched)
+        self._stale = source.changed_on_disk if source.path is not None else False
         self._autosave.clear()
         self.reload_problem = ""
         self._title()
@@ -124,7 +127,7 @@ class Files:
         self._watched.accept()
         try:
             source = open_source(self.source.path)
-            scene = load_scene(self.source.path)
+            scene = source.loaded or load_scene(self.source.path)
         except ClfractalError as error:
             self.reload_problem = str(error)
             self.viewer.studio.tell(str(error), wrong=True)
@@ -142,6 +145,7 @@ class Files:
         scene = found.scene()
         source = found.source()
         self.take(source, scene, saved=source.loaded)
+        self._autosave.write(source, scene)  # before the only copy goes away
         self.recovered.remove(found)
         found.discard()
 
@@ -184,8 +188,8 @@ class Files:
         studio = self.viewer.studio
         scene = studio.scene
         self.source = save_scene(self.source, scene, target, even_if_changed=even_if_changed)
-        studio.saved = scene
-        self._kept = scene
+        # In another folder maps and grids may have other names.
+        studio.scene = studio.saved = self._kept = self.source.loaded or scene
         self._watched.follow(self.source.watched)
         self._watched.accept()
         self._autosave.clear()
@@ -217,7 +221,8 @@ class Files:
         """Looks after the file on the disk and the safety copy."""
         viewer = self.viewer
         settings, studio = viewer.settings, viewer.studio
-        if settings.watch and self._watched.changed():
+        if settings.watch and (self._stale or self._watched.changed()):
+            self._stale = False
             self._changed_on_disk()
         every = settings.autosave
         if every and now - self._autosaved >= every:
@@ -283,6 +288,12 @@ class Files:
             viewer.finished = True
         else:
             self._shot_ready = 0
+
+    def keep(self) -> None:
+        """The window ends without being closed: what is unsaved is offered at the next start."""
+        if self._viewer is not None and self.options.shot is None and self.viewer.studio.unsaved:
+            self._autosave.write(self.source, self.viewer.studio.scene)
+            self._autosave.release()
 
     def close(self) -> None:
         """A clean end: the safety copy is not needed any more."""

@@ -2,28 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator, Iterable
+
 import numpy as np
 
+from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
 from clfractal.errors import ClfractalError, SceneError
 from clfractal.optics.view import camera_view
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
 from clfractal.work.comfort import Look, fitted
+from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
+from clfractal.work.run import Executor, Result, WorkItem
+
+
+class Cancellable:
+    """An executor whose work a token ends, for callers that know of none."""
+
+    def __init__(self, executor: Executor, token: CancelToken) -> None:
+        self._executor, self._token = executor, token
+
+    def execute(
+        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+    ) -> Generator[Result]:
+        """See `Executor`."""
+        return self._executor.execute(job, items, self._token)
 
 
 class Fits:
     """Fits stereo scenes, and remembers the last fit."""
 
     def __init__(self, device: Device, executor: LocalExecutor) -> None:
-        self._look = Look(device, executor)
+        self._device, self._executor = device, executor
         self._last: tuple[Scene, Scene] | None = None
 
-    def fitted(self, scene: Scene, moving: bool) -> Scene:
+    def fitted(self, scene: Scene, moving: bool, token: CancelToken) -> Scene:
         """The scene with `stereo.fit` carried out; as it is if it asks for none, or if there is nothing to fit to.
 
         While it moves the last fit is used, at the same distance from the camera.
+
+        Raises:
+            DeviceError, KernelBuildError: as of a render.
+            Stopped: the token was set.
         """
         stereo = scene.stereo
         if stereo is None or stereo.fit is None:
@@ -33,7 +55,7 @@ class Fits:
         if moving and self._last is not None:
             return _carried(self._last[1], scene)
         try:
-            found = fitted(scene, self._look)
+            found = fitted(scene, Look(self._device, Cancellable(self._executor, token)))
         except SceneError:
             # Nothing is in sight, for example: the plane stays where the camera's target is.
             return scene.model_copy(update={"stereo": stereo.model_copy(update={"fit": None})})

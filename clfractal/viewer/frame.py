@@ -29,6 +29,7 @@ class Frame:
         finished: whether it has the bits of the shell's picture.
         seconds: that rendering took so far, without compiling.
         frame_seconds: that the last pass took.
+        stamp: the canvas's, while it holds this frame.
     """
 
     number: int
@@ -42,6 +43,7 @@ class Frame:
     finished: bool
     seconds: float
     frame_seconds: float
+    stamp: int = 0
 
     @property
     def arrangement(self) -> Arrangement:
@@ -59,18 +61,25 @@ class CanvasPool:
         self._held: dict[int, int] = {}
 
     def take(self, *busy: Canvas | None) -> Canvas:
-        """A canvas that nobody reads, and that is none of `busy`."""
+        """A canvas that nobody reads, and that is none of `busy`; frames that were on it are gone."""
         with self._lock:
             for canvas in self._canvases:
                 if canvas not in busy and not self._held.get(id(canvas)):
-                    return canvas
-            self._canvases.append(Canvas(self.device))
-            return self._canvases[-1]
+                    break
+            else:
+                canvas = Canvas(self.device)
+                self._canvases.append(canvas)
+            canvas.stamp += 1
+            return canvas
 
-    def hold(self, canvas: Canvas) -> None:
-        """Keeps a canvas from being drawn on anew."""
+    def hold(self, frame: Frame) -> bool:
+        """Keeps a frame's canvas from being drawn on anew; False if that has happened, and there is a newer frame."""
+        canvas = frame.canvas
         with self._lock:
+            if canvas.stamp != frame.stamp:
+                return False
             self._held[id(canvas)] = self._held.get(id(canvas), 0) + 1
+            return True
 
     def release(self, canvas: Canvas) -> None:
         """Takes one `hold` back."""

@@ -12,7 +12,7 @@ from clfractal.viewer import window
 from clfractal.viewer.deeds import HELD
 from clfractal.viewer.flying import Key
 from clfractal.viewer.keys import Context, KeyEvent
-from clfractal.viewer.recording import Event, Player, Recorder, read_recording
+from clfractal.viewer.recording import Event, Player, Recorder, Recording
 
 if TYPE_CHECKING:
     from clfractal.viewer.app import Viewer
@@ -39,11 +39,14 @@ _RECORDED = ("key", "char", "button", "move", "scroll", "resize", "focus", "leav
 class Inputs:
     """Handles events one by one.
 
+    Args:
+        recording: events to play; None: none.
+
     Attributes:
         pointer: framebuffer pixels from the window's top left.
     """
 
-    def __init__(self, viewer: Viewer) -> None:
+    def __init__(self, viewer: Viewer, recording: Recording | None) -> None:
         self.viewer = viewer
         self.pointer = (-1.0, -1.0)
         self._before: tuple[float, float] | None = None
@@ -51,8 +54,8 @@ class Inputs:
         self._player: Player | None = None
         self._recorder: Recorder | None = None
         options = viewer.options
-        if options.play is not None:
-            self._player = Player(read_recording(options.play))
+        if recording is not None:
+            self._player = Player(recording)
         if options.record is not None:
             self._recorder = Recorder(options.record, viewer.window.size)
 

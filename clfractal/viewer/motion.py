@@ -24,6 +24,8 @@ class Motion:
     """Moves the studio's camera as time passes.
 
     Attributes:
+        sensitivity: factor on what a 3D mouse does.
+        level: whether looking around keeps the horizon.
         keys: of flying that are held.
         look: degrees that the head has turned since the last step, to the right and down.
         fly: the flight's state.
@@ -32,6 +34,7 @@ class Motion:
 
     studio: Studio
     sensitivity: float = 1.0
+    level: bool = True
     keys: set[Key] = field(default_factory=set)
     look: tuple[float, float] = (0.0, 0.0)
     fly: Fly = field(default_factory=Fly)
@@ -88,6 +91,7 @@ class Motion:
                 self._flew = False
                 self.studio.end_gesture()
             return False
+        self.fly.vertical = self.studio.saved.camera.up if self.level else None
         camera = self.fly.step(self.studio.scene.camera, keys, look, seconds, self.depth)
         self._flew = True
         self.studio.set_camera(camera, "fly")

@@ -159,11 +159,12 @@ class Outputs:
             self._draw_charts(surface, width, height)
         elif surface.texture:
             wide, high = surface.size
+            part, smooth = surface.part, surface.coarse and surface.smooth
             # A picture is at most a pixel smaller than its window, where halves need even sizes.
             if 0 <= width - wide <= 1 and 0 <= height - high <= 1:
-                self._rectangle.draw(surface.texture, (0, height - high, wide, high))
+                self._rectangle.draw(surface.texture, (0, height - high, wide, high), part, smooth=smooth)
             else:
-                self._rectangle.draw(surface.texture, (0, 0, width, height), smooth=True)
+                self._rectangle.draw(surface.texture, (0, 0, width, height), part, smooth=True)
         draw_ui(None)
 
     def _draw_half(

@@ -21,7 +21,8 @@ class Pacing:
     Attributes:
         rate: frames a second that are wanted.
         coarsest: the largest divider that is allowed; 1: never coarse.
-        seconds_per_pixel: of the frames so far.
+        seconds_per_pixel: that kernels took for the frames so far.
+        fixed: seconds of a frame that do not depend on its pixels.
     """
 
     rate: float = 30.0
@@ -35,9 +36,10 @@ class Pacing:
         wanted = math.ceil(math.sqrt(max(pixels * self.seconds_per_pixel / room, 1e-9)))
         return max(1, min(wanted, self.coarsest))
 
-    def learn(self, pixels: int, seconds: float) -> None:
-        """Takes note of what a frame of so many rendered pixels took."""
-        found = max(seconds - self.fixed, 0.1 * seconds) / max(pixels, 1)
+    def learn(self, pixels: int, kernel: float, seconds: float) -> None:
+        """Takes note of what a frame of so many rendered pixels took: the kernels, and all of it."""
+        self.fixed += 0.2 * (min(max(seconds - kernel, 0.0), 0.05) - self.fixed)
+        found = kernel / max(pixels, 1)
         # Slower at once, faster by and by: a frame that comes too late is worse than one that is too coarse.
         share = 0.7 if found > self.seconds_per_pixel else 0.3
         self.seconds_per_pixel += share * (found - self.seconds_per_pixel)

@@ -157,7 +157,9 @@ class SceneDeeds:
     def _orbit(self, dx: float, dy: float) -> None:
         camera = self.motion.target
         size = self.studio.viewport
-        self._camera(navigation.orbit(camera, camera.target, -dx, -dy, size, self.settings.orbit))
+        style = self.settings.orbit
+        vertical = self.studio.saved.camera.up if style == "turntable" else None
+        self._camera(navigation.orbit(camera, camera.target, -dx, -dy, size, style, vertical=vertical))
 
     def _pan(self, dx: float, dy: float) -> None:
         self._camera(navigation.pan(self.motion.target, -dx, -dy, self.studio.viewport, math.inf))
@@ -262,7 +264,7 @@ class SceneDeeds:
     def _scale(self, factor: float) -> None:
         box = self.controls.box
         if self.controls.marking and box is not None:
-            self.controls.box = zoom_box.scaled(box, zoom_box.stage_of(self.studio.scene), 1 / factor)
+            self.controls.box = zoom_box.scaled(box, zoom_box.stage_of(self.studio.scene), factor)
         else:
             self._plane(lambda plane: plane_moves.scale(plane, factor))
 

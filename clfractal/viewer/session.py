@@ -10,18 +10,22 @@ from dataclasses import dataclass, replace
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.errors import ClfractalError, DeviceError, Stopped
+from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, Stopped
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import Task
 from clfractal.viewer.fitting import Fits
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.viewer.pacing import Pacing, Schedule
 from clfractal.work.canvas import CHANNELS, Canvas, CanvasKernels, CanvasStore
+from clfractal.pictures.tiles import Region
+from clfractal.renderers.plan import PlannedView
+from clfractal.renderers.resources import Borrowing
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
 from clfractal.work.refine import has_room, pass_ranges
-from clfractal.work.run import run
+from clfractal.work.run import Progress, run
+from clfractal.work.show import Arrangement
 
 BUDGET_SECONDS = 0.02
 """Limit of the work that is queued on the device: what cannot be told to end, ends after this time."""
@@ -77,12 +81,18 @@ class Session:
         self._tasks: deque[Task] = deque()
         self._frames = 0
         self._busy = False
+        self._shielded = False
         self._executor = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
+        # Looks have another size: they would replace the picture's buffers. They fill the grid that the picture needs.
+        self._looking = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
+        self._looking.kept = self._executor.kept
+        # Many small pictures must not push out the grid that the picture on the screen is made of.
         self._aside = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
-        self._aside.kept = self._executor.kept
-        self._fits = Fits(device, self._aside)
+        self._aside.kept = Borrowing(self._executor.kept)
+        self._fits = Fits(device, self._looking)
         self._kernels: CanvasKernels | None = None
         self._gathered: _Gathering | None = None
+        self._current: Wanted | _Gathering | Task | None = None
         self._thread = threading.Thread(target=self._work, name="clfractal-session", daemon=True)
 
     def start(self) -> None:
@@ -103,7 +113,9 @@ class Session:
             self._number += 1
             self._wanted = Wanted(self._number, scene, moving, region)
             self.paused = False
-            self._token.cancel()
+            # A coarse frame of a movement is short, and is finished: if each move of a pointer ended it, none would come.
+            if not (moving and self._shielded):
+                self._token.cancel()
             self._changed.notify_all()
             return self._number
 
@@ -116,13 +128,20 @@ class Session:
         """Queues work in the background: done when the picture has its first full sample, before it gathers more."""
         with self._changed:
             self._tasks.append(task)
-            # A gathering picture goes on afterwards where it was.
-            if self.frame is not None and self._wanted is None:
+            # A picture that gathers samples goes on afterwards where it was.
+            if isinstance(self._current, _Gathering) and self._current.samples > 0:
                 self._token.cancel()
             self._changed.notify_all()
 
+    def take_tasks(self) -> list[Task]:
+        """The tasks that are not done, for another session; of one that is closed."""
+        with self._changed:
+            tasks = list(self._tasks)
+            self._tasks.clear()
+            return tasks
+
     def pause(self, paused: bool = True) -> None:
-        """Stops gathering samples, or goes on with what was gathered."""
+        """Stops rendering the picture, or goes on with what was gathered. A request goes on, too."""
         with self._changed:
             self.paused = paused
             if paused:
@@ -133,8 +152,7 @@ class Session:
     def idle(self) -> bool:
         """Whether nothing is under way and nothing is wanted."""
         with self._changed:
-            rests = self._gathered is None or self._gathered.finished or self.paused
-            return self._wanted is None and not self._busy and not self._tasks and rests
+            return not self._busy and not self._tasks and (self.paused or not self._draws())
 
     def close(self, timeout: float | None = 10.0) -> bool:
         """Ends the thread and frees the device's memory; whether it ended in time."""
@@ -149,38 +167,55 @@ class Session:
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._busy = False
-                self._changed.wait_for(self._has_work)
+                self._busy = self._shielded = False
+                self._current = None
+                self._changed.wait_for(lambda: self._closed or self._next() is not None)
                 self._busy = True
                 if self._closed:
                     break
-                wanted, self._wanted = self._wanted, None
                 token = self._token = CancelToken()
-                task = self._tasks[0] if wanted is None and self._tasks else None
+                work = self._current = self._next()
+                if work is self._wanted:
+                    self._wanted = None
             try:
-                if wanted is not None:
-                    self._begin(wanted, token)
-                if task is not None:
-                    self._do(task, token)
-                elif self._gathered is not None:
-                    self._gather(self._gathered, token)
+                if isinstance(work, Wanted):
+                    self._begin(work, token)
+                elif isinstance(work, _Gathering):
+                    self._gather(work, token)
+                elif work is not None:
+                    self._do(work, token)
             except Stopped:
                 continue
             except ClfractalError as error:
                 self._failed(error)
             except Exception as error:  # a mistake of ours must not freeze the window
-                self._failed(DeviceError(f"internal error, please report it: {type(error).__name__}: {error}"))
+                self._failed(_internal(error))
             finally:
                 self._say("")
-        self._executor.close()
-        self._aside.close()
+        for executor in (self._executor, self._looking, self._aside):
+            executor.close()
 
-    def _has_work(self) -> bool:
-        gathers = self._gathered is not None and not self._gathered.finished and not self.paused
-        return self._closed or self._wanted is not None or bool(self._tasks) or gathers
+    def _next(self) -> Wanted | _Gathering | Task | None:
+        """What comes next: a new picture until it has a sample, then all tasks, then more samples."""
+        gathered = self._gathered
+        if not self.paused:
+            if self._wanted is not None:
+                return self._wanted
+            if gathered is not None and gathered.samples == 0:
+                return gathered
+        if self._tasks:
+            return self._tasks[0]
+        more = gathered is not None and not gathered.finished and not self.paused
+        return gathered if more else None
+
+    def _draws(self) -> bool:
+        """Whether the picture is not finished."""
+        gathered = self._gathered
+        return self._wanted is not None or (gathered is not None and not gathered.finished)
 
     def _failed(self, error: ClfractalError) -> None:
         self._gathered = None
+        self._executor.forget()
         self.problem = error
         self.woken()
 
@@ -188,75 +223,109 @@ class Session:
         """The first, coarse frames of a picture."""
         self._gathered = None
         self._executor.forget()
-        scene = self._fits.fitted(wanted.scene, wanted.moving)
+        with self._changed:
+            self._shielded = wanted.moving
+        try:
+            self._gathered = self._begun(wanted, token)
+        except Stopped:
+            with self._changed:
+                # What was paused, and not replaced by another request, begins again later.
+                self._wanted = self._wanted or wanted
+            raise
+
+    def _begun(self, wanted: Wanted, token: CancelToken) -> _Gathering:
+        scene = self._fits.fitted(wanted.scene, wanted.moving, token)
         job = prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
         pixels = sum(view.plan.region.pixels for view in job.views)
         divider = self.pacing.divider(pixels)
         seconds = 0.0
-        if divider > 1 or wanted.moving:
+        if self._is_shown(wanted):
+            divider = 1  # a part of a picture that is there is refined: the rest stays as it is
+        elif divider > 1 or wanted.moving or wanted.region is not None:
             seconds += self._coarse(wanted, job, divider, token, seconds)
         if wanted.moving:
             self._settle(token)
-            if scene.stereo is not None and scene is not wanted.scene:
-                scene = self._fits.fitted(wanted.scene, False)
+            if scene is not wanted.scene:
+                scene = self._fits.fitted(wanted.scene, False, token)
                 job = prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
         while divider > 2 and self.pacing.estimate(pixels) > _HALVED_ABOVE:
             divider //= 2
             if divider > 1:
                 seconds += self._coarse(wanted, job, divider, token, seconds)
-        part = job
-        if wanted.region is not None:
-            part = prepare(scene, self.device, channels=CHANNELS, region=wanted.region)
-            if len(part.views) != len(job.views):
-                part = job
-        self._gathered = _Gathering(wanted, job, part, seconds)
+        return _Gathering(wanted, job, seconds)
+
+    def _is_shown(self, wanted: Wanted) -> bool:
+        """Whether the newest frame is a whole picture of the wanted scene."""
+        front = self.frame
+        return (
+            front is not None
+            and not wanted.moving
+            and front.divider == 1
+            and front.samples > 0
+            and front.scene == wanted.scene
+        )
 
     def _settle(self, token: CancelToken) -> None:
-        end = time.perf_counter() + SETTLE_SECONDS
-        while time.perf_counter() < end:
-            token.check()
-            time.sleep(0.005)
+        """Waits until nothing has moved for a while."""
+        with self._changed:
+            self._shielded = False
+            if self._wanted is not None:
+                raise Stopped
+            self._changed.wait_for(token, SETTLE_SECONDS)
+        token.check()
 
     def _coarse(self, wanted: Wanted, job: Job, divider: int, token: CancelToken, before: float) -> float:
         """Renders and publishes a coarse picture; gives the seconds that it took."""
         coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
         canvas = self._canvas(coarse)
-        state_seconds = self._run(coarse, canvas, token, None, None)
-        self.pacing.learn(canvas.pixels, state_seconds)
-        self._publish(wanted, job, coarse, canvas, divider, 1, False, before + state_seconds, state_seconds)
-        return state_seconds
+        state = self._run(coarse, canvas, token)
+        seconds = state.seconds
+        self.pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, seconds)
+        self._publish(wanted, job, coarse, canvas, divider, 1, False, before + seconds, seconds)
+        return seconds
 
     def _gather(self, work: _Gathering, token: CancelToken) -> None:
         """Samples of the whole picture, pass by pass, from where it stands."""
-        job, wanted = work.job, work.wanted
         if work.canvas is None:
-            work.canvas = self._canvas(job)
+            work.canvas = self._canvas(work.job)
             front = self.frame
             if front is not None and len(front.canvas.parts) == len(work.canvas.parts):
                 self._writer.enlarge(front.canvas, work.canvas)
                 work.prepared = True
-            work.ranges = pass_ranges(job.samples) if has_room(job, self._executor) else [(0, job.samples)]
-            work.schedule = Schedule(time.perf_counter())
-        canvas = work.canvas
+            work.begin(in_passes=has_room(work.part, self._executor, token))
         while work.ranges:
-            samples = work.ranges[0]
-            # A pass that was interrupted is done anew: pixels that have its samples already get no more.
-            took = self._run(work.part, canvas, token, samples, lambda seconds: self._grown(work, canvas, seconds))
-            work.ranges.pop(0)
-            work.seconds += took
-            work.samples = samples[1]
-            work.prepared = True
-            if samples[1] == 1:
-                self.pacing.learn(canvas.pixels, took)
-            last = not work.ranges
-            if last or samples[1] == 1 or work.schedule.due(time.perf_counter()):
-                self._publish(wanted, job, job, canvas, 1, work.samples, last, work.seconds, took)
-            if last:
+            try:
+                self._pass(work, work.canvas, token)
+            except DeviceError as error:
+                if error.status != STATUS_BAD_INPUT or not work.in_passes:
+                    raise
+                # No room after all for what passes keep.
                 self._executor.forget()
-                work.finished = True
-            elif self._tasks:
+                self._tell(f"{error.message}; so all samples are made in one pass")
+                work.begin(in_passes=False)
+            if work.ranges and self._tasks:
                 raise Stopped
+        self._executor.forget()
         work.finished = True
+
+    def _pass(self, work: _Gathering, canvas: Canvas, token: CancelToken) -> None:
+        """The next pass; one that was interrupted is done anew: pixels that have its samples already get no more."""
+        part, wanted = work.part, work.wanted
+        if work.ranges[0][0] > 0 and not self._executor.keeps(len(part.views)):
+            work.begin(in_passes=True)  # what was kept went with a drawing that could not be updated
+        samples = work.ranges[0]
+        state = self._run(part, canvas, token, work, samples)
+        work.ranges.pop(0)
+        seconds = state.seconds
+        work.seconds += seconds
+        work.samples = samples[1]
+        work.prepared = True
+        if samples[1] == 1:
+            pixels = sum(view.plan.region.pixels for view in part.views)
+            self.pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
+        last = not work.ranges
+        if last or samples[0] == 0 or work.schedule.due(time.perf_counter()):
+            self._publish(wanted, work.job, work.job, canvas, 1, work.samples, last, work.seconds, seconds)
 
     def _grown(self, work: _Gathering, canvas: Canvas, seconds: float) -> None:
         """Shows a picture whose pass is under way."""
@@ -271,27 +340,21 @@ class Session:
         job: Job,
         canvas: Canvas,
         token: CancelToken,
-        samples: tuple[int, int] | None,
-        grown: Callable[[float], None] | None,
-    ) -> float:
-        """One pass onto a canvas; gives its seconds."""
-        stores = [CanvasStore(canvas, job, number) for number in range(len(job.views))]
+        work: _Gathering | None = None,
+        samples: tuple[int, int] | None = None,
+    ) -> Progress:
+        """One pass onto a canvas; `work` is shown as it grows."""
+        numbers = range(len(job.views)) if work is None else work.numbers
+        stores = [CanvasStore(canvas, view, number) for view, number in zip(job.views, numbers, strict=True)]
         writer = self._writer
-        clips = [view.plan.region for view in job.views]
         self._executor.outlet = lambda view, film, places, tiles: writer.place(
-            canvas, view, clips[view], film, places, tiles
+            canvas, numbers[view], job.views[view].plan.region, film, places, tiles
         )
-        state = run(
-            job,
-            stores,
-            self._executor,
-            token=token,
-            samples=samples,
-            progress=None if grown is None else lambda state: grown(state.seconds),
-        )
+        grown = None if work is None else lambda state: self._grown(work, canvas, state.seconds)
+        state = run(job, stores, self._executor, token=token, samples=samples, progress=grown)
         with self.device.failures("rendering"):
             self.device.queue.finish()
-        return state.seconds
+        return state
 
     @property
     def _writer(self) -> CanvasKernels:
@@ -329,6 +392,7 @@ class Session:
             finished,
             seconds,
             frame_seconds,
+            canvas.stamp,
         )
         self.problem = None
         self.progress = ""
@@ -337,12 +401,18 @@ class Session:
     def _do(self, task: Task, token: CancelToken) -> None:
         """Some of a task's work; what is unfinished is gone on with later."""
         try:
-            task.work(self._aside, token, self._tell)
-        finally:
-            if task.finished:
-                with self._changed:
-                    self._tasks.remove(task)
-                self.woken()
+            if not task.finished:
+                task.work(self._aside, token, self._tell)
+        except Stopped:
+            if not task.finished:
+                raise
+        except ClfractalError as error:
+            task.failed(error)
+        except Exception as error:  # the picture goes on
+            task.failed(_internal(error))
+        with self._changed:
+            self._tasks.remove(task)
+        self.woken()
 
     def _tell(self, line: str) -> None:
         self._say(line)
@@ -353,14 +423,45 @@ class Session:
             self.woken()
 
 
-class _Gathering:
-    """A whole picture that gathers samples; `part` is the job of what is refined of it."""
+def _internal(error: Exception) -> DeviceError:
+    return DeviceError(f"internal error, please report it: {type(error).__name__}: {error}")
 
-    def __init__(self, wanted: Wanted, job: Job, part: Job, seconds: float) -> None:
-        self.wanted, self.job, self.part, self.seconds = wanted, job, part, seconds
+
+class _Gathering:
+    """A whole picture that gathers samples; `part` is the job of what is refined of it, by the views with `numbers`."""
+
+    def __init__(self, wanted: Wanted, job: Job, seconds: float) -> None:
+        self.wanted, self.job, self.seconds = wanted, job, seconds
+        self.part, self.numbers = _clipped(job, wanted.region)
         self.canvas: Canvas | None = None
         self.ranges: list[tuple[int, int]] = []
+        self.in_passes = False
         self.schedule = Schedule(0.0)
         self.samples = 0
         self.prepared = False
         self.finished = False
+
+    def begin(self, *, in_passes: bool) -> None:
+        """All samples are still to be made, in passes or at once."""
+        samples = self.part.samples
+        self.in_passes = in_passes
+        self.ranges = pass_ranges(samples) if in_passes else [(0, samples)]
+        self.schedule = Schedule(time.perf_counter())
+
+
+def _clipped(job: Job, region: tuple[int, int, int, int] | None) -> tuple[Job, tuple[int, ...]]:
+    """A job's views as far as they lie in a part of each eye's picture, and their numbers; all if nothing lies there."""
+    if region is None:
+        return job, tuple(range(len(job.views)))
+    views: dict[int, PlannedView] = {}
+    left, top, right, bottom = region[0], region[1], region[0] + region[2], region[1] + region[3]
+    for number, (view, place) in enumerate(zip(job.views, Arrangement.of(job).places, strict=True)):
+        whole = view.plan.region
+        x, y = max(left - place.x, whole.x), max(top - place.y, whole.y)
+        width, height = min(right - place.x, whole.right) - x, min(bottom - place.y, whole.bottom) - y
+        if width > 0 and height > 0:
+            plan = replace(view.plan, region=Region(x, y, width, height))
+            views[number] = replace(view, plan=plan)
+    if not views:
+        return job, tuple(range(len(job.views)))
+    return replace(job, views=tuple(views.values())), tuple(views)

@@ -10,7 +10,7 @@ from clfractal.errors import ClfractalError
 from clfractal.viewer import gl
 from clfractal.viewer.display import CopyTarget, Display, SharedTarget, Shown, Target
 from clfractal.viewer.frame import CanvasPool, Frame
-from clfractal.work.show import Look
+from clfractal.work.show import Look, can_reduce
 
 _TARGETS = 3
 """One is shown, one is being written, and one waits."""
@@ -55,18 +55,43 @@ class Surface:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the picture, pixels."""
-        return self.shown.target.size if self.shown is not None else (0, 0)
+        """Width and height of the picture, pixels; its texture has fewer if it is coarse, see `part`."""
+        return self.shown.frame.arrangement.size(self.shown.look) if self.shown is not None else (0, 0)
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the texture has fewer pixels than the picture."""
+        return self.shown is not None and self.shown.reduced
+
+    @property
+    def part(self) -> tuple[float, float, float, float]:
+        """The part of the texture that is the whole picture: left, top, right, bottom, 0 to 1."""
+        if self.shown is None or not self.shown.reduced:
+            return 0.0, 0.0, 1.0, 1.0
+        # A coarse pixel is the picture's pixel at the corner of its block, so that one's middle is the texel's middle.
+        divider, ends = self.shown.frame.divider, []
+        for side, texels in zip(self.size, self.shown.target.size, strict=True):
+            ends.append(((0.5 - 0.5 / divider) / texels, ((side - 0.5) / divider + 0.5) / texels))
+        return ends[0][0], ends[1][0], ends[0][1], ends[1][1]
+
+    @property
+    def smooth(self) -> bool:
+        """Whether coarse pixels are interpolated."""
+        return self.shown is not None and self.shown.look.smooth
 
     def want(self, frame: Frame | None, look: Look) -> None:
         """Asks for a frame, unless it is shown or on its way already."""
         if frame is None or self._asked == (frame.number, look):
             return
-        target = self._target(frame.arrangement.size(look))
+        reduced = can_reduce(frame.canvas, frame.arrangement, look)
+        region = frame.canvas.parts[0].region
+        target = self._target((region.width, region.height) if reduced else frame.arrangement.size(look))
         if target is None:
             return  # all are in use; it is asked for again after the next arrives
-        self._asked = (frame.number, look)
-        self._display.show(frame, look, target)
+        if self._display.show(frame, look, target, reduced=reduced):
+            self._asked = (frame.number, look)
+        else:
+            self._free.append(target)  # a newer frame is there
 
     def update(self) -> bool:
         """Takes what has arrived; whether the picture has changed."""
@@ -139,10 +164,10 @@ class Surface:
 
     def _failed(self, problem: ClfractalError) -> None:
         """Sharing that fails gives way to copying; copying that fails is told, and tried with the next frame."""
-        self._asked = None
         if not self.shared:
             self.remark(problem.message)
             return
+        self._asked = None
         self.remark(f"pictures are copied now, since sharing textures failed: {problem.message}")
         self._display.close()
         shown = self.shown.target if self.shown is not None else None

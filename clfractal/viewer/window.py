@@ -50,11 +50,9 @@ def start() -> None:
         raise DeviceError(
             f"clfractal view needs a display, and there is none{told}", status=STATUS_DEVICE_FAILED
         )
-    # PyOpenGL has to look for functions where GLFW made the context; it decides when it is imported.
-    if _platform_is_wayland():
-        os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
-    elif os.environ.get("XDG_SESSION_TYPE") == "wayland":
-        os.environ.setdefault("PYOPENGL_PLATFORM", "x11")
+    # PyOpenGL has to look for functions where GLFW makes the context. It guesses when it is imported, from variables
+    # that GLFW need not follow.
+    os.environ.setdefault("PYOPENGL_PLATFORM", "egl" if _platform_is_wayland() else "glx")
 
 
 def stop() -> None:

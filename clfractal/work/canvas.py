@@ -17,7 +17,6 @@ from clfractal.device.source import flatten
 from clfractal.pictures.tiled import Bands, Floats
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 from clfractal.renderers.plan import PlannedView
-from clfractal.work.job import Job
 
 CHANNELS = ("R", "G", "B", "A", "Z")
 """What a canvas holds of each pixel, so the channels of jobs that are rendered onto one."""
@@ -97,12 +96,15 @@ class CanvasKernels:
                 -(-side // group) * group
                 for side, group in zip((region.width, region.height), PIXEL_GROUP, strict=True)
             ]
-            cl.enqueue_nd_range_kernel(self.device.queue, self._enlarge, size, PIXEL_GROUP)
+            with self.device.failures("enlarging a picture"):
+                cl.enqueue_nd_range_kernel(self.device.queue, self._enlarge, size, PIXEL_GROUP)
         self.device.queue.flush()
 
 
 class Canvas:
     """The pictures of a job's views on a device; its memory is used again for the next job.
+
+    `stamp` rises whenever its picture gives way to another one.
 
     Raises:
         DeviceError: status 2, there is no room.
@@ -111,6 +113,7 @@ class Canvas:
     def __init__(self, device: Device) -> None:
         self.device = device
         self.parts: tuple[Part, ...] = ()
+        self.stamp = 0
         self._room = 0
         self.colors: Any = None
         self.depths: Any = None
@@ -123,6 +126,7 @@ class Canvas:
             offset += view.plan.region.pixels
         if offset > self._room:
             self.colors = self.depths = None
+            self._room = 0
             self.colors = self.device.buffer(16 * offset, "a picture on the screen")
             self.depths = self.device.buffer(4 * offset, "a picture on the screen")
             self._room = offset
@@ -156,10 +160,14 @@ class Canvas:
 
 
 class CanvasStore:
-    """A view's picture on a canvas, as a store for `run`: tiles are on the device already, and only counted here."""
+    """A view's picture on a canvas, as a store for `run`: tiles are on the device already, and only counted here.
 
-    def __init__(self, canvas: Canvas, job: Job, number: int) -> None:
-        view = job.views[number]
+    Args:
+        view: as it is rendered; perhaps less of it than the canvas holds.
+        number: of the canvas's part.
+    """
+
+    def __init__(self, canvas: Canvas, view: PlannedView, number: int) -> None:
         self.canvas, self.number = canvas, number
         self.channels = view.plan.channels
         self.display = view.size

@@ -181,6 +181,11 @@ class Drawing:
         width = 8 if self.view.plan.precision == "float64" else 4
         return tiles * self._kept_count * TILE_PIXELS * width
 
+    @property
+    def keeps(self) -> bool:
+        """Whether it has data kept between passes."""
+        return self._kept is not None
+
     def forget(self) -> None:
         """Frees the data kept between passes."""
         self._kept = None

@@ -76,14 +76,19 @@ class LocalExecutor:
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
 
-    def check_room(self, job: Job) -> None:
+    def keeps(self, views: int) -> bool:
+        """Whether the data kept between passes of so many views are there."""
+        return all(number in self._drawings and self._drawings[number].keeps for number in range(views))
+
+    def check_room(self, job: Job, token: CancelToken | None = None) -> None:
         """Makes sure that a job can be rendered in passes, and tells what a large one needs.
 
         Raises:
             DeviceError: status 2, with the memory needed and available, if the data kept between passes do not fit.
+            Stopped: the token was set while a program was built or a grid was filled.
         """
         needs = [
-            self._drawing(number, view, 1, None).kept_bytes(TileGrid(view.plan.region).count)
+            self._drawing(number, view, 1, token).kept_bytes(TileGrid(view.plan.region).count)
             for number, view in enumerate(job.views)
         ]
         self.device.check_memory(sum(needs), "a picture in passes", largest=max(needs))

@@ -64,7 +64,7 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
                 _enlarge(found, film, divider)
             stage = {8: "8th", 4: "4th", 2: "2nd"}[divider]
             yield _shown(whole, seconds, f"every {stage} pixel")
-        ranges = pass_ranges(job.samples) if has_room(job, executor) else [(0, job.samples)]
+        ranges = pass_ranges(job.samples) if has_room(job, executor, token) else [(0, job.samples)]
         films = JobFilms(job)
         for samples in ranges:
             before, films = films, JobFilms(job)
@@ -86,12 +86,16 @@ def pass_ranges(samples: int) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-def has_room(job: Job, executor: LocalExecutor) -> bool:
-    """Whether the device has room for the data kept between passes; if not, a message is printed."""
+def has_room(job: Job, executor: LocalExecutor, token: CancelToken | None = None) -> bool:
+    """Whether the device has room for the data kept between passes; if not, a message is printed.
+
+    Raises:
+        DeviceError, KernelBuildError, Stopped: as of `run`.
+    """
     if job.samples == 1:
         return True
     try:
-        executor.check_room(job)
+        executor.check_room(job, token)
     except DeviceError as error:
         if executor.tell is not None:
             executor.tell(f"{error.message}; so all samples are made in one pass")

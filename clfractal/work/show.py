@@ -120,6 +120,16 @@ class Arrangement:
         return self.image if look.stereo is None else picture_size(_joined(look.stereo), self.image)
 
 
+def can_reduce(canvas: Canvas, arrangement: Arrangement, look: Look) -> bool:
+    """Whether a coarse picture may be shown by as many pixels as it has, and enlarged afterwards.
+
+    Not if two eyes' pixels lie between each other, or pictures beside each other: enlarging would mix them.
+    """
+    alone = look.stereo is None or look.stereo.mode in ("left", "right", "anaglyph")
+    coarse = all(part.divider > 1 for part in canvas.parts)
+    return coarse and alone and len(set(arrangement.places)) == 1 and len(canvas.parts) <= 2
+
+
 def _joined(stereo: Stereo) -> Stereo:
     """What is shown of a pair that stays apart in files: both beside each other."""
     return stereo.model_copy(update={"mode": "split"}) if stereo.mode in APART else stereo
@@ -162,14 +172,19 @@ class Shower:
         self._views = device.buffer(SHOWN_VIEW.dtype("float32").itemsize * MOST_VIEWS, "views")
         self._show = device.buffer(SHOW.dtype("float32").itemsize, "how it is shown")
 
-    def enqueue(self, canvas: Canvas, arrangement: Arrangement, look: Look, shown: Any) -> cl.Event:
+    def enqueue(
+        self, canvas: Canvas, arrangement: Arrangement, look: Look, shown: Any, *, reduced: bool = False
+    ) -> cl.Event:
         """Starts the kernel on a canvas whose picture is complete; `shown` is where pixels go, row by row from the top.
+
+        Args:
+            reduced: show only the pixels that the canvas has, see `can_reduce`.
 
         Raises:
             DeviceError: the device failed.
         """
-        record, views = self.records(canvas, arrangement, look)
-        width, height = arrangement.size(look)
+        record, views = self.records(canvas, arrangement, look, reduced=reduced)
+        width, height = int(record["width"][0]), int(record["height"][0])
         size = [-(-side // group) * group for side, group in zip((width, height), GROUP, strict=True)]
         with self.device.failures("showing the picture"):
             cl.enqueue_copy(self.queue, self._views, views)
@@ -181,10 +196,11 @@ class Shower:
 
     @staticmethod
     def records(
-        canvas: Canvas, arrangement: Arrangement, look: Look
+        canvas: Canvas, arrangement: Arrangement, look: Look, *, reduced: bool = False
     ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """The kernel's structs, of the whole and of the views."""
-        width, height = arrangement.size(look)
+        first_part = canvas.parts[0].region
+        width, height = (first_part.width, first_part.height) if reduced else arrangement.size(look)
         eye = arrangement.image if look.stereo is None else eye_size(_joined(look.stereo), arrangement.image)
         mode, first, matrix = _way(look)
         values = {
@@ -203,7 +219,9 @@ class Shower:
         }
         rows = []
         for part, place, side in zip(canvas.parts, arrangement.places, arrangement.eyes, strict=True):
-            region, divider = part.region, part.divider
+            region, divider = part.region, 1 if reduced else part.divider
+            if reduced:
+                place = Place(-region.x, -region.y, region.right, region.bottom)
             left, top = place.x + region.x * divider, place.y + region.y * divider
             right = min(left + region.width * divider, place.x + place.width)
             bottom = min(top + region.height * divider, place.y + place.height)

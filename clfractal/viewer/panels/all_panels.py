@@ -1,9 +1,13 @@
-"""Draws every panel that is open."""
+"""Draws every panel that is open, in the order in which they lie over each other."""
 
 from __future__ import annotations
 
+from clfractal.viewer.panels import scene_dock
 from clfractal.viewer.panels.ui import Ui
 
 
 def draw(ui: Ui) -> None:
     """Draws the panels of one frame, between `imgui.new_frame` and `imgui.render`."""
+    scene_dock.draw(ui)
+
+

@@ -27,6 +27,7 @@ _NAMES = {
     "max_steps": "Most steps",
     "at": "Place",
     "by": "Colour by",
+    "center": "Centre",
     "color": "Colour",
     "colors": "Colours",
 }
@@ -399,7 +400,8 @@ def _describe(label: str, path: str, text: str, differs: bool) -> None:
     with theme.font("bold"):
         imgui.text_unformatted(label)
     if text:
-        imgui.text_unformatted(text[:1].upper() + text[1:])
+        # In files a value is null; here it is switched off.
+        imgui.text_unformatted((text[:1].upper() + text[1:]).replace("null:", "off:"))
     if path:
         with theme.colors(text=theme.FAINT), theme.font("fixed", 12.5):
             imgui.text_unformatted(path)

@@ -270,7 +270,7 @@ def _draw(
             low, high, theme.packed(theme.ACCENT, 0.42 if active else 0.34 if hovered else 0.27), 5.0
         )
         if part < 1:
-            draw.add_line(imgui.ImVec2(end.x - 1, low.y), imgui.ImVec2(end.x - 1, end.y), theme.packed(theme.ACCENT, 0.9), 2.0)
+            draw.add_line(imgui.ImVec2(end.x - 1, low.y), imgui.ImVec2(end.x - 1, end.y), theme.packed(theme.ACCENT, 0.75), 2.0)
         draw.pop_clip_rect()
     if mark is not None:
         draw.add_rect_filled(low, imgui.ImVec2(corner.x + 3, high.y), theme.packed(mark), 2.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Sequence
 from functools import lru_cache
 from typing import Any
@@ -21,7 +22,7 @@ from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
-_FAMILIAR = ("viridis", "magma", "inferno", "plasma", "cividis", "turbo", "twilight", "coolwarm", "gray", "cubehelix")
+_FAMILIAR = ("viridis", "magma", "inferno", "plasma", "cividis", "turbo", "twilight", "RdBu", "gray", "cubehelix")
 _STRIP, _HANDLE = 24.0, 7.0
 _FAR = 34.0
 """A stop that is dragged so far from its strip is removed."""
@@ -127,9 +128,11 @@ def _pixels(palette: str | tuple[Stop, ...]) -> tuple[Hashable, npt.NDArray[np.u
 
 @lru_cache(maxsize=1)
 def _known() -> list[str]:
-    """Short names of all palettes, our own first."""
-    others = sorted({name for name in names() if ":" not in name and not name.endswith("_r")} - set(PALETTES))
-    return [*PALETTES, *others]
+    """Names of all palettes, our own first; in full where a short name belongs to several."""
+    full = [name for name in names() if ":" in name and not name.endswith("_r")]
+    often = Counter(name.split(":")[-1].lower() for name in full)
+    short = {name if often[name.split(":")[-1].lower()] > 1 else name.split(":")[-1] for name in full}
+    return [*PALETTES, *sorted(short - set(PALETTES), key=str.lower)]
 
 
 def _reverse_named(ui: Ui, path: str, palette: str) -> None:

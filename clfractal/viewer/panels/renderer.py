@@ -14,7 +14,7 @@ from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas, plain
 from clfractal.viewer.panels.ui import Ui
 
-KINDS = {"surface": "Surface", "volume": "Volume", "cut_plane": "Cut plane"}
+KINDS = {"surface": "Surface", "volume": "Volume", "cut_plane": "Plane"}
 # A volume's grid takes a moment to fill, so the first one is small.
 _FIRST_RESOLUTION = 192
 

@@ -198,7 +198,8 @@ def field(
 def number(ui: Ui, path: str, label: str, current: float, scale: Scale, *, default: float | None, tip: str) -> None:
     """A number that the schema does not know of by itself (a formula's parameter): as `field`."""
     different = default is not None and current != default
-    reset = (lambda: _set(ui, path, default)) if default is not None else None
+    usual = int(default) if default is not None and scale.whole else default
+    reset = (lambda: _set(ui, path, usual)) if default is not None else None
     width = row(ui, label, path=path, tip=tip, differs=different, reset=reset)
     if width is None:
         return
