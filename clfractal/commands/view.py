@@ -48,7 +48,8 @@ def view(options: Options, shell: Shell) -> None:
     settings, remark = load_settings()
     if remark:
         shell.say(remark)
-    sys.setswitchinterval(0.001)  # the window's thread must not wait long for the others
+    sys.setswitchinterval(0.0002)  # the window's thread must not wait long for the others
+    shell.mute_drivers()
     begun = begin(options)
     from clfractal.viewer.app import Viewer
 

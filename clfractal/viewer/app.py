@@ -84,6 +84,7 @@ class Viewer:
         self.small = gl.SmallTextures()
         self.surface = self._new_surface()
         self.ui = Ui(self.studio, settings, settings.key_map, self.small, self.act)
+        self.ui.memory["controls"] = self.controls
         self.deeds = Deeds(self)
         self.deeds.scene.first_stereo = self._screen
         self.inputs = Inputs(self, begun.recording)

@@ -267,8 +267,9 @@ class Controls:
             return
         image = self.studio.shown_scene.image
         width, height = image.width, image.height
-        _, *first = in_eye(self.studio.scene.stereo, (width, height), *start)
-        _, *second = in_eye(self.studio.scene.stereo, (width, height), *place)
+        stereo = self.studio.screens(self.studio.scene.stereo)
+        _, *first = in_eye(stereo, (width, height), *start)
+        _, *second = in_eye(stereo, (width, height), *place)
         left, right = sorted((min(max(first[0], 0), width), min(max(second[0], 0), width)))
         top, bottom = sorted((min(max(first[1], 0), height), min(max(second[1], 0), height)))
         region = (int(left), int(top), int(right) - int(left), int(bottom) - int(top))

@@ -64,9 +64,10 @@ class CopyTarget:
     def end(self, queue: cl.CommandQueue) -> None:
         """See `Target`."""
         width, height = self.size
-        self._mapped, event = cl.enqueue_map_buffer(
-            queue, self._buffer, cl.map_flags.READ, 0, (height, width, 4), np.uint8, is_blocking=False
+        found: Any = cl.enqueue_map_buffer(
+            queue, self._buffer, cl.map_flags.READ, 0, (height, width, 4), np.dtype(np.uint8), is_blocking=False
         )
+        self._mapped, event = found
         event.wait()
         self.pixels = self._mapped
 

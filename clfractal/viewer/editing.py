@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from pydantic import ValidationError
 
 from clfractal.errors import SceneError, Where
 from clfractal.files.marks import Document, node_from_plain
+from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.load import check_scene
 from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
@@ -70,11 +72,24 @@ def edited(scene: Scene, values: Mapping[str, Any]) -> Scene:
             if sections[first] is None:
                 sections[first] = {}
             _put(sections[first], parts, value, path)
+    return replaced(scene, sections)
+
+
+def replaced(scene: Scene, sections: Mapping[str, Any]) -> Scene:
+    """A scene with other sections, plain or checked ones, as a whole checked as a scene file is.
+
+    Raises:
+        SceneError, FormulaError, FileError: they are wrong, or do not fit the others.
+    """
     fields: dict[str, Any] = {name: getattr(scene, name) for name in Scene.model_fields}
     try:
         checked = Scene.model_validate({**fields, **sections})
     except ValidationError as error:
-        document = Document(node_from_plain({**scene.resolved(), **sections}, None))
+        plain = {
+            name: _plain(value) if not isinstance(value, FormulaSpec) else value.mapping()
+            for name, value in sections.items()
+        }
+        document = Document(node_from_plain({**scene.resolved(), **plain}, None))
         raise first_error(error, document) from error
     result = scene.model_copy(update={name: getattr(checked, name) for name in sections})
     check_scene(result)
@@ -82,7 +97,7 @@ def edited(scene: Scene, values: Mapping[str, Any]) -> Scene:
 
 
 def _put(value: Any, parts: list[str], new: Any, path: str) -> None:
-    for part, after in zip(parts[:-1], parts[1:], strict=True):
+    for part, after in pairwise(parts):
         made: Any = [] if after.isdecimal() else {}
         value = _child(value, part, path, made)
     last = parts[-1]

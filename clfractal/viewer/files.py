@@ -35,7 +35,6 @@ class Files:
         remarks: lines for the user about the start.
         recovered: unsaved changes of windows that ended without saving; panels offer them.
         reload_problem: why the file that changed on the disk cannot be shown; empty if it can.
-        leaving: whether the user asked to close the window and there are unsaved changes.
     """
 
     def __init__(self, options: Options) -> None:
@@ -44,7 +43,6 @@ class Files:
         self.remarks: list[str] = []
         self.recovered: list[Recovered] = []
         self.reload_problem = ""
-        self.leaving = False
         self._viewer: Viewer | None = None
         self._autosave = Autosave()
         self._autosaved = 0.0
@@ -249,10 +247,10 @@ class Files:
             self.reload()
 
     def ask_to_close(self) -> None:
-        """Closes the window, or asks first if something is unsaved."""
-        if self.viewer.studio.unsaved and self.options.shot is None and not self.leaving:
-            self.leaving = True
-            self.viewer.ui.show.add("close")
+        """Closes the window, or asks first if something is unsaved; asked while it asks, it closes."""
+        shown = self.viewer.ui.show
+        if self.viewer.studio.unsaved and self.options.shot is None and "close" not in shown:
+            shown.add("close")
         else:
             self.leave()
 

@@ -63,9 +63,11 @@ class HistogramTask:
         try:
             self.found = _filled(self.scene, executor, token, tell)
         except ClfractalError as error:
-            if token.cancelled:
-                raise
-            self.problem = error.message
+            self.failed(error)
+
+    def failed(self, error: ClfractalError) -> None:
+        """See `background.Task`."""
+        self.problem = error.message
 
 
 def _filled(scene: Scene, executor: LocalExecutor, token: CancelToken, tell: Tell) -> Histogram:

@@ -57,14 +57,14 @@ def in_eye(stereo: Stereo | None, image: tuple[int, int], x: float, y: float) ->
     return int(second != stereo.swap), x, y
 
 
-def picked(shown: Shown, stereo: Stereo | None, x: float, y: float) -> Pick | None:
+def picked(shown: Shown, x: float, y: float) -> Pick | None:
     """What is shown at a place of the window; None outside the picture.
 
     Args:
-        stereo: how the picture is shown.
         x, y: pixels of the picture as it is shown, from the top left.
     """
     arrangement = shown.frame.arrangement
+    stereo = arrangement.fitting(shown.look).stereo
     eye, across, down = in_eye(stereo, arrangement.image, x, y)
     numbers = range(len(arrangement.places))
     for number in reversed(numbers):

@@ -74,7 +74,7 @@ class SceneDeeds:
             "redo_camera": lambda: self._undo("camera", self.studio.redo),
             "exposure_down": lambda: self._expose(-0.25),
             "exposure_up": lambda: self._expose(0.25),
-            "exposure_reset": lambda: self._edit({"output.exposure": self.studio.saved.output.exposure}),
+            "exposure_reset": self._reset_exposure,
             "next_renderer": self.next_renderer,
             "region": self._choose_region,
             "region_clear": lambda: self.studio.set_region(None),
@@ -335,6 +335,9 @@ class SceneDeeds:
 
     def _expose(self, stops: float) -> None:
         self._edit({"output.exposure": round(self.studio.scene.output.exposure + stops, 3)})
+
+    def _reset_exposure(self) -> None:
+        self._edit({"output.exposure": self.studio.saved.output.exposure})
 
     def _undo(self, kind: Any, how: Callable[[Any], bool]) -> None:
         self.motion.stop()

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, Stopped
+from clfractal.pictures.tiles import Region
+from clfractal.renderers.plan import PlannedView
+from clfractal.renderers.resources import Borrowing
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import Task
 from clfractal.viewer.fitting import Fits
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.viewer.pacing import Pacing, Schedule
 from clfractal.work.canvas import CHANNELS, Canvas, CanvasKernels, CanvasStore
-from clfractal.pictures.tiles import Region
-from clfractal.renderers.plan import PlannedView
-from clfractal.renderers.resources import Borrowing
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
@@ -292,6 +292,7 @@ class Session:
             if front is not None and len(front.canvas.parts) == len(work.canvas.parts):
                 self._writer.enlarge(front.canvas, work.canvas)
                 work.prepared = True
+        if not work.begun:
             work.begin(in_passes=has_room(work.part, self._executor, token))
         while work.ranges:
             try:
@@ -435,7 +436,7 @@ class _Gathering:
         self.part, self.numbers = _clipped(job, wanted.region)
         self.canvas: Canvas | None = None
         self.ranges: list[tuple[int, int]] = []
-        self.in_passes = False
+        self.begun = self.in_passes = False
         self.schedule = Schedule(0.0)
         self.samples = 0
         self.prepared = False
@@ -444,7 +445,7 @@ class _Gathering:
     def begin(self, *, in_passes: bool) -> None:
         """All samples are still to be made, in passes or at once."""
         samples = self.part.samples
-        self.in_passes = in_passes
+        self.begun, self.in_passes = True, in_passes
         self.ranges = pass_ranges(samples) if in_passes else [(0, samples)]
         self.schedule = Schedule(time.perf_counter())
 

@@ -19,7 +19,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
-from clfractal.viewer.editing import edited, value_at
+from clfractal.viewer.editing import edited, replaced, value_at
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.history import History, Kind
 from clfractal.viewer.live import with_live
@@ -101,7 +101,7 @@ class Studio:
             self.problems.pop(path, None)
         if gesture is not None:
             self._live = tuple(
-                path.rsplit(".", 1)[1] for path in values if path.startswith("formula.parameters.")
+                path.split(".")[2] for path in values if path.startswith("formula.parameters.")
             )
         self._replace(changed, gesture)
         return True
@@ -145,11 +145,11 @@ class Studio:
 
     def undo(self, kind: Kind = "scene") -> bool:
         """Takes back the last step of one stack; whether there was one."""
-        return self._restore(self.history.undo(kind))
+        return self._restore(self.history.undo(kind), lambda: self.history.redo(kind))
 
     def redo(self, kind: Kind = "scene") -> bool:
         """Repeats the step that was taken back last."""
-        return self._restore(self.history.redo(kind))
+        return self._restore(self.history.redo(kind), lambda: self.history.undo(kind))
 
     @property
     def unsaved(self) -> bool:
@@ -214,7 +214,8 @@ class Studio:
         moving = time.perf_counter() < self._moving_until
         live = self._live if moving else ()
         key = (render_key(self.shown_scene), self.region, live)
-        if not again and key == self._requested and not (self.session.frame is None and not moving):
+        failed = self.session.frame is None and self.session.problem is not None and not moving
+        if not again and key == self._requested and not failed:
             return
         self._requested = key
         wanted = with_live(key[0], live) if live else key[0]
@@ -232,13 +233,16 @@ class Studio:
 
     def pick(self, x: float, y: float, depths: Any) -> Pick | None:
         """What lies under a pixel of the window; None if nothing was rendered there yet. See `picking.picked`."""
-        return picked(depths, self.screens(self.scene.stereo), x, y) if depths is not None else None
+        return picked(depths, x, y) if depths is not None else None
 
     def use_device(self, device: Device) -> None:
         """Goes on with another device; the last picture stays until the new one is there."""
         self.session.close()
+        tasks = self.session.take_tasks()
         self.session = Session(device, self.pacing, self.woken)
         self.session.start()
+        for task in tasks:
+            self.session.add(task)
         self._requested = None
         self.refresh()
 
@@ -293,10 +297,17 @@ class Studio:
         self._moving_until = time.perf_counter() + 0.4 if gesture is not None else 0.0
         self.refresh()
 
-    def _restore(self, sections: dict[str, Any] | None) -> bool:
+    def _restore(self, sections: dict[str, Any] | None, back: Callable[[], Any]) -> bool:
         if sections is None:
             return False
-        self.scene = self.scene.model_copy(update=sections)
+        try:
+            changed = replaced(self.scene, sections)
+        except ClfractalError as error:
+            # The other stack has moved on: a step of stereo does not fit an orthographic camera, for example.
+            back()
+            self.tell(f"this step does not fit the present scene: {error}", wrong=True)
+            return True
+        self.scene = changed
         self._moving_until = 0.0
         self.refresh()
         return True

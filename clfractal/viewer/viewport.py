@@ -44,11 +44,11 @@ def image_of(stereo: Stereo | None, viewport: tuple[int, int]) -> tuple[int, int
 
 def render_key(scene: Scene) -> Scene:
     """The scene without what only concerns showing and saving: pictures of scenes with equal keys have the same rays."""
-    update: dict[str, object] = {"output": Output()}
+    update: dict[str, object] = {"output": Output.model_validate({})}
     if "bookmarks" in Scene.model_fields:
         update["bookmarks"] = {}
     if scene.stereo is not None:
-        plain = Stereo()
+        plain = Stereo.model_validate({})
         shown = {name: getattr(plain, name) for name in ("swap", "method", "glasses", "colors")}
         mode = "pair" if scene.stereo.mode in _WHOLE else scene.stereo.mode
         update["stereo"] = scene.stereo.model_copy(update={**shown, "mode": mode})

@@ -24,6 +24,11 @@ ROW_GROUP = (16, 1)
 PIXEL_GROUP = (32, 8)
 
 
+def whole_groups(size: tuple[int, int], group: tuple[int, int]) -> tuple[int, int]:
+    """The smallest global size of whole work-groups that covers a size."""
+    return -(-size[0] // group[0]) * group[0], -(-size[1] // group[1]) * group[1]
+
+
 @dataclass(frozen=True, slots=True)
 class Part:
     """Where a canvas holds one view's picture.
@@ -92,10 +97,7 @@ class CanvasKernels:
                 np.float32(was.width / region.width),
                 np.float32(was.height / region.height),
             )
-            size = [
-                -(-side // group) * group
-                for side, group in zip((region.width, region.height), PIXEL_GROUP, strict=True)
-            ]
+            size = whole_groups((region.width, region.height), PIXEL_GROUP)
             with self.device.failures("enlarging a picture"):
                 cl.enqueue_nd_range_kernel(self.device.queue, self._enlarge, size, PIXEL_GROUP)
         self.device.queue.flush()

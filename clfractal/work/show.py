@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,8 +19,8 @@ from clfractal.files import srgb
 from clfractal.pictures.anaglyph import matrices
 from clfractal.pictures.compose import BELOW, BESIDE, Side, eye_size, picture_size
 from clfractal.scene.layout import Place
-from clfractal.scene.stereo import APART, Stereo
-from clfractal.work.canvas import Canvas
+from clfractal.scene.stereo import APART, Mode, Stereo
+from clfractal.work.canvas import Canvas, whole_groups
 from clfractal.work.job import Identity, Job, StereoPair
 
 MOST_VIEWS = 64
@@ -87,12 +87,14 @@ class Arrangement:
         eyes: of each view, 0 (left, or none) or 1.
         places: of each view in its eye's picture.
         background: between views, linear.
+        stereo: the section that was rendered; None without stereo.
     """
 
     image: tuple[int, int]
     eyes: tuple[int, ...]
     places: tuple[Place, ...]
     background: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0))
+    stereo: Stereo | None = None
 
     @classmethod
     def of(cls, job: Job) -> Arrangement:
@@ -113,11 +115,31 @@ class Arrangement:
                     places[number] = place
             for number in numbers:
                 eyes[number] = int(side == "right")
-        return cls(image, tuple(eyes), tuple(places), background)
+        return cls(image, tuple(eyes), tuple(places), background, job.scene.stereo)
+
+    def fitting(self, look: Look) -> Look:
+        """The look, or the nearest one that these views can be shown with.
+
+        For a moment a window has a picture that was rendered for another way of stereo than the one just chosen: without a
+        second eye, or with eyes squeezed in another way. (Scenes are checked, so a squeezed picture can be halved.)
+        """
+        have, want = self.stereo, look.stereo
+        if have is None:
+            return look if want is None else replace(look, stereo=None)
+        squeeze = (1, 1) if want is None else want.squeeze
+        if squeeze == have.squeeze:
+            eyes = {"left": {0}, "right": {1}}.get(want.mode if want is not None else "left", {0, 1})
+            if eyes <= set(self.eyes):
+                return look
+        if have.squeeze != (1, 1):
+            return replace(look, stereo=have)
+        mode: Mode = "left" if 0 in self.eyes else "right"
+        return replace(look, stereo=have.model_copy(update={"mode": mode}))
 
     def size(self, look: Look) -> tuple[int, int]:
         """Width and height of what is shown."""
-        return self.image if look.stereo is None else picture_size(_joined(look.stereo), self.image)
+        stereo = self.fitting(look).stereo
+        return self.image if stereo is None else picture_size(_joined(stereo), self.image)
 
 
 def can_reduce(canvas: Canvas, arrangement: Arrangement, look: Look) -> bool:
@@ -125,6 +147,7 @@ def can_reduce(canvas: Canvas, arrangement: Arrangement, look: Look) -> bool:
 
     Not if two eyes' pixels lie between each other, or pictures beside each other: enlarging would mix them.
     """
+    look = arrangement.fitting(look)
     alone = look.stereo is None or look.stereo.mode in ("left", "right", "anaglyph")
     coarse = all(part.divider > 1 for part in canvas.parts)
     return coarse and alone and len(set(arrangement.places)) == 1 and len(canvas.parts) <= 2
@@ -185,7 +208,7 @@ class Shower:
         """
         record, views = self.records(canvas, arrangement, look, reduced=reduced)
         width, height = int(record["width"][0]), int(record["height"][0])
-        size = [-(-side // group) * group for side, group in zip((width, height), GROUP, strict=True)]
+        size = whole_groups((width, height), GROUP)
         with self.device.failures("showing the picture"):
             cl.enqueue_copy(self.queue, self._views, views)
             cl.enqueue_copy(self.queue, self._show, record)
@@ -199,6 +222,7 @@ class Shower:
         canvas: Canvas, arrangement: Arrangement, look: Look, *, reduced: bool = False
     ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """The kernel's structs, of the whole and of the views."""
+        look = arrangement.fitting(look)
         first_part = canvas.parts[0].region
         width, height = (first_part.width, first_part.height) if reduced else arrangement.size(look)
         eye = arrangement.image if look.stereo is None else eye_size(_joined(look.stereo), arrangement.image)

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.files.srgb import decode, encode
 from clfractal.viewer.panels import theme
-from clfractal.viewer.panels.layout import tip
+from clfractal.viewer.panels.buttons import tip
 from clfractal.viewer.panels.ui import Ui
 
 Color = tuple[float, float, float]
@@ -63,7 +63,11 @@ def color_button(ui: Ui, path: str, color: Sequence[float], width: float, *, hei
 def _pick(ui: Ui, path: str, codes: Color, gain: float) -> None:
     """The picker; while it is used, its own codes are kept: those of a grey or black forget their hue."""
     known = ui.memory.get("picker")
-    if known is not None and known[0] == path and np.allclose(linear(known[1], gain), linear(codes, gain), atol=1e-5):
+    if (
+        known is not None
+        and known[0] == path
+        and np.allclose(linear(known[1], gain), linear(codes, gain), atol=1e-5)
+    ):
         codes = known[1]
     flags = (
         imgui.ColorEditFlags_.no_side_preview

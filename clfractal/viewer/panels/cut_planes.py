@@ -136,7 +136,9 @@ def _cut_plane(ui: Ui, index: int) -> None:
 def _own_plane(ui: Ui) -> None:
     if not w.filtering(ui):
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
-        if w.button("Show it in the object", icon=theme.CUBE, width=-1, about="The surface, cut open at this plane"):
+        if w.button(
+            "Show it in the object", icon=theme.CUBE, width=-1, about="The surface, cut open at this plane"
+        ):
             shown = ui.studio.scene.renderer
             assert isinstance(shown, CutPlaneRenderer)
             plane = {"plane": plain(shown.plane), "colors": plain(shown.colors), "opacity": 1.0, "cut": True}
@@ -188,7 +190,10 @@ def _placed(ui: Ui, path: str, plane: Plane) -> None:
     steps = f" and {len(plane.transform)} steps" if plane.transform else ""
     center = ", ".join(f"{each:.5g}" for each in placed.center)
     normal = ", ".join(f"{each + 0.0:.4g}" for each in placed.normal)
-    w.hint(ui, f"Given by {kind}{steps}.\nMiddle {center}\nNormal {normal}\n{placed.width:.5g} x {placed.height:.5g}")
+    w.hint(
+        ui,
+        f"Given by {kind}{steps}.\nMiddle {center}\nNormal {normal}\n{placed.width:.5g} x {placed.height:.5g}",
+    )
     if w.filtering(ui):
         return
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
@@ -234,9 +239,7 @@ def _amount(ui: Ui, sizes: dict[str, float], key: str, label: str, scale: w.Scal
         sizes[key] = change.value
 
 
-def _step(
-    ui: Ui, path: str, label: str, change: Callable[[float], Plane], about: str = ""
-) -> None:
+def _step(ui: Ui, path: str, label: str, change: Callable[[float], Plane], about: str = "") -> None:
     """A row with a button for either way."""
     width = w.row(ui, label, path=f"{path}.{label}", tip=about)
     if width is None:

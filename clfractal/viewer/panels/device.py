@@ -29,7 +29,9 @@ def draw(ui: Ui) -> None:
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
         if w.button("Look again", icon=theme.REFRESH, about="Find devices that were plugged in"):
             ui.memory.pop("devices", None)
-    w.field(ui, "renderer.precision", "Numbers", segmented=True, words={"float32": "32 bit", "float64": "64 bit"})
+    w.field(
+        ui, "renderer.precision", "Numbers", segmented=True, words={"float32": "32 bit", "float64": "64 bit"}
+    )
     w.group(ui, "While something moves")
     _setting(ui, "frame_rate", "Frames a second", w.Scale(1, 240, (5, 120)))
     _flag(ui, "coarse", "May be coarse", f"coarse pictures while moving ({ui.keys.hint('coarse')})")

@@ -31,7 +31,7 @@ class Difference:
 
 
 def differences(scene: Scene) -> list[Difference]:
-    """All values that are not the defaults of their sections, in the schema's order; the formula's own are not among them."""
+    """All values that are not the defaults of their sections, in the schema's order; without the formula's own."""
     found: list[Difference] = []
     for name, meta in metas(Scene).items():
         if name in _LEFT_OUT:

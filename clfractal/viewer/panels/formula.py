@@ -75,7 +75,9 @@ def _choice(ui: Ui) -> None:
     text = titles().get(formula.name or "", ui.studio.scene.chain.title or "Own formula")
     about = ui.studio.scene.chain.first.formula.description if len(ui.studio.scene.chain.links) == 1 else ""
     with theme.measures(button_text_align=(0.0, 0.5)):
-        if w.button(f"{text}##formula", width=wide - 2 * (height + 4), about=about or "Choose another formula"):
+        if w.button(
+            f"{text}##formula", width=wide - 2 * (height + 4), about=about or "Choose another formula"
+        ):
             imgui.open_popup("##library")
     w.in_row(4)
     on = "formula_editor" in ui.show
@@ -195,7 +197,8 @@ def _julia(ui: Ui, path: str, bound: BoundFormula) -> None:
             start = kept.get(path, list(own or first))
             _put(ui, place, None if given is not None else start if len(start) == len(first) else first)
     given = w.value(ui, place)
-    for index, number in enumerate(given or ()):
+    before = list(given or ())
+    for index, number in enumerate(before):
         name = bound.formula.variables[index]
         width = w.row(ui, f"Constant {name}", path=f"{place}.{index}", tip="what is added to this variable")
         if width is None:
@@ -203,7 +206,6 @@ def _julia(ui: Ui, path: str, bound: BoundFormula) -> None:
         mark = theme.AXES[index] if index < 3 else theme.SECOND
         scale = w.Scale(-1e6, 1e6, (-2, 2))
         change = w.number_box(w.boxes(ui), f"{place}.{index}", float(number), width, scale, mark=mark)
-        before = list(given)
         w.apply(ui, place, change, lambda new, at=index: [*before[:at], new, *before[at + 1 :]])  # type: ignore[misc]
     w.problem(ui, place)
 
@@ -216,7 +218,7 @@ def _open_chain(ui: Ui) -> None:
     spec = ui.studio.value("formula")
     common = {name: spec[name] for name in ("iterations", "bailout", "distance_bailout") if name in spec}
     if spec.get("name") and catalog.is_chain(spec["name"]):
-        inline = {key: value for key, value in catalog.description(spec["name"]).items()}
+        inline = dict(catalog.description(spec["name"]))
         julia = {"julia": spec["julia"]} if "julia" in spec else {}
         ui.studio.edit({"formula": {"inline": inline, **common, **julia}})
         return

@@ -78,11 +78,15 @@ def text_of(spec: FormulaSpec) -> str:
 def applied(spec: FormulaSpec, inline: dict[str, Any]) -> dict[str, Any]:
     """The scene's `formula` with another text: values of parameters that the text still has stay, as far as they fit."""
     kept = spec.mapping()
-    found = {
+    found: dict[str, Any] = {
         name: kept[name] for name in ("iterations", "bailout", "distance_bailout") if name in kept
     }
     known = inline.get("parameters")
-    values = {name: value for name, value in kept.get("parameters", {}).items() if isinstance(known, dict) and name in known}
+    values = {
+        name: value
+        for name, value in kept.get("parameters", {}).items()
+        if isinstance(known, dict) and name in known
+    }
     for more in ({"parameters": values, "julia": kept.get("julia")}, {"julia": kept.get("julia")}, {}):
         given = {name: value for name, value in more.items() if value}
         try:
@@ -101,9 +105,7 @@ def draw(ui: Ui) -> None:
     _follow(ui, state)
     wide, high = min(_WIDTH, ui.size[0] - 40), min(_HEIGHT, ui.size[1] - 40)
     left = min(theme.DOCK_LEFT + 3 * theme.MARGIN, ui.size[0] - wide - theme.MARGIN)
-    imgui.set_next_window_pos(
-        imgui.ImVec2(left, ui.size[1] - high - theme.MARGIN), imgui.Cond_.appearing
-    )
+    imgui.set_next_window_pos(imgui.ImVec2(left, ui.size[1] - high - theme.MARGIN), imgui.Cond_.appearing)
     imgui.set_next_window_size(imgui.ImVec2(wide, high), imgui.Cond_.appearing)
     shown, still_open = imgui.begin(
         _TITLE, True, imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_collapse
@@ -118,7 +120,7 @@ def draw(ui: Ui) -> None:
 def _follow(ui: Ui, state: Editing) -> None:
     """Takes over a formula that was changed elsewhere: chosen, undone, or of another scene."""
     spec = ui.studio.scene.formula
-    source = (spec.name, spec.file, spec.inline, spec.chain if spec.inline is None else None)
+    source = _source(spec)
     if source == state.source:
         return
     state.source = source
@@ -134,6 +136,11 @@ def _follow(ui: Ui, state: Editing) -> None:
         ui.studio.tell(str(error), wrong=True)
         return
     _fill(state)
+
+
+def _source(spec: FormulaSpec) -> Any:
+    """The part of a scene's formula that the text stands for; not parameters, iterations and radii beside it."""
+    return (spec.name, spec.file, spec.inline, spec.chain)
 
 
 def _fill(state: Editing) -> None:
@@ -179,6 +186,7 @@ def check(ui: Ui, state: Editing) -> None:
     if not ui.studio.edit({"formula": applied(spec, inline)}):
         # The text is a formula, but not for this scene (a zoom beyond its bounds, for example).
         state.error = FormulaError(ui.studio.problems.pop("formula", "does not fit this scene"))
+    state.source = _source(ui.studio.scene.formula)
 
 
 def _is_library(spec: FormulaSpec, inline: dict[str, Any]) -> bool:

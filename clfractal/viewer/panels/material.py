@@ -63,7 +63,9 @@ def _background(ui: Ui) -> None:
         if found is not None:
             kept = ui.memory.setdefault("background.kept", {})
             if found:
-                kept.update(top=list(w.value(ui, "background.top")), bottom=list(w.value(ui, "background.bottom")))
+                kept.update(
+                    top=list(w.value(ui, "background.top")), bottom=list(w.value(ui, "background.bottom"))
+                )
             _put(ui, "background", "transparent" if found else dict(kept))
     if ui.studio.scene.background != "transparent":
         w.fields(ui, "background", ("top", "bottom"))
@@ -94,7 +96,9 @@ def _map(ui: Ui) -> None:
     width = w.row(ui, "Map", path="environment.name", tip=about)
     if width is None:
         return
-    found = w.choose("environment.name", {name: w.word(name) for name in names()}, environment.name or "", width)
+    found = w.choose(
+        "environment.name", {name: w.word(name) for name in names()}, environment.name or "", width
+    )
     if found is not None:
         _put(ui, "environment.name", found)
     w.problem(ui, "environment.name")

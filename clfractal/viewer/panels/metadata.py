@@ -154,6 +154,11 @@ def meta_of(section: type[Section], name: str) -> Meta | None:
     return metas(section).get(name)
 
 
+def by_magnitude(usual: tuple[float, float]) -> bool:
+    """Whether a slider over this range is divided by magnitudes."""
+    return usual[0] > 0 and usual[1] / usual[0] > _DECADES
+
+
 def all_sections() -> list[type[Section]]:
     """Every class of section that a scene may hold, the scene's own first."""
     found: list[type[Section]] = [Scene]
@@ -189,7 +194,7 @@ def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
     if kind == "vector" and size == 3 and low == 0:
         kind = "color"
     usual = _usual(section, name, kind, low, high)
-    log = usual is not None and usual[0] > 0 and usual[1] / usual[0] > _DECADES
+    log = usual is not None and by_magnitude(usual)
     return Meta(
         name,
         kind,

@@ -79,6 +79,7 @@ class Boxes:
         start: the value at the drag's beginning.
         travel: of the drag, points of normal speed.
         moved: whether the pointer has moved in this drag.
+        all_selected: whether the whole text is to be selected, as a double click on a box asks for.
     """
 
     typing: str = ""
@@ -88,6 +89,7 @@ class Boxes:
     start: float = 0.0
     travel: float = 0.0
     moved: bool = False
+    all_selected: bool = False
 
 
 def number_box(
@@ -240,8 +242,18 @@ def _typed(boxes: Boxes, name: str, width: float, scale: Scale) -> Change:
         boxes.fresh = False
     # Tab goes to the next box: as a character it is seen here, instead of going where Dear ImGui sends it.
     flags = imgui.InputTextFlags_.auto_select_all | imgui.InputTextFlags_.allow_tab_input
+    flags |= imgui.InputTextFlags_.callback_always
     before = boxes.text
-    _, boxes.text = imgui.input_text(f"##{name}.text", boxes.text, flags)
+
+    def select(data: Any) -> int:
+        if boxes.all_selected:
+            boxes.all_selected = False
+            data.select_all()
+        return 0
+
+    _, boxes.text = imgui.input_text(f"##{name}.text", boxes.text, flags, select)
+    # The first click of two has begun to type; the second would select a word of the number.
+    boxes.all_selected |= imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0)
     tab = "\t" in boxes.text
     ended = imgui.is_item_deactivated() or (not began and not imgui.is_item_active() and before == boxes.text)
     if not (tab or ended):
@@ -270,7 +282,12 @@ def _draw(
             low, high, theme.packed(theme.ACCENT, 0.42 if active else 0.34 if hovered else 0.27), 5.0
         )
         if part < 1:
-            draw.add_line(imgui.ImVec2(end.x - 1, low.y), imgui.ImVec2(end.x - 1, end.y), theme.packed(theme.ACCENT, 0.75), 2.0)
+            draw.add_line(
+                imgui.ImVec2(end.x - 1, low.y),
+                imgui.ImVec2(end.x - 1, end.y),
+                theme.packed(theme.ACCENT, 0.75),
+                2.0,
+            )
         draw.pop_clip_rect()
     if mark is not None:
         draw.add_rect_filled(low, imgui.ImVec2(corner.x + 3, high.y), theme.packed(mark), 2.0)
@@ -321,8 +338,10 @@ _TWO: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 def _value(node: ast.expr) -> float:
     """The value of a parsed sum of numbers; ValueError for anything else."""
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        return float(node.value)
+    if isinstance(node, ast.Constant):
+        if isinstance(node.value, (int, float)) and not isinstance(node.value, bool):
+            return float(node.value)
+        raise ValueError("no number")
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
         return -_value(node.operand) if isinstance(node.op, ast.USub) else _value(node.operand)
     if isinstance(node, ast.BinOp) and type(node.op) in _TWO:

@@ -22,7 +22,18 @@ from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
-_FAMILIAR = ("viridis", "magma", "inferno", "plasma", "cividis", "turbo", "twilight", "RdBu", "gray", "cubehelix")
+_FAMILIAR = (
+    "viridis",
+    "magma",
+    "inferno",
+    "plasma",
+    "cividis",
+    "turbo",
+    "twilight",
+    "colorbrewer:RdBu",
+    "gray",
+    "cubehelix",
+)
 _STRIP, _HANDLE = 24.0, 7.0
 _FAR = 34.0
 """A stop that is dragged so far from its strip is removed."""
@@ -102,7 +113,9 @@ def moved(stops: list[dict[str, Any]], index: int, at: float) -> tuple[list[dict
     """The stops with one at another place, in order again, and that one's new index."""
     one = {**stops[index], "at": round(min(max(at, 0.0), 1.0), 4)}
     others = [stop for number, stop in enumerate(stops) if number != index]
-    place = sum(stop["at"] < one["at"] or (stop["at"] == one["at"] and n < index) for n, stop in enumerate(others))
+    place = sum(
+        stop["at"] < one["at"] or (stop["at"] == one["at"] and n < index) for n, stop in enumerate(others)
+    )
     return [*others[:place], one, *others[place:]], place
 
 
@@ -147,10 +160,11 @@ def _list(ui: Ui, path: str) -> None:
     if not imgui.begin_popup(f"##{path}.list"):
         return
     text = w.search(ui, "palette.search", "Find among all palettes").strip().lower()
-    if text:
-        found = [each for each in _known() if text in each.lower()][:_MOST_FOUND]
-    else:
-        found = [*PALETTES, *_FAMILIAR]
+    found = (
+        [*PALETTES, *_FAMILIAR]
+        if not text
+        else [each for each in _known() if text in each.lower()][:_MOST_FOUND]
+    )
     imgui.begin_child("##palettes", imgui.ImVec2(0, 0))
     wide = imgui.get_content_region_avail().x
     for name in found:
@@ -184,9 +198,7 @@ def _editor(ui: Ui, path: str, stops: list[dict[str, Any]], width: float) -> Non
     w.field(ui, f"{path}.{chosen}.color")
     wide = w.row(ui, "Place", path=f"{path}.{chosen}.at", tip="place in the palette, 0 to 1")
     if wide is not None:
-        change = w.number_box(
-            w.boxes(ui), f"{path}.at", stops[chosen]["at"], wide, w.Scale(0, 1, (0, 1))
-        )
+        change = w.number_box(w.boxes(ui), f"{path}.at", stops[chosen]["at"], wide, w.Scale(0, 1, (0, 1)))
         if change.value is not None:
             new, state["chosen"] = moved(stops, chosen, change.value)
             ui.studio.edit({path: new}, path if change.dragging else None)
@@ -198,7 +210,9 @@ def _editor(ui: Ui, path: str, stops: list[dict[str, Any]], width: float) -> Non
     if w.button("Distribute", about="All stops at equal distances"):
         ui.studio.edit({path: distributed(stops)})
     w.in_row(4)
-    if w.icon_button(theme.PLUS, "Add a stop beside this one (or double click the strip)", enabled=len(stops) < 256):
+    if w.icon_button(
+        theme.PLUS, "Add a stop beside this one (or double click the strip)", enabled=len(stops) < 256
+    ):
         other = stops[chosen + 1] if chosen + 1 < len(stops) else stops[chosen - 1]
         new, state["chosen"] = added(stops, (stops[chosen]["at"] + other["at"]) / 2)
         ui.studio.edit({path: new})

@@ -31,7 +31,7 @@ from clfractal.viewer.panels.ui import Ui
 
 @dataclass(frozen=True, slots=True)
 class _Panel:
-    """A panel of the dock: its heading, what draws it, a summary for the heading's right, and whether it is open at first."""
+    """A panel of the dock: its heading, what draws it, a summary at the heading's right, whether it is open at first."""
 
     key: str
     title: str
@@ -95,9 +95,7 @@ def _dock(ui: Ui) -> None:
     for panel in _PANELS:
         if not panel.shown(ui):
             continue
-        if w.header(
-            ui, panel.key, panel.title, panel.icon, summary=panel.summary(ui), opened=panel.opened
-        ):
+        if w.header(ui, panel.key, panel.title, panel.icon, summary=panel.summary(ui), opened=panel.opened):
             imgui.push_id(panel.key)
             panel.draw(ui)
             imgui.pop_id()

@@ -12,7 +12,7 @@ from clfractal.optics.view import View
 from clfractal.scene.base import length, minus
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
-from clfractal.scene.stereo import Stereo
+from clfractal.scene.stereo import EyeName, Stereo
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
@@ -170,7 +170,7 @@ def under_pointer(ui: Ui) -> tuple[float, float] | None:
     return on_screen, float(geometry.degrees(scene.stereo, on_screen))
 
 
-def _views(scene: Scene) -> dict[geometry.EyeName, View] | None:
+def _views(scene: Scene) -> dict[EyeName, View] | None:
     return _eye_views(_Same(scene))
 
 
@@ -189,7 +189,7 @@ class _Same:
 
 
 @lru_cache(maxsize=4)
-def _eye_views(same: _Same) -> dict[geometry.EyeName, View] | None:
+def _eye_views(same: _Same) -> dict[EyeName, View] | None:
     try:
         return geometry.eye_views(same.scene)
     except ClfractalError:

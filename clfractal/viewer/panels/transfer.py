@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -174,7 +175,7 @@ def _draw_graph(ui: Ui, area: _Area, stops: Stops, colors: Stops | None, chosen:
         imgui.ImVec2(area.x + area.width, area.place(stops[-1]["at"], stops[-1]["opacity"]).y),
     ]
     floor = area.y + area.height
-    for first, second in zip(line[:-1], line[1:], strict=True):
+    for first, second in pairwise(line):
         if second.x > first.x:
             corners = [first, second, imgui.ImVec2(second.x, floor), imgui.ImVec2(first.x, floor)]
             draw.add_convex_poly_filled(corners, theme.packed(theme.ACCENT, 0.16))
@@ -207,7 +208,9 @@ def _draw_histogram(ui: Ui, area: _Area, draw: Any) -> None:
         if right.x < area.x or left.x > area.x + area.width:
             continue
         draw.add_rect_filled(
-            imgui.ImVec2(max(left.x, area.x), left.y), imgui.ImVec2(min(right.x, area.x + area.width), right.y), color
+            imgui.ImVec2(max(left.x, area.x), left.y),
+            imgui.ImVec2(min(right.x, area.x + area.width), right.y),
+            color,
         )
 
 
@@ -220,7 +223,7 @@ def histogram(ui: Ui) -> Histogram | None:
         if known is None or known[0] is not given:
             found = histogram_of(given.values, given.low, given.high)
             known = ui.memory["histogram.given"] = (given, found)
-        return known[1]  # type: ignore[no-any-return]
+        return known[1]
     renderer = scene.renderer
     assert isinstance(renderer, VolumeRenderer)
     parts = {"box", "zoom", "value", "sub_points", "fill"}
@@ -231,7 +234,7 @@ def histogram(ui: Ui) -> Histogram | None:
     if task is None or (task[0] != key and task[1].finished):
         task = ui.memory["histogram.task"] = (key, HistogramTask(scene))
         ui.studio.session.add(task[1])
-    return task[1].found  # type: ignore[no-any-return]
+    return task[1].found
 
 
 # Colours

@@ -80,7 +80,12 @@ def _resolution(ui: Ui, renderer: VolumeRenderer) -> None:
     """One number for the longest side, dragged only when it is let go: each value fills a grid."""
     path, about = "renderer.resolution", "voxels along the longest side, or along x, y and z"
     width = w.row(
-        ui, "Resolution", path=path, tip=about, differs=renderer.resolution != 512, reset=lambda: _put(ui, path, 512)
+        ui,
+        "Resolution",
+        path=path,
+        tip=about,
+        differs=renderer.resolution != 512,
+        reset=lambda: _put(ui, path, 512),
     )
     if width is None:
         return
@@ -90,7 +95,7 @@ def _resolution(ui: Ui, renderer: VolumeRenderer) -> None:
     if three:
         width = w.columns(3)
     else:
-        width -= 34
+        width -= imgui.get_frame_height() + 4
     for index, side in enumerate(sides):
         if index:
             w.in_row(4)
@@ -166,7 +171,11 @@ def _zoom(ui: Ui, renderer: VolumeRenderer) -> None:
     wide = (imgui.get_content_region_avail().x - 4) / 2
     text = "Zoom in" if marking else "Mark a cube"
     hint = f"({ui.keys.hint('zoom_apply')})"
-    about = f"Fill the grid with what is in the cube {hint}" if marking else f"Then drag it; the wheel scales it {hint}"
+    about = (
+        f"Fill the grid with what is in the cube {hint}"
+        if marking
+        else f"Then drag it; the wheel scales it {hint}"
+    )
     if w.button(text, icon=theme.EXPAND, width=wide, primary=marking, about=about):
         ui.act("zoom_apply")
     w.in_row(4)

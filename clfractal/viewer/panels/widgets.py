@@ -11,27 +11,21 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import metadata, theme
+from clfractal.viewer.panels.buttons import button, choose, icon_button, segments, text_box, tip, toggle
 from clfractal.viewer.panels.color_button import color_button
 from clfractal.viewer.panels.layout import (
     boxes,
-    button,
-    choose,
     columns,
     filtering,
     group,
     header,
     hint,
-    icon_button,
     in_row,
     label_of,
     problem,
     row,
     search,
-    segments,
-    text_box,
-    tip,
-    toggle,
     word,
 )
 from clfractal.viewer.panels.metadata import Meta, Target, find, plain
@@ -174,7 +168,12 @@ def field(
     before = ui.studio.scene
     label = label or label_of(meta.name)
     width = row(
-        ui, label, path=path, tip=meta.description, differs=differs(target, meta), reset=_reset(ui, path, meta)
+        ui,
+        label,
+        path=path,
+        tip=meta.description,
+        differs=differs(target, meta),
+        reset=_reset(ui, path, meta),
     )
     if width is None:
         return False
@@ -195,7 +194,9 @@ def field(
     return ui.studio.scene is not before
 
 
-def number(ui: Ui, path: str, label: str, current: float, scale: Scale, *, default: float | None, tip: str) -> None:
+def number(
+    ui: Ui, path: str, label: str, current: float, scale: Scale, *, default: float | None, tip: str
+) -> None:
     """A number that the schema does not know of by itself (a formula's parameter): as `field`."""
     different = default is not None and current != default
     usual = int(default) if default is not None and scale.whole else default
@@ -217,8 +218,9 @@ def differs(target: Target, meta: Meta) -> bool:
 
 def scale_of(meta: Meta, **options: Any) -> Scale:
     """How a field is dragged and shown."""
-    usual = options.get("usual") or meta.usual
-    log = meta.log if not options.get("usual") else usual[0] > 0 and usual[1] / usual[0] > 40
+    given: tuple[float, float] | None = options.get("usual")
+    usual = given or meta.usual
+    log = meta.log if given is None else metadata.by_magnitude(given)
     return Scale(
         meta.low,
         meta.high,

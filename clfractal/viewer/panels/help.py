@@ -1,0 +1,99 @@
+"""The help over the picture: every key by what it does, and what the pointer does."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from imgui_bundle import imgui
+
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels.ui import Ui
+
+POINTER_ROWS: tuple[tuple[str, str], ...] = (
+    ("drag", "turn about the point under the pointer"),
+    ("right or middle drag", "move; the point follows the pointer"),
+    ("wheel", "nearer, farther, to the pointer; Shift: finer"),
+    ("double click", "centre on what is under the pointer"),
+    ("Shift+drag", "drag the nearest light"),
+    ("Ctrl+click", "make sharp what is under the pointer"),
+    ("Alt+drag", "refine a rectangle alone"),
+    ("cut plane: drag", "move the plane; right: turn, middle: tilt"),
+    ("zoom cube: drag, wheel", "move it, change its size"),
+)
+"""Gestures of the pointer and what they do; `docs/window.md` has the same."""
+
+Row = tuple[str, str]
+
+
+def blocks(ui: Ui) -> list[tuple[str, list[Row]]]:
+    """Headings and their rows: (keys, what they do)."""
+    rows = ui.keys.help_rows()
+    found = [
+        (group, [(keys, told) for _, keys, told in each]) for group, each in groupby(rows, lambda row: row[0])
+    ]
+    return [("Pointer", list(POINTER_ROWS)), *found]
+
+
+def columns_of(found: list[tuple[str, list[Row]]], count: int) -> list[list[tuple[str, list[Row]]]]:
+    """The blocks in columns of about the same height, in their order."""
+    total = sum(len(rows) + 2 for _, rows in found)
+    columns: list[list[tuple[str, list[Row]]]] = [[]]
+    used = 0
+    for title, rows in found:
+        height = len(rows) + 2
+        if columns[-1] and len(columns) < count and used + height / 2 > total * len(columns) / count:
+            columns.append([])
+        columns[-1].append((title, rows))
+        used += height
+    return columns
+
+
+def draw(ui: Ui) -> None:
+    """Draws the help, if it is open."""
+    if "help" not in ui.show:
+        return
+    margin = 2 * theme.MARGIN
+    imgui.set_next_window_pos(imgui.ImVec2(margin, margin))
+    imgui.set_next_window_size(imgui.ImVec2(ui.size[0] - 2 * margin, ui.size[1] - 2 * margin))
+    imgui.set_next_window_bg_alpha(0.93)
+    flags = (
+        imgui.WindowFlags_.no_title_bar
+        | imgui.WindowFlags_.no_resize
+        | imgui.WindowFlags_.no_move
+        | imgui.WindowFlags_.no_saved_settings
+    )
+    imgui.begin("##help", None, flags)
+    with theme.font("bold", 18.0):
+        imgui.text("Keys and pointer")
+    hint = f"{ui.keys.hint('help')} or {ui.keys.hint('cancel')} closes"
+    imgui.same_line(imgui.get_window_width() - imgui.calc_text_size(hint).x - 20)
+    imgui.text_colored(theme.vec(theme.DIM), hint)
+    imgui.dummy(imgui.ImVec2(0, 4))
+    count = max(1, min(4, int((ui.size[0] - 2 * margin) // 380)))
+    size = 12.5
+    if imgui.begin_table("##keys", count):
+        for column in columns_of(blocks(ui), count):
+            imgui.table_next_column()
+            for title, rows in column:
+                _block(title, rows, size)
+        imgui.end_table()
+    imgui.end()
+
+
+def _block(title: str, rows: list[Row], size: float) -> None:
+    with theme.font("bold", size + 1):
+        imgui.text_colored(theme.vec(theme.ACCENT), title)
+    with theme.font(size=size):
+        keys_width = 138.0
+        for keys, told in rows:
+            start = imgui.get_cursor_pos()
+            imgui.push_text_wrap_pos(start.x + keys_width - 8)
+            imgui.text_colored(theme.vec(theme.TEXT), keys)
+            imgui.pop_text_wrap_pos()
+            after = imgui.get_cursor_pos_y()
+            imgui.set_cursor_pos(imgui.ImVec2(start.x + keys_width, start.y))
+            imgui.push_text_wrap_pos(0.0)
+            imgui.text_colored(theme.vec(theme.DIM), told)
+            imgui.pop_text_wrap_pos()
+            imgui.set_cursor_pos(imgui.ImVec2(start.x, max(after, imgui.get_cursor_pos_y())))
+    imgui.dummy(imgui.ImVec2(0, 5))

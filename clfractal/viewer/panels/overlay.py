@@ -1,0 +1,209 @@
+"""The figures over the picture's lower rim, as the thesis's programs have them: time, depth, method, zoom, stereo."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from imgui_bundle import imgui
+
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.viewer import zoom_box
+from clfractal.viewer.panels import stereo as stereo_panel
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels.ui import Ui
+
+Pair = tuple[str, str]
+"""A label and its value."""
+
+_SPINNER = "|/-\\"
+
+
+def lines(ui: Ui) -> list[list[Pair]]:
+    """What the overlay tells, in rows: of the picture, of the scene, of stereo."""
+    found = [_picture(ui), _scene(ui)]
+    if ui.studio.scene.stereo is not None:
+        found.append(_stereo(ui))
+    return found
+
+
+def _picture(ui: Ui) -> list[Pair]:
+    frame, session = ui.studio.frame, ui.studio.session
+    found: list[Pair] = []
+    if frame is not None:
+        found.append(("render", seconds_text(frame.seconds if frame.divider == 1 else frame.frame_seconds)))
+        if ui.speed.frames:
+            found.append(("frames", f"{ui.speed.frames:.0f}/s"))
+        width, height = frame.arrangement.size(ui.studio.look)
+        coarse = f", 1/{frame.divider}" if frame.divider > 1 else ""
+        found.append(("size", f"{width} x {height}{coarse}"))
+        total = frame.job.samples
+        state = "" if frame.finished else ", paused" if session.paused else ""
+        found.append(("samples", f"{frame.samples} of {total}{state}"))
+        found.append(("number", frame.job.precision))
+    found.append(("device", session.device.info.name))
+    found.append(("picture", ui.speed.way))
+    if ui.studio.region is not None:
+        found.append(("region", "{2} x {3} at {0}, {1}".format(*ui.studio.region)))
+    return found
+
+
+def _scene(ui: Ui) -> list[Pair]:
+    scene = ui.studio.scene
+    renderer = scene.renderer
+    found: list[Pair] = [("iterations", f"{scene.formula.iterations}")]
+    if isinstance(renderer, SurfaceRenderer):
+        found.append(("method", f"{renderer.search}, {renderer.normal.replace('_', ' ')}"))
+        step = f"{renderer.step:g}" if renderer.search == "steps" else f"{renderer.detail:g} px"
+        found.append(("step", step))
+    elif isinstance(renderer, VolumeRenderer):
+        found.append(("method", f"volume, {renderer.value}"))
+        found.append(("zoom", number_text(renderer.magnification)))
+        box = _marked(ui)
+        if box is not None:
+            found.append(("new zoom", number_text(zoom_box.next_magnification(renderer, box))))
+    elif isinstance(renderer, CutPlaneRenderer):
+        found.append(("method", "cut plane"))
+        found.append(("plane", f"{renderer.plane.placed.height:.4g} high"))
+    if not isinstance(renderer, CutPlaneRenderer):
+        pick = ui.pick
+        hit = pick is not None and pick.point is not None
+        found.append(("depth", f"{pick.depth:.5g}" if pick is not None and hit else "-"))
+        if pick is not None and pick.point is not None:
+            found.append(("point", ", ".join(f"{each:.4g}" for each in pick.point)))
+    return found
+
+
+def _marked(ui: Ui) -> zoom_box.ZoomBox | None:
+    """The box of the next zoom, if it is shown."""
+    controls = ui.memory.get("controls")
+    return controls.box if controls is not None and controls.marking else None
+
+
+def _stereo(ui: Ui) -> list[Pair]:
+    stereo = ui.studio.scene.stereo
+    assert stereo is not None
+    found = [
+        ("stereo", stereo.mode.replace("_", " ") + (", swapped" if stereo.swap else "")),
+        ("screen", f"{stereo.screen_width:.4g} wide, {stereo.screen_distance:.4g} away"),
+        ("eyes", f"{stereo.interpupillary_distance:.4g} apart"),
+    ]
+    if "parallax" in ui.show or ui.pick is not None:
+        found.append(("parallax", _parallax(ui)))
+    return found
+
+
+def _parallax(ui: Ui) -> str:
+    found = stereo_panel.under_pointer(ui)
+    if found is None:
+        return "-"
+    on_screen, angle = found
+    return f"{on_screen:+.4g}, {angle:+.2f} degrees"
+
+
+def seconds_text(seconds: float) -> str:
+    """A time for people: milliseconds below a second."""
+    if seconds < 1:
+        return f"{1e3 * seconds:.0f} ms"
+    return f"{seconds:.1f} s" if seconds < 100 else f"{seconds / 60:.1f} min"
+
+
+def number_text(number: float) -> str:
+    """A magnification for people."""
+    return f"{number:.3g}x" if number < 1e5 else f"{number:.2e}x"
+
+
+def draw(ui: Ui) -> None:
+    """Draws the figures at the lower rim, above them what takes long and what is wrong."""
+    left = theme.MARGIN + (theme.DOCK_LEFT + theme.MARGIN if "panels" in ui.show else 0.0)
+    bottom = ui.size[1] - theme.MARGIN
+    if "overlay" in ui.show:
+        bottom = _figures(ui, left, bottom)
+    _state(ui, left, bottom)
+
+
+def _figures(ui: Ui, left: float, bottom: float) -> float:
+    """The rows, from the bottom up; gives where the next thing ends."""
+    canvas = imgui.get_background_draw_list()
+    room = ui.size[0] - left - theme.MARGIN
+    with theme.font(size=12.5):
+        rows = _wrapped(lines(ui), room - 16)
+        high = imgui.get_text_line_height() + 3
+        top = bottom - high * len(rows) - 8
+        wide = max(sum(_width(pair) for pair in row) for row in rows) + 12
+        canvas.add_rect_filled(
+            imgui.ImVec2(left, top),
+            imgui.ImVec2(left + wide, bottom),
+            theme.packed(theme.PANEL, 0.72),
+            theme.ROUNDING,
+        )
+        for number, row in enumerate(rows):
+            x, y = left + 9, top + 5 + number * high
+            for label, value in row:
+                canvas.add_text(imgui.ImVec2(x, y), theme.packed(theme.DIM), label)
+                x += imgui.calc_text_size(label).x + 5
+                canvas.add_text(imgui.ImVec2(x, y), theme.packed(theme.TEXT), value)
+                x += imgui.calc_text_size(value).x + 14
+    frame = ui.studio.frame
+    if frame is not None and not frame.finished:
+        share = frame.samples / max(frame.job.samples, 1)
+        canvas.add_rect_filled(
+            imgui.ImVec2(left + 6, bottom - 2.5),
+            imgui.ImVec2(left + 6 + (wide - 12) * share, bottom - 1),
+            theme.packed(theme.ACCENT),
+        )
+    return top - 6
+
+
+def _width(pair: Pair) -> float:
+    return float(imgui.calc_text_size(pair[0]).x + imgui.calc_text_size(pair[1]).x) + 19
+
+
+def _wrapped(rows: list[list[Pair]], room: float) -> list[list[Pair]]:
+    """Rows that fit into a width."""
+    found: list[list[Pair]] = []
+    for row in rows:
+        line: list[Pair] = []
+        used = 0.0
+        for pair in row:
+            if line and used + _width(pair) > room:
+                found.append(line)
+                line, used = [], 0.0
+            line.append(pair)
+            used += _width(pair)
+        found.append(line)
+    return found
+
+
+def _state(ui: Ui, left: float, bottom: float) -> None:
+    """What takes long, and why the newest scene cannot be shown."""
+    session = ui.studio.session
+    told: list[tuple[str, theme.Rgba]] = []
+    if session.problem is not None:
+        told.append((str(session.problem), theme.WARNING))
+    if session.progress:
+        turn = _SPINNER[int(time.perf_counter() * 8) % len(_SPINNER)]
+        told.append((f"{turn}  {session.progress}", theme.ACCENT))
+    canvas = imgui.get_background_draw_list()
+    for text, color in told:
+        room = ui.size[0] - left - theme.MARGIN - 20
+        size = imgui.calc_text_size(text, None, False, room)
+        top = bottom - size.y - 10
+        canvas.add_rect_filled(
+            imgui.ImVec2(left, top),
+            imgui.ImVec2(left + min(size.x, room) + 20, bottom),
+            theme.packed(theme.PANEL, 0.9),
+            theme.ROUNDING,
+        )
+        canvas.add_text(
+            imgui.get_font(),
+            imgui.get_font_size(),
+            imgui.ImVec2(left + 10, top + 5),
+            theme.packed(color),
+            text,
+            None,
+            room if math.isfinite(room) else 0.0,
+        )
+        bottom = top - 6
