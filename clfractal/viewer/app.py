@@ -296,7 +296,7 @@ class Viewer:
         ui.size, ui.scale, ui.pick = size, scale, self.pick
         ui.speed = replace(self.meter.speed, way="shared" if self.surface.shared else "copied")
         self._draw_marks(scale)
-        all_panels.draw(ui)
+        self._draw_panels(ui)
         imgui.render()
         if imgui.get_io().want_text_input or imgui.is_any_item_active():
             self._redraw = max(self._redraw, 1)
@@ -307,6 +307,23 @@ class Viewer:
         self.files.after_draw(framebuffer)
         self.outputs.swap()
         self.meter.swapped(time.perf_counter())
+
+    def _draw_panels(self, ui: Ui) -> None:
+        """A mistake in a panel costs that frame's panels, never the window."""
+        before = imgui.internal.ErrorRecoveryState()
+        imgui.internal.error_recovery_store_state(before)
+        try:
+            all_panels.draw(ui)
+        except Exception as error:
+            io = imgui.get_io()
+            asserts, io.config_error_recovery_enable_assert = io.config_error_recovery_enable_assert, False
+            logs, io.config_error_recovery_enable_debug_log = io.config_error_recovery_enable_debug_log, False
+            imgui.internal.error_recovery_try_to_recover_state(before)
+            io.config_error_recovery_enable_assert = asserts
+            io.config_error_recovery_enable_debug_log = logs
+            line = f"internal error, please report it: {type(error).__name__}: {error}"
+            if not any(message.text.startswith(line[:60]) for message in self.studio.messages[-5:]):
+                self.studio.tell(line, wrong=True)
 
     def _draw_ui(self, by: UiRenderer | None, data: Any) -> None:
         (by or self.renderer).draw(data, list(self.places.ui))

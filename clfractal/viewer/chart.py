@@ -1,7 +1,7 @@
 """A chart for setting up projectors and screens: one picture for each eye, to be shown without parallax.
 
 What it is for: every pixel of the rim must be seen (overscan, keystone); circles must be round and cells square (aspect);
-the ramp must have 16 steps, and the striped patch must be as light as the plain one beside it (gamma); the rulers of the two
+the ramp must have 16 steps, and the striped patch must be as light as the plain one beside it (gamma); the rulers of both
 projectors must coincide; and each eye must see its own letter alone (which side is which, crosstalk).
 """
 
@@ -68,7 +68,7 @@ def marks(size: tuple[int, int]) -> tuple[Box, ...]:
 
 def grid_cell(size: tuple[int, int]) -> int:
     """Side of a cell of the grid, whole pixels."""
-    return max(4, round(size[1] / 18))
+    return max(4, round(min(size) / 18))
 
 
 def _axis(length: int) -> Floats:
@@ -78,7 +78,7 @@ def _axis(length: int) -> Floats:
 
 def _unit(size: tuple[int, int]) -> int:
     """Width of a thin line: a pixel up to 1080 rows, two for twice as many."""
-    return max(1, round(size[1] / 1080))
+    return max(1, round(min(size) / 1080))
 
 
 def _line(distance: Floats, width: float) -> Floats:
@@ -104,11 +104,10 @@ def circles(size: tuple[int, int]) -> list[tuple[float, float, float]]:
     """Middles (x, y, from the picture's top left) and radii of the circles' lines, pixels."""
     width, height = size
     cell = grid_cell(size)
-    large = 8 * cell if width > height else 0.45 * width
-    small = 2 * cell
-    across, down = width / 2 - 3 * cell, height / 2 - 3 * cell
+    large, small = 8 * cell, 2 * cell
+    across, down = width / 2 - 2.5 * cell, height / 2 - 2.5 * cell
     found = [(width / 2, height / 2, float(large)), (width / 2, height / 2, float(small))]
-    if across > large:
+    if float(np.hypot(across, down)) > large + small + cell / 2:
         found += [(width / 2 + i * across, height / 2 + j * down, float(small)) for i in (-1, 1) for j in (-1, 1)]
     return found
 
@@ -133,12 +132,18 @@ def _crosshair(gray: Floats) -> None:
     _blend(gray, _line(_axis(height), thick)[:, None], _LINE)
 
 
+def _ruler_reach(size: tuple[int, int]) -> int:
+    """How far the ruler goes to each side, pixels: whole hundreds of lines' widths."""
+    unit = _unit(size)
+    return min(4, int(0.42 * size[0] / (100 * unit))) * 100 * unit
+
+
 def _ruler(gray: Floats) -> None:
     """Ticks along the horizontal line of the cross: one every 10 pixels, longer every 50 and 100."""
     height, width = gray.shape
     unit = _unit((width, height))
     along, down = _axis(width), np.abs(_axis(height))
-    reach = min(400 * unit, int(0.42 * width))
+    reach = _ruler_reach((width, height))
     for every, high in ((10, 5), (50, 9), (100, 14)):
         step = every * unit
         off = along - step * np.rint(along / step)
@@ -237,21 +242,31 @@ def _write(picture: Pixels, text: str, box: Box, high: int, value: int = 255) ->
 
 
 def _label(picture: Pixels) -> None:
-    """What the chart is for, above its bars, in a box that hides the grid."""
+    """The picture's size above the bars, and numbers below the ruler."""
     size = (picture.shape[1], picture.shape[0])
-    cell = grid_cell(size)
-    left, top, right, _ = bars_box(size)
-    box = (left, top - cell, right, top - cell // 4)
-    picture[box[1] : box[3], left:right, :3] = int(_GROUND)
-    _write(picture, f"{size[0]} x {size[1]}", box, max(9, cell // 2))
+    cell, unit = grid_cell(size), _unit(size)
+    top = bars_box(size)[1] - cell
+    _on_ground(picture, f"{size[0]} x {size[1]}", _centred(size, 5 * cell, cell * 3 // 4, top), max(9, cell // 2))
+    high = max(8, 11 * unit)
+    top = size[1] // 2 + 17 * unit
+    for pixels in range(100, _ruler_reach(size) // unit + 1, 100):
+        for sign in (-1, 1):
+            middle = size[0] // 2 + sign * pixels * unit
+            box = (middle - 2 * high, top, middle + 2 * high, top + high + 2)
+            _write(picture, f"{sign * pixels * unit:+d}", box, high, int(_LINE))
+
+
+def _on_ground(picture: Pixels, text: str, box: Box, high: int) -> None:
+    picture[box[1] : box[3], box[0] : box[2], :3] = int(_GROUND)
+    _write(picture, text, box, high)
 
 
 def _corner(size: tuple[int, int], eye: Eye) -> Box:
-    """The box of an eye's letter: beside the upper corner circle on its side."""
-    width, _ = size
+    """The box of an eye's letter, around the place of the upper corner circle on its side."""
     cell = grid_cell(size)
-    left = cell if eye == "left" else width - 5 * cell
-    return left, cell, left + 4 * cell, 5 * cell
+    margin = cell // 2
+    left = margin if eye == "left" else size[0] - margin - 4 * cell
+    return left, margin, left + 4 * cell, margin + 4 * cell
 
 
 def _pointers(size: tuple[int, int]) -> Box:

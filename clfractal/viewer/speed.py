@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 
 import numpy as np
@@ -55,7 +56,8 @@ class Meter:
         """The newest figures."""
         times = self._arrived
         frames = 0.0
-        if len(times) > 2 and times[-1] > times[0]:
+        moving = len(times) > 2 and time.perf_counter() - times[-1] < 0.5
+        if moving and times[-1] > times[0]:
             frames = (len(times) - 1) / (times[-1] - times[0])
         return Speed(frames, self.latencies[-1] if self.latencies else 0.0)
 

@@ -187,7 +187,8 @@ def _placed(ui: Ui, path: str, plane: Plane) -> None:
     """A plane by corners or with steps: where it is, and a button that writes it by its middle and normal."""
     placed = plane.placed
     kind = "its corners" if plane.corners is not None else "a middle and normal"
-    steps = f" and {len(plane.transform)} steps" if plane.transform else ""
+    count = len(plane.transform)
+    steps = f", and {count} {'step' if count == 1 else 'steps'}" if count else ""
     center = ", ".join(f"{each:.5g}" for each in placed.center)
     normal = ", ".join(f"{each + 0.0:.4g}" for each in placed.normal)
     w.hint(

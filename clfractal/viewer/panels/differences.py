@@ -93,7 +93,8 @@ def _cached(ui: Ui) -> list[Difference]:
 
 
 def _line(ui: Ui, each: Difference, name: str) -> None:
-    label = name.replace("_", " ").replace(".", " · ")
+    *before, last = name.split(".")
+    label = " · ".join([*(each.replace("_", " ") for each in before), w.label_of(last)])
     about = f"{words(each.value, 200)}\ndefault: {words(each.default, 200)}"
     width = w.row(
         ui,
@@ -132,11 +133,11 @@ def words(value: Any, most: int) -> str:
     elif isinstance(value, bool):
         text = "yes" if value else "no"
     elif isinstance(value, (int, float)):
-        text = f"{value:.5g}" if isinstance(value, float) else str(value)
+        text = (f"{value:.5g}" if isinstance(value, float) else str(value)).replace("-", "\u2212")
     elif isinstance(value, str):
         text = value
     elif isinstance(value, list) and all(isinstance(each, (int, float)) for each in value):
-        text = ", ".join(f"{each:.4g}" for each in value)
+        text = ", ".join(f"{each:.4g}" for each in value).replace("-", "\u2212")
     elif isinstance(value, dict):
         text = ", ".join(f"{key} {words(each, 20)}" for key, each in value.items() if each is not None)
     elif isinstance(value, list) and value and all(isinstance(each, str) for each in value):

@@ -34,7 +34,7 @@ def draw_surroundings(ui: Ui) -> None:
     w.group(ui, "Fog")
     radius = used_bounds(ui.studio.scene)[1]
     if _switch(ui, "fog", "Fog", {"density": float(f"{0.25 / radius:.2g}")}):
-        w.fields(ui, "fog", ("color", "density", "background"), background={"label": "Covers background"})
+        w.fields(ui, "fog", ("color", "density", "background"), background={"label": "On background"})
     w.group(ui, "Environment")
     if _switch(ui, "environment", "Environment", {"name": names()[0]}):
         _map(ui)

@@ -34,7 +34,7 @@ def draw(ui: Ui) -> None:
     width = min(_WIDTH, ui.size[0] - 2 * theme.MARGIN)
     left = ui.size[0] - theme.MARGIN - width
     for text, wrong, alpha in reversed(visible(ui, time.perf_counter())):
-        size = imgui.calc_text_size(text, None, False, width - 34)
+        size = imgui.calc_text_size(text, False, width - 34)
         top = bottom - size.y - 16
         canvas.add_rect_filled(
             imgui.ImVec2(left, top),
@@ -55,7 +55,6 @@ def draw(ui: Ui) -> None:
             imgui.ImVec2(left + 16, top + 8),
             theme.packed(theme.TEXT, round(alpha, 2)),
             text,
-            None,
             width - 34,
         )
         bottom = top - 6

@@ -189,7 +189,7 @@ def _state(ui: Ui, left: float, bottom: float) -> None:
     canvas = imgui.get_background_draw_list()
     for text, color in told:
         room = ui.size[0] - left - theme.MARGIN - 20
-        size = imgui.calc_text_size(text, None, False, room)
+        size = imgui.calc_text_size(text, False, room)
         top = bottom - size.y - 10
         canvas.add_rect_filled(
             imgui.ImVec2(left, top),
@@ -203,7 +203,6 @@ def _state(ui: Ui, left: float, bottom: float) -> None:
             imgui.ImVec2(left + 10, top + 5),
             theme.packed(color),
             text,
-            None,
             room if math.isfinite(room) else 0.0,
         )
         bottom = top - 6

@@ -39,7 +39,7 @@ _MILLIMETRES = {"unit": " mm", "factor": 1000.0}
 def summary(ui: Ui) -> str:
     """For the heading."""
     stereo = ui.studio.scene.stereo
-    return MODES[stereo.mode].lower() if stereo is not None else "off"
+    return MODES[stereo.mode] if stereo is not None else "off"
 
 
 def draw(ui: Ui) -> None:

@@ -194,7 +194,9 @@ def _draw_graph(ui: Ui, area: _Area, stops: Stops, colors: Stops | None, chosen:
 def _draw_histogram(ui: Ui, area: _Area, draw: Any) -> None:
     found = histogram(ui)
     if found is None:
-        draw.add_text(imgui.ImVec2(area.x + 4, area.y + 2), theme.packed(theme.FAINT), "counting values…")
+        task = ui.memory.get("histogram.task")
+        text = task[1].problem if task is not None and task[1].problem else "counting values…"
+        draw.add_text(imgui.ImVec2(area.x + 4, area.y + 2), theme.packed(theme.FAINT), text)
         return
     # Most voxels are outside or inside: by magnitudes the few others are seen too.
     heights = np.log1p(found.shares * 1e5) / np.log1p(1e5)
@@ -230,11 +232,14 @@ def histogram(ui: Ui) -> Histogram | None:
     key = json.dumps(
         [scene.formula.mapping(), renderer.model_dump(mode="json", include=parts - set(Sampled.model_fields))]
     )
-    task = ui.memory.get("histogram.task")
-    if task is None or (task[0] != key and task[1].finished):
-        task = ui.memory["histogram.task"] = (key, HistogramTask(scene))
-        ui.studio.session.add(task[1])
-    return task[1].found
+    session = ui.studio.session
+    known = ui.memory.get("histogram.task")
+    # A task that another device was to do is never done.
+    lost = known is not None and not known[1].finished and known[2] is not session
+    if known is None or lost or (known[0] != key and known[1].finished):
+        known = ui.memory["histogram.task"] = (key, HistogramTask(scene), session)
+        session.add(known[1])
+    return known[1].found
 
 
 # Colours

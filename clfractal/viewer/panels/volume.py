@@ -40,7 +40,7 @@ def draw(ui: Ui) -> None:
     _box(ui, renderer)
     w.group(ui, "Rays")
     w.field(ui, "renderer.interpolation", segmented=True)
-    w.field(ui, "renderer.step", unit=" voxels")
+    w.field(ui, "renderer.step", unit=" voxel")
     w.field(ui, "renderer.shadows")
     if renderer.transfer.opacity is None:
         low, high = limits(ui)
@@ -56,7 +56,7 @@ def draw(ui: Ui) -> None:
     w.group(ui, "Normals")
     w.field(ui, "renderer.normals")
     if renderer.normals == "gradient":
-        w.field(ui, "renderer.normal_radius", "Smoothing", unit=" voxels")
+        w.field(ui, "renderer.normal_radius", "Smoothing")
     if renderer.file is None and not w.filtering(ui):
         _zoom(ui, renderer)
 
@@ -186,8 +186,10 @@ def _zoom(ui: Ui, renderer: VolumeRenderer) -> None:
     for index, zoom in enumerate(renderer.zoom):
         place = ", ".join(f"{each:.4g}" for each in zoom.center)
         w.hint(ui, f"{index + 1}.  {zoom.scale:.4g} x  at {place}")
-    if steps and w.button("Back to the whole", width=-1):
-        _put(ui, "renderer.zoom", [])
+    if steps:
+        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        if w.button("Back to the whole", icon=theme.RESET, width=-1):
+            _put(ui, "renderer.zoom", [])
 
 
 def magnified(factor: float) -> str:
