@@ -23,6 +23,8 @@ BUDGET_SECONDS = 0.1
 IN_FLIGHT = 2
 # A launch grows at most by this factor over the one before: what follows may be much heavier.
 GROWTH = 3.0
+# From picture to picture the heaviest launch counts less, by this factor.
+FORGETTING = 1.5
 # Longest sleep between checks of a launch; an interrupt is noticed after it.
 POLL_SECONDS = 0.0005
 # With more work-items in one dimension PoCL compiles the kernel again.
@@ -61,11 +63,15 @@ class Pace:
         """Starts again with a size that is safe for the heaviest work so far, because the last work may have been light."""
         if self.slowest is not None:
             self.size = float(np.clip(self.slowest * self.seconds, self.least, self.most))
+            # One slow launch, such as a driver's first, must not make all later pictures slow.
+            self.slowest *= FORGETTING
 
     def learn(self, amount: float, milliseconds: float) -> None:
         """Sets the next size by what `amount` of work took."""
         rate = amount / max(1e-3 * milliseconds, 1e-6)
-        self.slowest = rate if self.slowest is None else min(self.slowest, rate)
+        # A short launch leaves cores idle, so its rate says nothing about longer ones.
+        if 1e-3 * milliseconds >= self.seconds / 4:
+            self.slowest = rate if self.slowest is None else min(self.slowest, rate)
         largest = min(max(amount, self.least) * GROWTH, self.most)
         self.size = float(np.clip(rate * self.seconds, self.least, largest))
 

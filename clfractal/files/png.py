@@ -86,6 +86,22 @@ def write_png_pixels(
         writer.write_packed(stream, (row.tobytes() for row in pixels))
 
 
+def read_png_pixels(path: str | Path) -> npt.NDArray[np.uint8]:
+    """The pixels of a PNG file of 8-bit colours, shape (height, width, 3).
+
+    Raises:
+        FileError: it cannot be read, is no PNG file, or is damaged or cut short.
+    """
+    with open_regular(path) as stream:
+        try:
+            width, height, rows, _ = png.Reader(file=stream).asRGB8()
+            # Row by row: the size that a damaged header claims takes no memory.
+            found = np.frombuffer(b"".join(bytes(row) for row in rows), np.uint8)
+            return found.reshape(height, width, 3)
+        except (OSError, ValueError, EOFError, zlib.error, png.Error) as error:
+            raise file_error(path, "cannot be read", error) from error
+
+
 def stream_png(
     stream: BinaryIO,
     bands: Iterable[Floats],

@@ -130,7 +130,11 @@ class Viewer:
         now = time.perf_counter()
         seconds, self._last = now - self._last, now
         self.inputs.play(now - self.started)
+        moved = False
         while self.events:
+            if moved and self.events[0].kind in ("button", "scroll"):
+                break  # panels learn only with a frame that the pointer is over them now
+            moved = moved or self.events[0].kind == "move"
             self.inputs.handle(self.events.popleft(), now)
             self._redraw = _REDRAWN
         if self.window.closing:
@@ -139,6 +143,7 @@ class Viewer:
             self._redraw = _REDRAWN
         if self.motion.step(now, seconds, window.gamepad(), window.plain_joystick()):
             self._redraw = _REDRAWN
+        self._take_settings()
         self.controls.rest(now)
         self.files.tick(now)
         self._follow()
@@ -173,6 +178,16 @@ class Viewer:
         self.ui.keys = settings.key_map
         self._set_motion(settings)
         self.pacing.rate, self.pacing.coarsest = settings.frame_rate, settings.used_coarsest
+
+    def _take_settings(self) -> None:
+        """A panel has changed the user's settings: they count at once, and are kept."""
+        if self.ui.settings is self.settings:
+            return
+        self.set_settings(self.ui.settings)
+        try:
+            self.settings.save()
+        except ClfractalError as error:
+            self.studio.tell(str(error), wrong=True)
 
     def _set_motion(self, settings: Settings) -> None:
         self.motion.sensitivity = settings.mouse
@@ -350,7 +365,8 @@ class Viewer:
     def _redraw_while_busy(self) -> None:
         """A spinner turns while something compiles or is rendered beside the picture."""
         session = self.studio.session
-        if session.progress or any(not still.finished for still in self.studio.stills):
+        awaited = self.ui.memory.pop("awaited", False)  # a panel waits for pictures, or for a thread of its own
+        if awaited or session.progress or any(not still.finished for still in self.studio.stills):
             self._wake_at = time.perf_counter() + 0.1
 
     _wake_at = 0.0

@@ -98,7 +98,7 @@ class Thumbnail:
         run(self._films.job, self._films.films, executor, token=token)
         film = self._films.picture()
         self._token = None
-        gain = np.float32(2.0 ** self._films.job.scene.output.exposure)
+        gain = np.float32(2.0**self._films.job.scene.output.exposure)
         colors = np.stack([film[name] * gain for name in "RGB"], axis=-1)
         opaque = np.full((*colors.shape[:2], 1), 255, np.uint8)
         self.film = film

@@ -65,7 +65,13 @@ class CopyTarget:
         """See `Target`."""
         width, height = self.size
         found: Any = cl.enqueue_map_buffer(
-            queue, self._buffer, cl.map_flags.READ, 0, (height, width, 4), np.dtype(np.uint8), is_blocking=False
+            queue,
+            self._buffer,
+            cl.map_flags.READ,
+            0,
+            (height, width, 4),
+            np.dtype(np.uint8),
+            is_blocking=False,
         )
         self._mapped, event = found
         event.wait()

@@ -18,7 +18,7 @@ def kind_of(sections: Mapping[str, Any]) -> Kind:
 
 
 @dataclass(slots=True)
-class _Step:
+class Step:
     """Sections before and after an edit."""
 
     before: dict[str, Any]
@@ -28,8 +28,8 @@ class _Step:
 
 @dataclass(slots=True)
 class _Stack:
-    done: list[_Step] = field(default_factory=list)
-    undone: list[_Step] = field(default_factory=list)
+    done: list[Step] = field(default_factory=list)
+    undone: list[Step] = field(default_factory=list)
 
 
 class History:
@@ -52,7 +52,7 @@ class History:
             last.before = {**old, **last.before}
             last.after = {**last.after, **new}
             return
-        stack.done.append(_Step(old, new, gesture))
+        stack.done.append(Step(old, new, gesture))
         del stack.done[:-MOST_STEPS]
 
     def seal(self) -> None:
@@ -79,6 +79,11 @@ class History:
         step = stack.undone.pop()
         stack.done.append(step)
         return step.after
+
+    def steps(self, kind: Kind) -> tuple[list[Step], int]:
+        """The steps of a stack, the oldest first, those that were undone last; and how many are done."""
+        stack = self._stacks[kind]
+        return [*stack.done, *reversed(stack.undone)], len(stack.done)
 
     def depth(self, kind: Kind) -> tuple[int, int]:
         """How many steps can be undone and redone."""

@@ -302,26 +302,34 @@ class SceneDeeds:
         if kind == "cut_plane":
             changes["cut_planes"] = []
         if not self._edit(changes):
-            self.studio.tell(next(iter(self.studio.problems.values()), "not possible"), wrong=True)
+            self.studio.tell(self.studio.problems.get("renderer", "not possible"), wrong=True)
 
     # Stereo
 
     def stereo_mode(self, step: int) -> None:
-        """The next or previous way of showing two eyes; the first is one eye alone, without stereo."""
+        """The next or previous way of showing two eyes; the first is one eye alone, without stereo.
+
+        A way that the scene does not fit (an odd width that cannot be halved) is told and left out.
+        """
         stereo = self.studio.scene.stereo
         now = stereo.mode if stereo is not None else None
         place = STEREO_MODES.index(now) if now in STEREO_MODES else 2
-        mode = STEREO_MODES[(place + step) % len(STEREO_MODES)]
-        if mode is None:
-            self._kept = self.studio.value("stereo")
-            self._edit({"stereo": None})
-        else:
-            section = dict(self.studio.value("stereo") or self._kept or self.first_stereo())
-            section["mode"] = mode
-            if not self._edit({"stereo": section}):
-                self.studio.tell(next(iter(self.studio.problems.values()), "not possible"), wrong=True)
+        for count in range(1, len(STEREO_MODES)):
+            mode = STEREO_MODES[(place + count * step) % len(STEREO_MODES)]
+            if self._set_stereo(mode):
+                self.studio.tell(f"stereo: {mode or 'off'}")
                 return
-        self.studio.tell(f"stereo: {mode or 'off'}")
+            problem = self.studio.problems.pop("stereo", "not possible")
+            self.studio.tell(f"stereo: {mode}: {problem}", wrong=True)
+            if stereo is None and not isinstance(self.studio.scene.camera, PerspectiveCamera):
+                return  # no other way would fit either
+
+    def _set_stereo(self, mode: str | None) -> bool:
+        if mode is None:
+            self._kept = self.studio.value("stereo") or self._kept
+            return self._edit({"stereo": None})
+        section = self.studio.value("stereo") or self._kept or self.first_stereo()
+        return self._edit({"stereo": {**section, "mode": mode}})
 
     def _of_stereo(self, key: str, change: Callable[[Any], Any]) -> None:
         if self.studio.scene.stereo is None:

@@ -79,7 +79,9 @@ class CanvasKernels:
         part = canvas.parts[number]
         region = part.region
         numbers = (part.offset, region.x, region.y, region.width, clip.x, clip.y, clip.right, clip.bottom)
-        self._place.set_args(film, places, canvas.colors, canvas.depths, *(np.int32(each) for each in numbers))
+        self._place.set_args(
+            film, places, canvas.colors, canvas.depths, *(np.int32(each) for each in numbers)
+        )
         cl.enqueue_nd_range_kernel(self.device.queue, self._place, (TILE, tiles), ROW_GROUP)
 
     def enlarge(self, old: Canvas, canvas: Canvas) -> None:

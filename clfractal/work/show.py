@@ -42,7 +42,12 @@ SHOW = Struct(
         Field("transparent", "int", 0, "1: a board shows where nothing covers it"),
         Field("gain", "float", 0, "two to the power of the exposure"),
         Field("background", "float", 3, "between the views of a layout, linear"),
-        Field("matrix", "float", 18, "of an anaglyph, a row for each colour: left R, G, B, right R, G, B; or two filters"),
+        Field(
+            "matrix",
+            "float",
+            18,
+            "of an anaglyph, a row for each colour: left R, G, B, right R, G, B; or two filters",
+        ),
     ],
 )
 SHOWN_VIEW = Struct(

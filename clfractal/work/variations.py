@@ -18,6 +18,7 @@ from clfractal.errors import ClfractalError, SceneError, Where, unknown_name
 from clfractal.formulas import reference
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import Image
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.work.varied import AMOUNT, Kind, Step, Strength, changed
@@ -206,21 +207,11 @@ def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
 
 
 def preview_scene(scene: Scene, width: int, height: int) -> Scene:
-    """The scene as a quick small picture shows it: for one eye, with few samples, a coarse grid, and parameters live.
+    """The scene as a quick small picture shows it: as `small_scene`, and with parameters live.
 
     Variations of one scene then share one program: their parameters are not part of its text.
     """
-    updates: dict[str, Any] = {"image": {"width": width, "height": height}, "stereo": None}
-    updates["renderer"] = _coarse(scene.renderer)
-    if scene.layout is not None:
-        views = [
-            view.model_copy(update={"renderer": _coarse(view.renderer)})
-            if view.renderer is not None
-            else view
-            for view in scene.layout.views
-        ]
-        updates["layout"] = scene.layout.model_copy(update={"views": views})
-    small = scene.model_copy(update=updates)
+    small = small_scene(scene, width, height)
     try:
         live = {
             f"{slot.path}.live": [parameter.name for parameter in slot.bound.formula.parameters]
@@ -232,6 +223,21 @@ def preview_scene(scene: Scene, width: int, height: int) -> Scene:
         return lively
     except (ClfractalError, ValidationError):
         return small  # a value that only a text of its own can show
+
+
+def small_scene(scene: Scene, width: int, height: int) -> Scene:
+    """The scene as a small picture shows it: for one eye, with few samples, and a coarse grid."""
+    updates: dict[str, Any] = {"image": Image(width=width, height=height), "stereo": None}
+    updates["renderer"] = _coarse(scene.renderer)
+    if scene.layout is not None:
+        views = [
+            view.model_copy(update={"renderer": _coarse(view.renderer)})
+            if view.renderer is not None
+            else view
+            for view in scene.layout.views
+        ]
+        updates["layout"] = scene.layout.model_copy(update={"views": views})
+    return scene.model_copy(update=updates)
 
 
 def _coarse(renderer: Any) -> Any:

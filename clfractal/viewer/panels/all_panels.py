@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from clfractal.viewer.panels import dialogs, help, messages, overlay, scene_dock
+from clfractal.viewer.panels import (
+    dialogs,
+    gallery,
+    help,
+    history,
+    menu,
+    messages,
+    overlay,
+    scene_dock,
+    stills,
+    variations,
+)
 from clfractal.viewer.panels.ui import Ui
 
 
@@ -10,6 +21,11 @@ def draw(ui: Ui) -> None:
     """Draws the panels of one frame, between `imgui.new_frame` and `imgui.render`."""
     overlay.draw(ui)
     scene_dock.draw(ui)
+    menu.draw(ui)
+    variations.draw(ui)
+    stills.draw(ui)
+    history.draw(ui)
+    gallery.draw(ui)
     help.draw(ui)
     dialogs.draw(ui)
     messages.draw(ui)

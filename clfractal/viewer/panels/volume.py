@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from clfractal.scene.checks import used_bounds
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import zoom_box
+from clfractal.viewer.controls import Controls
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import plain
@@ -161,7 +162,8 @@ def _zoom(ui: Ui, renderer: VolumeRenderer) -> None:
     """The magnification now and after the next zoom, whose cube is moved and scaled in the picture."""
     w.group(ui, "Zoom")
     w.reading(ui, "Magnification", magnified(renderer.magnification))
-    box: zoom_box.ZoomBox | None = ui.memory.get("zoom_box")
+    controls: Controls | None = ui.memory.get("controls")
+    box = controls.box if controls is not None and controls.marking else None
     marking = box is not None
     if box is not None:
         after = zoom_box.next_magnification(renderer, box)

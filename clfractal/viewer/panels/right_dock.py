@@ -1,0 +1,68 @@
+"""The column at the window's right, which variations, stills, and history share: those that are open lie below each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from imgui_bundle import imgui
+
+from clfractal.viewer.panels import menu, theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.ui import Ui
+
+_PARTS = {"variations": 2.0, "stills": 1.0, "history": 1.2}
+"""Parts in their order, and their shares of the height."""
+_OVERLAY = 64.0
+"""Points at the lower rim that belong to the overlay."""
+_WIDEST = 420.0
+
+
+def width_of(ui: Ui) -> float:
+    """Points that the column is wide: more in a wide window, but the picture's middle stays free."""
+    return min(max(0.21 * ui.size[0], theme.DOCK_RIGHT), _WIDEST, ui.size[0] - 2 * theme.MARGIN)
+
+
+def place(ui: Ui, part: str) -> tuple[float, float, float, float]:
+    """Left, top, width and height of a part that is open, points."""
+    top = theme.MARGIN + (menu.HEIGHT + theme.MARGIN if "panels" in ui.show else 0.0)
+    bottom = ui.size[1] - theme.MARGIN - (_OVERLAY if "overlay" in ui.show else 0.0)
+    shown = [name for name in _PARTS if name in ui.show]
+    room = bottom - top - theme.MARGIN * (len(shown) - 1)
+    total = sum(_PARTS[name] for name in shown)
+    for name in shown:
+        high = room * _PARTS[name] / total
+        if name == part:
+            return ui.size[0] - theme.MARGIN - width_of(ui), top, width_of(ui), max(high, 80.0)
+        top += high + theme.MARGIN
+    raise KeyError(part)
+
+
+@contextmanager
+def window(ui: Ui, part: str, title: str, icon: str) -> Iterator[None]:
+    """The window of a part that is open, with its title and a button that closes it."""
+    left, top, width, height = place(ui, part)
+    imgui.set_next_window_pos(imgui.ImVec2(left, top))
+    imgui.set_next_window_size(imgui.ImVec2(width, height))
+    flags = (
+        imgui.WindowFlags_.no_decoration
+        | imgui.WindowFlags_.no_move
+        | imgui.WindowFlags_.no_saved_settings
+        | imgui.WindowFlags_.no_scroll_with_mouse
+        | imgui.WindowFlags_.no_bring_to_front_on_focus
+        | imgui.WindowFlags_.no_focus_on_appearing
+    )
+    imgui.begin(f"##{part}", None, flags)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(theme.ACCENT), icon)
+    w.in_row(7)
+    with theme.font("bold"):
+        imgui.text(title)
+    imgui.same_line(width - 10 - imgui.get_frame_height())
+    if w.icon_button(theme.CROSS, "Close", name=f"{part}.close"):
+        ui.show.discard(part)
+    imgui.dummy(imgui.ImVec2(0, 1))
+    try:
+        yield
+    finally:
+        imgui.end()

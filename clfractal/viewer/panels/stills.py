@@ -1,0 +1,327 @@
+"""Stills: the present scene as picture files of any size, rendered in the background; and how far they are."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.errors import ClfractalError, FileError, Where
+from clfractal.pictures.outputs import check_output, output_files
+from clfractal.scene.parts import MAX_PIXELS, MAX_SIDE
+from clfractal.scene.stereo import Stereo
+from clfractal.viewer.background import Still
+from clfractal.viewer.panels import layout, right_dock, theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import clipped
+from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.viewport import image_of
+
+PRESETS: dict[str, tuple[int, int] | None] = {
+    "Window": None,
+    "1080p": (1920, 1080),
+    "4K": (3840, 2160),
+    "8K": (7680, 4320),
+    "Square 2048": (2048, 2048),
+    "Square 4096": (4096, 4096),
+}
+"""Sizes to choose from; None: as large as the window's picture."""
+FORMATS = {"png": "PNG", "exr": "EXR", "both": "Both"}
+_ENDINGS = {"png": (".png",), "exr": (".exr",), "both": (".png", ".exr")}
+_MOST_SAMPLES = 65_536
+
+
+@dataclass(slots=True)
+class Wanted:
+    """What the panel remembers.
+
+    Attributes:
+        size: of the picture, pixels; None: as large as the window's.
+        samples: for a pixel; None: as many as the scene says.
+        kind: the one of `FORMATS`.
+        name: of the files, without ending, relative to the current folder; empty: a free one.
+        problem: why the last one could not begin, or empty.
+    """
+
+    size: tuple[int, int] | None = None
+    samples: int | None = None
+    kind: str = "png"
+    name: str = ""
+    problem: str = ""
+    kept: dict[int, float] = field(default_factory=dict)
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel, if it is open."""
+    if "stills" not in ui.show:
+        return
+    state: Wanted = ui.memory.setdefault("stills", Wanted())
+    with right_dock.window(ui, "stills", "Render a still", theme.CAMERA):
+        imgui.begin_child("##stills", imgui.ImVec2(0, 0))
+        _settings(ui, state)
+        _start(ui, state)
+        _list(ui)
+        imgui.end_child()
+
+
+def paths_of(name: str, kind: str, folder: Path | None = None) -> tuple[Path, ...]:
+    """The files of a name; an ending that is one of the formats' is left out."""
+    place = Path(name.strip()).expanduser()
+    if place.suffix.lower() in (".png", ".exr"):
+        place = place.with_suffix("")
+    whole = (folder or Path.cwd()) / place
+    return tuple(whole.with_name(f"{whole.name}{ending}") for ending in _ENDINGS[kind])
+
+
+def free_name(stem: str, kind: str, taken: Collection[Path], stereo: Stereo | None = None) -> str:
+    """A name such as `mandelbulb-still-1` under which there is no file, and none is on its way."""
+    number = 1
+    while any(_is_taken(path, taken) for path in _all(paths_of(f"{stem}-still-{number}", kind), stereo)):
+        number += 1
+    return f"{stem}-still-{number}"
+
+
+def check(paths: Iterable[Path], taken: Collection[Path], stereo: Stereo | None) -> None:
+    """Makes sure that files can be written, and that none of them is there already.
+
+    Args:
+        taken: files that are on their way.
+        stereo: of the scene: some modes write a file for each eye.
+
+    Raises:
+        FileError: what is wrong with one of them.
+    """
+    for path in _all(paths, stereo):
+        if path.name.startswith("."):
+            raise FileError("a still needs a name", Where(str(path)))
+        check_output(path)
+        if _is_taken(path, taken):
+            raise FileError("is there already; choose another name", Where(path.name))
+
+
+def _all(paths: Iterable[Path], stereo: Stereo | None) -> list[Path]:
+    return [file for path in paths for file in output_files(stereo, path)]
+
+
+def _is_taken(path: Path, taken: Collection[Path]) -> bool:
+    return path in taken or path.exists() or path.is_symlink()
+
+
+def on_their_way(stills: Iterable[Still]) -> set[Path]:
+    """The files of stills that are not finished."""
+    return {
+        file
+        for still in stills
+        if not still.finished
+        for path in still.paths
+        for file in output_files(still.scene.stereo, path)
+    }
+
+
+# Settings
+
+
+def _settings(ui: Ui, state: Wanted) -> None:
+    size = state.size or _window_size(ui)
+    name = next((name for name, each in PRESETS.items() if each == state.size), "")
+    label, width = _label("Size")
+    found = w.choose("stills.preset", _preset_words(ui), name or "free", width)
+    if found is not None:
+        state.size = PRESETS[found] if found in PRESETS else size
+    _label("")
+    room = imgui.get_content_region_avail().x
+    each = (room - 20) / 2
+    wide = _number(ui, "stills.width", size[0], each, MAX_SIDE)
+    w.in_row(5)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(theme.FAINT), "x")
+    w.in_row(5)
+    high = _number(ui, "stills.height", size[1], each, MAX_SIDE)
+    if wide is not None or high is not None:
+        state.size = (wide or size[0], high or size[1])
+    present = ui.studio.scene.renderer.samples
+    _, width = _label("Samples")
+    samples = _number(ui, "stills.samples", state.samples or present, width - 30, _MOST_SAMPLES)
+    if samples is not None:
+        state.samples = samples
+    w.in_row(4)
+    about = f"As the scene says: {present}"
+    if w.icon_button(theme.RESET, about, name="stills.samples.reset", enabled=state.samples is not None):
+        state.samples = None
+    _, width = _label("Format")
+    chosen = w.segments("stills.kind", FORMATS, state.kind, width)
+    if chosen is not None:
+        state.kind, state.problem = chosen, ""
+    _, width = _label("Name")
+    suggestion = _suggestion(ui, state)
+    imgui.set_next_item_width(width)
+    _, text = imgui.input_text_with_hint("##stills.name", suggestion, state.name)
+    if text != state.name:
+        state.name, state.problem = text, ""
+    w.tip(f"Without ending; in {Path.cwd()} unless a folder is given")
+
+
+def _label(text: str) -> tuple[str, float]:
+    """A label, then the place of its widget; the text, and the width that the widget has, points."""
+    wide = imgui.get_content_region_avail().x
+    start = imgui.get_cursor_pos_x()
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(theme.DIM), text)
+    left = 0.27 * wide
+    imgui.same_line(start + left)
+    return text, wide - left
+
+
+def _number(ui: Ui, name: str, value: int, width: float, most: int) -> int | None:
+    """A box with a whole number; the new one, if it was changed."""
+    # A drag over some hundred points reaches every usual size.
+    scale = w.Scale(1, most, None, False, True, "", 1.0, 1.0, (False, False))
+    change = w.number_box(w.boxes(ui), name, float(value), width, scale)
+    return None if change.value is None else round(change.value)
+
+
+def _preset_words(ui: Ui) -> dict[str, str]:
+    words = {}
+    for name, size in PRESETS.items():
+        width, height = size or _window_size(ui)
+        words[name] = f"{name}, {width} x {height}" if not name.startswith("Square") else name
+    return {**words, "free": "Free"}
+
+
+def _window_size(ui: Ui) -> tuple[int, int]:
+    width, height = image_of(ui.studio.scene.stereo, ui.studio.viewport)
+    return width, height
+
+
+def _suggestion(ui: Ui, state: Wanted) -> str:
+    """A free name; looked up anew when something has changed that it depends on."""
+    files: Any = ui.memory.get("files")
+    path = files.source.path if files is not None else None
+    stem = path.stem if path is not None else "scene"
+    stereo = ui.studio.scene.stereo
+    ended = sum(1 for still in ui.studio.stills if still.finished)
+    key = (stem, state.kind, stereo.mode if stereo else None, len(ui.studio.stills), ended)
+    known = ui.memory.get("stills.suggestion")
+    if known is None or known[0] != key:
+        found = free_name(stem, state.kind, on_their_way(ui.studio.stills), stereo)
+        known = ui.memory["stills.suggestion"] = (key, found)
+    return str(known[1])
+
+
+def _start(ui: Ui, state: Wanted) -> None:
+    size = state.size or _window_size(ui)
+    too_large = size[0] * size[1] > MAX_PIXELS
+    imgui.dummy(imgui.ImVec2(0, 1))
+    if w.button("Render", icon=theme.CAMERA, primary=True, width=-1, enabled=not too_large):
+        start(ui, state)
+    if too_large:
+        layout.warn(f"At most {MAX_PIXELS:,} pixels.")
+    elif state.problem:
+        layout.warn(state.problem)
+
+
+def start(ui: Ui, state: Wanted) -> Still | None:
+    """Begins a still as the panel is set; None if its files cannot be written."""
+    studio = ui.studio
+    stereo = studio.scene.stereo
+    ui.memory.pop("stills.suggestion", None)
+    paths = paths_of(state.name.strip() or _suggestion(ui, state), state.kind)
+    try:
+        check(paths, on_their_way(studio.stills), stereo)
+        still = studio.render_still(paths, state.size, state.samples)
+    except ClfractalError as error:
+        state.problem = str(error)
+        return None
+    state.problem = state.name = ""
+    return still
+
+
+# The list
+
+
+def _list(ui: Ui) -> None:
+    stills = ui.studio.stills
+    if not stills:
+        return
+    imgui.dummy(imgui.ImVec2(0, 2))
+    for still in reversed(stills):
+        imgui.push_id(str(id(still)))
+        _still(ui, still)
+        imgui.pop_id()
+    if any(still.finished for still in stills):
+        if w.button("Clear the list", about="Forgets what has ended; the files stay"):
+            ui.studio.stills[:] = [still for still in stills if not still.finished]
+
+
+def _still(ui: Ui, still: Still) -> None:
+    side = imgui.get_frame_height()
+    wide = imgui.get_content_region_avail().x
+    icon, color = _sign(still)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(color), icon)
+    w.in_row(7)
+    imgui.align_text_to_frame_padding()
+    names = ", ".join(path.name for path in _all(still.paths, still.scene.stereo))
+    room = imgui.get_content_region_avail().x - (side + 6 if not still.finished else 0)
+    imgui.text(clipped(names, room))
+    w.tip("\n".join(str(path) for path in _all(still.paths, still.scene.stereo)))
+    if not still.finished:
+        imgui.same_line(imgui.get_content_region_max().x - side)
+        if w.icon_button(theme.CROSS, "Cancel it: nothing is written", name="cancel"):
+            still.cancel()
+    if not still.finished:
+        _bar(still.share, wide)
+    color = theme.WARNING if still.problem else theme.FAINT
+    with theme.font(size=12.5), theme.colors(text=color):
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_unformatted(state_text(still))
+        imgui.pop_text_wrap_pos()
+    imgui.dummy(imgui.ImVec2(0, 2))
+
+
+def _sign(still: Still) -> tuple[str, theme.Rgba]:
+    if still.problem:
+        return theme.WARN, theme.WARNING
+    if still.written:
+        return theme.CHECK, theme.GOOD
+    return (theme.CROSS, theme.FAINT) if still.cancelled else (theme.PICTURE, theme.ACCENT)
+
+
+def state_text(still: Still) -> str:
+    """How far a still is, in few words."""
+    if still.problem:
+        return still.problem
+    size = f"{still.scene.image.width} x {still.scene.image.height}"
+    if still.written:
+        return f"{size}, written"
+    if still.cancelled:
+        return f"{size}, cancelled"
+    if still.share >= 1:
+        return f"{size}, writing"
+    if still.share <= 0:
+        return f"{size}, waiting for the picture"
+    left = f", {time_text(still.remaining)} left" if still.remaining is not None else ""
+    return f"{size}, {100 * still.share:.0f} %{left}"
+
+
+def time_text(seconds: float) -> str:
+    """A time that is left, for people."""
+    if seconds < 90:
+        return f"{max(round(seconds), 1)} s"
+    if seconds < 90 * 60:
+        return f"{round(seconds / 60)} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def _bar(share: float, width: float) -> None:
+    corner, high = imgui.get_cursor_screen_pos(), 5.0
+    draw_list = imgui.get_window_draw_list()
+    far = imgui.ImVec2(corner.x + width, corner.y + high)
+    draw_list.add_rect_filled(corner, far, theme.packed(theme.FRAME), high / 2)
+    if share > 0:
+        filled = imgui.ImVec2(corner.x + max(share * width, high), far.y)
+        draw_list.add_rect_filled(corner, filled, theme.packed(theme.ACCENT), high / 2)
+    imgui.dummy(imgui.ImVec2(width, high))
