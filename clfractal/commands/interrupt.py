@@ -18,6 +18,9 @@ from types import FrameType
 GRACE_SECONDS = 0.35
 """How long the orderly way may take. A child process that compiles is given 0.25 s by Python itself."""
 
+wake: Callable[[], None] = lambda: None
+"""Called from another thread when Ctrl-C has come: makes a main thread that waits outside of Python go on."""
+
 
 def watch(last_words: Callable[[], None], status: int) -> None:
     """From now on Ctrl-C raises KeyboardInterrupt once, and ends the process with `status` soon after.
@@ -46,6 +49,7 @@ def _ignore(_number: int, _frame: FrameType | None) -> None:
 def _end_by_force(reading: int, last_words: Callable[[], None], status: int) -> None:
     while os.read(reading, 1) != bytes([signal.SIGINT]):
         pass
+    wake()
     time.sleep(GRACE_SECONDS)
     last_words()
     os._exit(status)

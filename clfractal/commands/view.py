@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
+from clfractal.commands import interrupt
 from clfractal.commands.render import numbers_of
 from clfractal.commands.shell import Shell
 from clfractal.errors import DeviceError, SceneError, Where
@@ -42,6 +43,7 @@ def view(options: Options, shell: Shell) -> None:
         import ruamel.yaml  # noqa: F401
     except ImportError as error:
         raise DeviceError(f"{_EXTRA} (missing: {error.name})") from error
+    from clfractal.viewer import window
     from clfractal.viewer.begin import begin
     from clfractal.viewer.settings import load_settings
 
@@ -51,6 +53,7 @@ def view(options: Options, shell: Shell) -> None:
     sys.setswitchinterval(0.0002)  # the window's thread must not wait long for the others
     shell.mute_drivers()
     begun = begin(options)
+    interrupt.wake = window.wake
     from clfractal.viewer.app import Viewer
 
     Viewer(begun, settings, remark, shell.say).run()

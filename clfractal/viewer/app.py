@@ -56,9 +56,7 @@ class Viewer:
         ClfractalError: there is no such monitor.
     """
 
-    def __init__(
-        self, begun: Begun, settings: Settings, remark: str, tell: Callable[[str], None]
-    ) -> None:
+    def __init__(self, begun: Begun, settings: Settings, remark: str, tell: Callable[[str], None]) -> None:
         self.options, self.settings, self.tell = begun.options, settings, tell
         options, scene, device = begun.options, begun.scene, begun.device
         self.files = begun.files
@@ -80,6 +78,7 @@ class Viewer:
         self.controls = Controls(self.studio, settings, self.motion)
         self.outputs = Outputs(self.window, self.events.append)
         self.studio.screens = self.outputs.shown_stereo
+        self.pads = window.Pads()
         self.meter = Meter()
         self.small = gl.SmallTextures()
         self.surface = self._new_surface()
@@ -128,8 +127,10 @@ class Viewer:
         """One round: events, motion, what has arrived, and a picture if anything changed."""
         window.poll(self._patience())
         now = time.perf_counter()
+        self.window.look()
+        self.pads.look(now)
         seconds, self._last = now - self._last, now
-        self.inputs.play(now - self.started)
+        self.inputs.play(now)
         moved = False
         while self.events:
             if moved and self.events[0].kind in ("button", "scroll"):
@@ -141,7 +142,7 @@ class Viewer:
             self.window.closing = False
             self.files.ask_to_close()
             self._redraw = _REDRAWN
-        if self.motion.step(now, seconds, window.gamepad(), window.plain_joystick()):
+        if self.motion.step(now, seconds, self.pads.gamepad(), self.pads.six()):
             self._redraw = _REDRAWN
         self._take_settings()
         self.controls.rest(now)
@@ -365,7 +366,9 @@ class Viewer:
     def _redraw_while_busy(self) -> None:
         """A spinner turns while something compiles or is rendered beside the picture."""
         session = self.studio.session
-        awaited = self.ui.memory.pop("awaited", False)  # a panel waits for pictures, or for a thread of its own
+        awaited = self.ui.memory.pop(
+            "awaited", False
+        )  # a panel waits for pictures, or for a thread of its own
         if awaited or session.progress or any(not still.finished for still in self.studio.stills):
             self._wake_at = time.perf_counter() + 0.1
 
@@ -378,7 +381,7 @@ class Viewer:
         wait = _IDLE_SECONDS
         due = self.inputs.next_due
         if due is not None:
-            wait = min(wait, max(self.started + due - time.perf_counter(), 0.0))
+            wait = min(wait, max(due - time.perf_counter(), 0.0))
         if self._wake_at:
             left = self._wake_at - time.perf_counter()
             if left <= 0:
@@ -386,7 +389,7 @@ class Viewer:
                 self._redraw = 1
                 return 0.0
             wait = min(wait, left)
-        if window.gamepad() or window.plain_joystick():
+        if self.pads.any:
             wait = min(wait, 1 / 60)
         return max(min(wait, self.files.patience), 0.001)
 

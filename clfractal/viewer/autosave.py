@@ -6,10 +6,10 @@ when the window's process ends, however it ends.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import secrets
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -26,6 +26,22 @@ from clfractal.scene.load import SceneText, load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.saving import SceneSource, open_source, scene_text
 
+if sys.platform == "win32":  # there a file that is open cannot be removed, and has other locks
+
+    def _lock(descriptor: int, *, wait: bool) -> None:
+        import msvcrt
+
+        msvcrt.locking(descriptor, msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, 1)
+
+else:
+
+    def _lock(descriptor: int, *, wait: bool) -> None:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+_CLOSED_WITH_EXEC = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 _VERSION = 1
 
 
@@ -203,10 +219,10 @@ def _read(folder: Path, name: str, lock: int) -> Recovered | None:
 def _locked_file(path: Path) -> int:
     """A descriptor of a new file that this process holds locked; OSError if that is not possible."""
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | _CLOSED_WITH_EXEC, 0o600)
         # (Where files cannot be locked, the note's process number has to do.)
         with suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            _lock(descriptor, wait=True)
         # Another window may have taken the new file for a left one and removed it before it was locked.
         if _is_at(descriptor, path):
             return descriptor
@@ -216,13 +232,13 @@ def _locked_file(path: Path) -> int:
 def _taken(path: Path) -> int | None:
     """A descriptor of the lock of a window that has ended, now held by this process; None if it is held elsewhere."""
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
+        descriptor = os.open(path, os.O_RDWR | _CLOSED_WITH_EXEC)
     except OSError:
         return None
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _lock(descriptor, wait=False)
         gone = _is_at(descriptor, path)
-    except BlockingIOError:
+    except (BlockingIOError, PermissionError):
         gone = False
     except OSError:
         # A file system without locks: the note tells whose it is.

@@ -59,13 +59,18 @@ def prepared(scene: Scene, executor: LocalExecutor, token: CancelToken, tell: Te
 class Thumbnail:
     """A small picture of a scene, 8-bit RGBA.
 
+    Args:
+        load: gives the scene, in the session's thread.
+        size: width and height, pixels.
+        samples: of a pixel.
+
     Attributes:
         pixels: shape (height, width, 4), when it is finished.
         problem: why there is none.
     """
 
-    def __init__(self, load: Callable[[], Scene], size: tuple[int, int]) -> None:
-        self._load, self.size = load, size
+    def __init__(self, load: Callable[[], Scene], size: tuple[int, int], samples: int = 1) -> None:
+        self._load, self.size, self.samples = load, size, samples
         self.pixels: Pixels | None = None
         self.film: Film | None = None
         self.problem = ""
@@ -109,7 +114,9 @@ class Thumbnail:
         scene = self._load()
         from clfractal.scene.parts import Image
 
-        renderer = scene.renderer.model_copy(update={"samples": 1, "noise": None, "min_samples": None})
+        renderer = scene.renderer.model_copy(
+            update={"samples": self.samples, "noise": None, "min_samples": None}
+        )
         image = Image(width=self.size[0], height=self.size[1])
         return scene.model_copy(update={"image": image, "renderer": renderer, "stereo": None})
 

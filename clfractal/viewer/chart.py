@@ -108,7 +108,9 @@ def circles(size: tuple[int, int]) -> list[tuple[float, float, float]]:
     across, down = width / 2 - 2.5 * cell, height / 2 - 2.5 * cell
     found = [(width / 2, height / 2, float(large)), (width / 2, height / 2, float(small))]
     if float(np.hypot(across, down)) > large + small + cell / 2:
-        found += [(width / 2 + i * across, height / 2 + j * down, float(small)) for i in (-1, 1) for j in (-1, 1)]
+        found += [
+            (width / 2 + i * across, height / 2 + j * down, float(small)) for i in (-1, 1) for j in (-1, 1)
+        ]
     return found
 
 
@@ -246,7 +248,9 @@ def _label(picture: Pixels) -> None:
     size = (picture.shape[1], picture.shape[0])
     cell, unit = grid_cell(size), _unit(size)
     top = bars_box(size)[1] - cell
-    _on_ground(picture, f"{size[0]} x {size[1]}", _centred(size, 5 * cell, cell * 3 // 4, top), max(9, cell // 2))
+    _on_ground(
+        picture, f"{size[0]} x {size[1]}", _centred(size, 5 * cell, cell * 3 // 4, top), max(9, cell // 2)
+    )
     high = max(8, 11 * unit)
     top = size[1] // 2 + 17 * unit
     for pixels in range(100, _ruler_reach(size) // unit + 1, 100):

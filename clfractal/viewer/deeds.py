@@ -181,4 +181,14 @@ class Deeds:
         self.chart_shown = not self.chart_shown
 
 
-_CLOSED_BY_ESCAPE = {"close", "help", "gallery", "variations", "save", "open", "stills", "history", "formula_editor"}
+_CLOSED_BY_ESCAPE = {
+    "close",
+    "help",
+    "gallery",
+    "variations",
+    "save",
+    "open",
+    "stills",
+    "history",
+    "formula_editor",
+}

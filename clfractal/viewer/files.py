@@ -136,7 +136,7 @@ class Files:
         studio.set_scene(scene)  # a step that can be undone: nothing is lost
         studio.saved = source.loaded or scene
         self._watched.follow(source.watched)
-        studio.tell(f"loaded {self.source.path.name} again")
+        studio.tell(f"loaded {source.path.name if source.path else 'the scene'} again")
 
     def recover(self, found: Recovered) -> None:
         """Goes on with unsaved changes of a window that ended."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import OpenGL
 
 OpenGL.ERROR_CHECKING = False  # a query after each call would wait for the driver; `check` asks once a frame
-from OpenGL import GL  # noqa: E402
+from OpenGL import GL as GL  # noqa: E402
 
 from clfractal.errors import DeviceError  # noqa: E402
 

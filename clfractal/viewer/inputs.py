@@ -53,6 +53,8 @@ class Inputs:
         self._held: dict[int, Key] = {}
         self._player: Player | None = None
         self._recorder: Recorder | None = None
+        # Recordings count from the first picture on: what a pointer does depends on what is under it.
+        self._start: float | None = None
         options = viewer.options
         if recording is not None:
             self._player = Player(recording)
@@ -61,18 +63,22 @@ class Inputs:
 
     @property
     def next_due(self) -> float | None:
-        """When the next event of a recording is due, seconds since the start."""
-        return self._player.next_seconds if self._player is not None else None
+        """When the next event of a recording is due, seconds of the loop's clock."""
+        if self._player is None or self._start is None or self._player.next_seconds is None:
+            return None
+        return self._start + self._player.next_seconds
 
     @property
     def played(self) -> bool:
         """Whether nothing of a recording is left."""
         return self._player is None or self._player.done
 
-    def play(self, seconds: float) -> None:
+    def play(self, now: float) -> None:
         """Queues the events of a recording whose time has come."""
-        if self._player is not None:
-            for event in self._player.due(seconds):
+        if self._start is None and self.viewer.surface.shown is not None:
+            self._start = now
+        if self._player is not None and self._start is not None:
+            for event in self._player.due(now - self._start):
                 # The window has its own size now.
                 if event.kind != "resize":
                     self.viewer.events.append(event)
@@ -86,7 +92,7 @@ class Inputs:
         """One event."""
         viewer = self.viewer
         if self._recorder is not None and event.kind in _RECORDED:
-            self._recorder.add(event, now - viewer.started)
+            self._recorder.add(event, now - self._start if self._start is not None else 0.0)
         before = viewer.studio.session.newest
         values: Any = event.values
         handler = getattr(self, f"_{event.kind}", None)
@@ -132,7 +138,7 @@ class Inputs:
         if 0 <= button < 5:
             io.add_mouse_button_event(button, action == PRESS)
         if action == PRESS and not over_panels and not viewer.deeds.flying:
-            imgui.set_window_focus(None)  # type: ignore[arg-type]
+            imgui.set_window_focus(None)
             aim = viewer.aim_at(*self.pointer)
             viewer.controls.press(button, mods, self._in_picture(), aim, now)
 

@@ -138,6 +138,7 @@ class Outputs:
             draw_ui: draws the panels, by the given renderer or the first window's.
         """
         if self.second is not None:
+            self.second.look()
             self._draw_half(surface, 0, charted, self._rectangle, self.first)
             draw_ui(None)
             self.second.use()

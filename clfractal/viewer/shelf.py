@@ -28,6 +28,8 @@ Pixels = npt.NDArray[np.uint8]
 
 SIZE = (480, 270)
 """Pixels of a picture: it is shown at half that size, or on a screen of twice the resolution."""
+SAMPLES = 4
+"""Of a pixel."""
 MOST_KEPT = 500
 """Pictures on the disk; the oldest go first. One has some 250 KB."""
 
@@ -129,9 +131,9 @@ class Shelf:
 
 
 def shown_scene(scene: Scene) -> Scene:
-    """The scene as its small picture shows it: one sample for each of many pixels, and grids that fill at once."""
+    """The scene as its small picture shows it: with few samples, and grids that fill at once."""
     small = small_scene(scene, *SIZE)
-    updates = {"renderer": small.renderer.model_copy(update={"samples": 1})}
+    updates = {"renderer": small.renderer.model_copy(update={"samples": SAMPLES})}
     return small.model_copy(update=updates)
 
 

@@ -248,11 +248,13 @@ class Studio:
 
     # Beside the picture
 
-    def thumbnail(self, key: Hashable, load: Callable[[], Scene], size: tuple[int, int]) -> Thumbnail:
+    def thumbnail(
+        self, key: Hashable, load: Callable[[], Scene], size: tuple[int, int], samples: int = 1
+    ) -> Thumbnail:
         """A small picture that is rendered in the background, once for a key; ask again until it is `finished`."""
         found = self._thumbnails.get(key)
         if found is None:
-            found = self._thumbnails[key] = Thumbnail(load, size)
+            found = self._thumbnails[key] = Thumbnail(load, size, samples)
             self.session.add(found)
             while len(self._thumbnails) > MOST_THUMBNAILS:
                 self._thumbnails.pop(next(iter(self._thumbnails))).cancel()

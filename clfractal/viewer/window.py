@@ -122,6 +122,7 @@ class Window:
         glfw.make_context_current(self.handle)
         glfw.set_window_size_limits(self.handle, *_SMALLEST, glfw.DONT_CARE, glfw.DONT_CARE)
         self._listen()
+        self.look()
 
     def _made(self, size: tuple[int, int], share: Window | None, quad: bool) -> Any:
         glfw.default_window_hints()
@@ -192,15 +193,24 @@ class Window:
 
     @property
     def framebuffer(self) -> tuple[int, int]:
-        """Size in pixels; (0, 0) while it is minimised."""
-        width, height = glfw.get_framebuffer_size(self.handle)
-        return int(width), int(height)
+        """Size in pixels; (0, 0) while it is minimised. As of the last `look`."""
+        return self._framebuffer
 
     @property
     def size(self) -> tuple[int, int]:
-        """Size in screen coordinates."""
+        """Size in screen coordinates, as of the last `look`."""
+        return self._size
+
+    def look(self) -> None:
+        """Asks the system for what may have changed; once for each round of the loop.
+
+        Each question to GLFW may wait for another thread's turn of the interpreter, so nothing is asked twice.
+        """
+        width, height = glfw.get_framebuffer_size(self.handle)
+        self._framebuffer = (int(width), int(height))
         width, height = glfw.get_window_size(self.handle)
-        return int(width), int(height)
+        self._size = (int(width), int(height))
+        self._iconified = bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
 
     @property
     def scale(self) -> float:
@@ -212,7 +222,7 @@ class Window:
     @property
     def minimised(self) -> bool:
         """Whether nothing of it can be seen."""
-        return bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED)) or 0 in self.framebuffer
+        return self._iconified or 0 in self.framebuffer
 
     @property
     def closing(self) -> bool:
@@ -246,7 +256,7 @@ class Window:
         def overlap(each: Monitor) -> int:
             across = min(x + width, each.x + each.width) - max(x, each.x)
             down = min(y + height, each.y + each.height) - max(y, each.y)
-            return max(across, 0) * max(down, 0)
+            return int(max(across, 0) * max(down, 0))
 
         return max(monitors(), key=overlap, default=None)
 
@@ -277,6 +287,7 @@ class Window:
         glfw.set_window_attrib(self.handle, glfw.DECORATED, False)
         glfw.set_window_attrib(self.handle, glfw.FLOATING, True)
         glfw.set_window_monitor(self.handle, None, left, top, right - left, bottom - top, glfw.DONT_CARE)
+        self.look()
 
     def unfill(self) -> None:
         """Becomes the window that it was before `fill`."""
@@ -287,6 +298,7 @@ class Window:
         glfw.set_window_attrib(self.handle, glfw.FLOATING, False)
         glfw.set_window_attrib(self.handle, glfw.DECORATED, True)
         glfw.set_window_monitor(self.handle, None, x, y, width, height, glfw.DONT_CARE)
+        self.look()
 
     def pointer(self) -> tuple[float, float]:
         """The pointer's place, screen coordinates from the window's top left."""
@@ -368,21 +380,39 @@ def key_name(key: int, scancode: int) -> str | None:
     return _text(name) if name else None
 
 
-def gamepad() -> tuple[list[float], list[int]] | None:
-    """Axes (left x, left y, right x, right y, left and right trigger; -1 to 1) and buttons of the first gamepad."""
-    for number in range(glfw.JOYSTICK_1, glfw.JOYSTICK_LAST + 1):
-        if glfw.joystick_present(number) and glfw.joystick_is_gamepad(number):
-            state = glfw.get_gamepad_state(number)
-            if state:
-                return list(state.axes), list(state.buttons)
-    return None
+class Pads:
+    """Gamepads and 3D mice; looked for once a second, and asked only if there are any."""
 
+    def __init__(self) -> None:
+        self._looked = -10.0
+        self._gamepad: int | None = None
+        self._joystick: int | None = None
 
-def plain_joystick() -> list[float] | None:
-    """The six axes of a 3D mouse (moves x, y, z; turns x, y, z), which is a joystick without a gamepad's layout."""
-    for number in range(glfw.JOYSTICK_1, glfw.JOYSTICK_LAST + 1):
-        if glfw.joystick_present(number) and not glfw.joystick_is_gamepad(number):
-            pointer, count = glfw.get_joystick_axes(number)
-            if count >= 6:
-                return [float(pointer[index]) for index in range(6)]
-    return None
+    @property
+    def any(self) -> bool:
+        """Whether there are any."""
+        return self._gamepad is not None or self._joystick is not None
+
+    def look(self, now: float) -> None:
+        """Looks for what was plugged in or out; `now` in seconds."""
+        if now - self._looked < 1.0:
+            return
+        self._looked = now
+        there = [n for n in range(glfw.JOYSTICK_1, glfw.JOYSTICK_LAST + 1) if glfw.joystick_present(n)]
+        pads = [n for n in there if glfw.joystick_is_gamepad(n)]
+        self._gamepad = next(iter(pads), None)
+        self._joystick = next((n for n in there if n not in pads), None)
+
+    def gamepad(self) -> tuple[list[float], list[int]] | None:
+        """Axes (left x, left y, right x, right y, left and right trigger; -1 to 1) and buttons of the first gamepad."""
+        if self._gamepad is None:
+            return None
+        state = glfw.get_gamepad_state(self._gamepad)
+        return (list(state.axes), list(state.buttons)) if state else None
+
+    def six(self) -> list[float] | None:
+        """The six axes of a 3D mouse (moves x, y, z; turns x, y, z), which is a joystick without a gamepad's layout."""
+        if self._joystick is None:
+            return None
+        pointer, count = glfw.get_joystick_axes(self._joystick)
+        return [float(pointer[index]) for index in range(6)] if count >= 6 else None

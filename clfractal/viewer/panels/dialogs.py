@@ -114,7 +114,6 @@ def _closing(ui: Ui, files: Files) -> None:
     _begin(ui, "Unsaved changes", "The scene differs from its file.")
     if buttons.button("Save", primary=True):
         ui.show.discard("close")
-        files.leaving = False
         _save_and_leave(ui, files)
     layout.in_row()
     if buttons.button("Discard"):
@@ -122,7 +121,6 @@ def _closing(ui: Ui, files: Files) -> None:
     layout.in_row()
     if buttons.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
         ui.show.discard("close")
-        files.leaving = False
     imgui.end()
 
 

@@ -12,7 +12,7 @@ from clfractal import resources
 from clfractal.viewer.panels import cards, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.shelf import SIZE, Entry, Shelf
+from clfractal.viewer.shelf import SAMPLES, SIZE, Entry, Shelf
 
 KINDS = {"all": "All", "surface": "Surfaces", "volume": "Volumes", "cut": "Cut planes", "stereo": "Stereo"}
 """What the gallery can be narrowed to, and its words."""
@@ -192,6 +192,8 @@ def _line(entry: Entry) -> str:
     if entry.scene is None:
         return entry.path.name
     formula = entry.scene.formula.name or "formula of its own"
+    if formula == entry.path.stem:
+        return formula
     return f"{entry.path.stem}  \u00b7  {formula.replace('_', ' ')}"
 
 
@@ -211,7 +213,7 @@ def _picture(ui: Ui, state: Gallery, entry: Entry) -> None:
     if not entry.key or scene is None:
         return
     state.asked.add(entry)
-    found = ui.studio.thumbnail(_key(entry), lambda: scene, SIZE)
+    found = ui.studio.thumbnail(_key(entry), lambda: scene, SIZE, SAMPLES)
     if found.pixels is not None:
         entry.pixels = found.pixels
         state.shelf.keep(entry)

@@ -205,9 +205,10 @@ def _add(ui: Ui, marks: Mapping[str, Any]) -> None:
     ui.memory[key] = text
     w.in_row(4)
     hint = ui.keys.hint("bookmark_add")
-    if w.icon_button(theme.PLUS, f"Keep the present camera under this name ({hint})", name="add") or done:
-        if add(ui, text.strip() or free_name(marks)):
-            ui.memory[key] = ""
+    about = f"Keep the present camera under this name ({hint}: a free name)"
+    wanted = w.icon_button(theme.PLUS, about, name="add") or done
+    if wanted and add(ui, text.strip() or free_name(marks)):
+        ui.memory[key] = ""
 
 
 def free_name(marks: Mapping[str, Any]) -> str:

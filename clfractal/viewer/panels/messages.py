@@ -33,7 +33,10 @@ def draw(ui: Ui) -> None:
     bottom = ui.size[1] - theme.MARGIN - (64 if "overlay" in ui.show else 0)
     width = min(_WIDTH, ui.size[0] - 2 * theme.MARGIN)
     left = ui.size[0] - theme.MARGIN - width
-    for text, wrong, alpha in reversed(visible(ui, time.perf_counter())):
+    shown = visible(ui, time.perf_counter())
+    if shown:
+        ui.memory["awaited"] = True  # they have to go, though nothing else may happen
+    for text, wrong, alpha in reversed(shown):
         size = imgui.calc_text_size(text, False, width - 34)
         top = bottom - size.y - 16
         canvas.add_rect_filled(

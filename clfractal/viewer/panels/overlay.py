@@ -7,7 +7,9 @@ import time
 
 from imgui_bundle import imgui
 
+from clfractal.scene.checks import used_bounds
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import zoom_box
@@ -56,10 +58,10 @@ def _scene(ui: Ui) -> list[Pair]:
     found: list[Pair] = [("iterations", f"{scene.formula.iterations}")]
     if isinstance(renderer, SurfaceRenderer):
         found.append(("method", f"{renderer.search}, {renderer.normal.replace('_', ' ')}"))
-        step = f"{renderer.step:g}" if renderer.search == "steps" else f"{renderer.detail:g} px"
-        found.append(("step", step))
+        found.append(("step", _step(scene, renderer)))
     elif isinstance(renderer, VolumeRenderer):
-        found.append(("method", f"volume, {renderer.value}"))
+        found.append(("method", f"volume, {renderer.value}, {renderer.normals.replace('_', ' ')}"))
+        found.append(("step", f"{renderer.step:g} voxels"))
         found.append(("zoom", number_text(renderer.magnification)))
         box = _marked(ui)
         if box is not None:
@@ -74,6 +76,13 @@ def _scene(ui: Ui) -> list[Pair]:
         if pick is not None and pick.point is not None:
             found.append(("point", ", ".join(f"{each:.4g}" for each in pick.point)))
     return found
+
+
+def _step(scene: Scene, renderer: SurfaceRenderer) -> str:
+    """The fixed step of a search by steps, scene units; else the distance that counts as a hit, pixels."""
+    if renderer.search == "distance":
+        return f"{renderer.detail:g} px"
+    return f"{used_bounds(scene)[1] / 100 if renderer.step is None else renderer.step:.4g}"
 
 
 def _marked(ui: Ui) -> zoom_box.ZoomBox | None:
@@ -154,7 +163,7 @@ def _figures(ui: Ui, left: float, bottom: float) -> float:
             imgui.ImVec2(left + 6 + (wide - 12) * share, bottom - 1),
             theme.packed(theme.ACCENT),
         )
-    return top - 6
+    return float(top - 6)
 
 
 def _width(pair: Pair) -> float:

@@ -1,4 +1,4 @@
-"""The column at the window's right, which variations, stills, and history share: those that are open lie below each other."""
+"""The column at the window's right: variations, stills and history, those that are open below each other."""
 
 from __future__ import annotations
 

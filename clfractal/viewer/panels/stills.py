@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,6 @@ class Wanted:
     kind: str = "png"
     name: str = ""
     problem: str = ""
-    kept: dict[int, float] = field(default_factory=dict)
 
 
 def draw(ui: Ui) -> None:
@@ -127,10 +126,10 @@ def on_their_way(stills: Iterable[Still]) -> set[Path]:
 def _settings(ui: Ui, state: Wanted) -> None:
     size = state.size or _window_size(ui)
     name = next((name for name, each in PRESETS.items() if each == state.size), "")
-    label, width = _label("Size")
+    width = _label("Size")
     found = w.choose("stills.preset", _preset_words(ui), name or "free", width)
     if found is not None:
-        state.size = PRESETS[found] if found in PRESETS else size
+        state.size = PRESETS.get(found, size)
     _label("")
     room = imgui.get_content_region_avail().x
     each = (room - 20) / 2
@@ -143,7 +142,7 @@ def _settings(ui: Ui, state: Wanted) -> None:
     if wide is not None or high is not None:
         state.size = (wide or size[0], high or size[1])
     present = ui.studio.scene.renderer.samples
-    _, width = _label("Samples")
+    width = _label("Samples")
     samples = _number(ui, "stills.samples", state.samples or present, width - 30, _MOST_SAMPLES)
     if samples is not None:
         state.samples = samples
@@ -151,11 +150,11 @@ def _settings(ui: Ui, state: Wanted) -> None:
     about = f"As the scene says: {present}"
     if w.icon_button(theme.RESET, about, name="stills.samples.reset", enabled=state.samples is not None):
         state.samples = None
-    _, width = _label("Format")
+    width = _label("Format")
     chosen = w.segments("stills.kind", FORMATS, state.kind, width)
     if chosen is not None:
         state.kind, state.problem = chosen, ""
-    _, width = _label("Name")
+    width = _label("Name")
     suggestion = _suggestion(ui, state)
     imgui.set_next_item_width(width)
     _, text = imgui.input_text_with_hint("##stills.name", suggestion, state.name)
@@ -164,15 +163,15 @@ def _settings(ui: Ui, state: Wanted) -> None:
     w.tip(f"Without ending; in {Path.cwd()} unless a folder is given")
 
 
-def _label(text: str) -> tuple[str, float]:
-    """A label, then the place of its widget; the text, and the width that the widget has, points."""
+def _label(text: str) -> float:
+    """A label, then the place of its widget; the width that this has, points."""
     wide = imgui.get_content_region_avail().x
     start = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec(theme.DIM), text)
     left = 0.27 * wide
     imgui.same_line(start + left)
-    return text, wide - left
+    return float(wide - left)
 
 
 def _number(ui: Ui, name: str, value: int, width: float, most: int) -> int | None:
@@ -251,9 +250,9 @@ def _list(ui: Ui) -> None:
         imgui.push_id(str(id(still)))
         _still(ui, still)
         imgui.pop_id()
-    if any(still.finished for still in stills):
-        if w.button("Clear the list", about="Forgets what has ended; the files stay"):
-            ui.studio.stills[:] = [still for still in stills if not still.finished]
+    ended = any(still.finished for still in stills)
+    if ended and w.button("Clear the list", about="Forgets what has ended; the files stay"):
+        ui.studio.stills[:] = [still for still in stills if not still.finished]
 
 
 def _still(ui: Ui, still: Still) -> None:

@@ -16,7 +16,6 @@ from clfractal.scene.model import Scene
 from clfractal.viewer.panels import cards, layout, right_dock, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
-from clfractal.work.varied import Kind, Strength
 from clfractal.work.variations import (
     KINDS,
     STRENGTHS,
@@ -26,6 +25,7 @@ from clfractal.work.variations import (
     preview_scene,
     worthwhile,
 )
+from clfractal.work.varied import Kind, Strength
 
 COUNT = 12
 SPARES = 6
