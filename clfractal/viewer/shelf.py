@@ -6,6 +6,7 @@ Kept pictures are optional, as all of the cache is: without them they are render
 from __future__ import annotations
 
 import os
+import re
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -30,6 +31,7 @@ SIZE = (480, 270)
 """Pixels of a picture: it is shown at half that size, or on a screen of twice the resolution."""
 SAMPLES = 4
 """Of a pixel."""
+_TAKES = re.compile(r"Takes (about|some)? ?[^.]*\d+ x \d+[^.]*\.")
 MOST_KEPT = 500
 """Pictures on the disk; the oldest go first. One has some 250 KB."""
 
@@ -149,13 +151,17 @@ def kind_of(scene: Scene) -> str:
 
 
 def words_of(text: str) -> tuple[str, str]:
-    """The title and the description that a scene file begins with: its first lines of comment."""
+    """The title and the description that a scene file begins with: its first lines of comment.
+
+    How long the picture takes at its full size is left out.
+    """
     lines = []
     for line in text.splitlines():
         if not line.startswith("#"):
             break
         lines.append(line.lstrip("#").strip())
-    return (lines[0] if lines else "", " ".join(lines[1:]))
+    about = " ".join(lines[1:]).replace("`", "")
+    return (lines[0] if lines else "", _TAKES.sub("", about).strip())
 
 
 def _read_words(entry: Entry) -> None:

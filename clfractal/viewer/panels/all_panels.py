@@ -10,6 +10,7 @@ from clfractal.viewer.panels import (
     menu,
     messages,
     overlay,
+    right_dock,
     scene_dock,
     stills,
     variations,
@@ -22,6 +23,7 @@ def draw(ui: Ui) -> None:
     overlay.draw(ui)
     scene_dock.draw(ui)
     menu.draw(ui)
+    right_dock.fit(ui)
     variations.draw(ui)
     stills.draw(ui)
     history.draw(ui)

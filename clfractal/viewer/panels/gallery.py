@@ -17,6 +17,7 @@ from clfractal.viewer.shelf import SAMPLES, SIZE, Entry, Shelf
 KINDS = {"all": "All", "surface": "Surfaces", "volume": "Volumes", "cut": "Cut planes", "stereo": "Stereo"}
 """What the gallery can be narrowed to, and its words."""
 _LEAST = 190.0  # points of a card
+_COLUMNS = 6.5  # at most
 _LARGEST = 0.8  # of the window
 _ABOUT = 320  # characters
 
@@ -145,7 +146,7 @@ def _cards(ui: Ui, state: Gallery) -> None:
     flags = imgui.WindowFlags_.always_vertical_scrollbar
     imgui.begin_child("##cards", imgui.ImVec2(room.x, room.y - foot), 0, flags)
     inner = imgui.get_content_region_avail().x - 6
-    columns, width = cards.grid(inner, _LEAST, 14.0)
+    columns, width = cards.grid(inner, max(_LEAST, inner / _COLUMNS), 14.0)
     left, top = imgui.get_cursor_pos_x(), imgui.get_cursor_pos_y() + 2
     shown = [entry for entry in state.shelf.entries if matches(entry, state.kind, _text(ui))]
     high = cards.height(width, cards.Card("", None, title="-", line="-")) + 12

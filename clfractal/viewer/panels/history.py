@@ -45,7 +45,7 @@ def _stack(ui: Ui, kind: Kind) -> None:
     w.in_row(8)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec(theme.FAINT), f"{done} back, {undone} forth")
-    imgui.same_line(imgui.get_content_region_max().x - 2 * imgui.get_frame_height() - 3)
+    imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - 2 * imgui.get_frame_height() - 3)
     hint = ui.keys.hint(undo)
     if w.icon_button(theme.UNDO, f"Undo ({hint})", name=undo, enabled=done > 0):
         ui.act(undo)

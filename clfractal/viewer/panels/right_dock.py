@@ -11,8 +11,8 @@ from clfractal.viewer.panels import menu, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
-_PARTS = {"variations": 2.0, "stills": 1.0, "history": 1.2}
-"""Parts in their order, and their shares of the height."""
+_PARTS = {"variations": (370.0, 2.0), "stills": (250.0, 0.7), "history": (230.0, 1.0)}
+"""Parts in their order: the least height that they can be used with, points, and their shares of what is left."""
 _OVERLAY = 64.0
 """Points at the lower rim that belong to the overlay."""
 _WIDEST = 420.0
@@ -23,19 +23,35 @@ def width_of(ui: Ui) -> float:
     return min(max(0.21 * ui.size[0], theme.DOCK_RIGHT), _WIDEST, ui.size[0] - 2 * theme.MARGIN)
 
 
+def fit(ui: Ui) -> None:
+    """Closes the parts that have been open longest, until the others have room; before they are drawn."""
+    order: list[str] = ui.memory.setdefault("right_dock", [])
+    shown = [name for name in _PARTS if name in ui.show]
+    order[:] = [name for name in order if name in shown] + [name for name in shown if name not in order]
+    top, bottom = _span(ui)
+    while len(order) > 1:
+        needed = sum(_PARTS[name][0] for name in order) + theme.MARGIN * (len(order) - 1)
+        if needed <= bottom - top:
+            return
+        ui.show.discard(order.pop(0))
+
+
 def place(ui: Ui, part: str) -> tuple[float, float, float, float]:
     """Left, top, width and height of a part that is open, points."""
-    top = theme.MARGIN + (menu.HEIGHT + theme.MARGIN if "panels" in ui.show else 0.0)
-    bottom = ui.size[1] - theme.MARGIN - (_OVERLAY if "overlay" in ui.show else 0.0)
+    top, bottom = _span(ui)
     shown = [name for name in _PARTS if name in ui.show]
-    room = bottom - top - theme.MARGIN * (len(shown) - 1)
-    total = sum(_PARTS[name] for name in shown)
-    for name in shown:
-        high = room * _PARTS[name] / total
-        if name == part:
-            return ui.size[0] - theme.MARGIN - width_of(ui), top, width_of(ui), max(high, 80.0)
-        top += high + theme.MARGIN
-    raise KeyError(part)
+    before = shown[: shown.index(part)]
+    left_over = bottom - top - theme.MARGIN * (len(shown) - 1) - sum(_PARTS[name][0] for name in shown)
+    total = sum(_PARTS[name][1] for name in shown)
+    high = {name: max(_PARTS[name][0] + left_over * _PARTS[name][1] / total, 80.0) for name in shown}
+    top += sum(high[name] + theme.MARGIN for name in before)
+    return ui.size[0] - theme.MARGIN - width_of(ui), top, width_of(ui), high[part]
+
+
+def _span(ui: Ui) -> tuple[float, float]:
+    """Where the column begins and ends, below the bar of buttons and above the overlay."""
+    top = theme.MARGIN + (menu.HEIGHT + theme.MARGIN if "panels" in ui.show else 0.0)
+    return top, ui.size[1] - theme.MARGIN - (_OVERLAY if "overlay" in ui.show else 0.0)
 
 
 @contextmanager

@@ -268,7 +268,7 @@ def _still(ui: Ui, still: Still) -> None:
     imgui.text(clipped(names, room))
     w.tip("\n".join(str(path) for path in _all(still.paths, still.scene.stereo)))
     if not still.finished:
-        imgui.same_line(imgui.get_content_region_max().x - side)
+        imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - side)
         if w.icon_button(theme.CROSS, "Cancel it: nothing is written", name="cancel"):
             still.cancel()
     if not still.finished:

@@ -30,8 +30,10 @@ from clfractal.work.varied import Kind, Strength
 COUNT = 12
 SPARES = 6
 """Variations that take the places of those that show nothing."""
-SIZE = (400, 224)
-"""Pixels of a picture: it is shown at half that size, or on a screen of twice the resolution."""
+SIZE = (264, 148)
+"""Pixels of a picture: it is shown at about half that size, or on a screen of twice the resolution."""
+SAMPLES = 4
+"""Of a pixel."""
 _KEPT = ("image", "output", "stereo", "bookmarks")
 _LEAST = 118.0  # points of a card
 _GAP = 6.0
@@ -226,7 +228,7 @@ def _grid(ui: Ui, state: Choice) -> None:
 def _card(ui: Ui, state: Choice, work: Draw, number: int, width: float) -> None:
     variation, small = work.found[number]
     key = ("variation", state.number, number)
-    picture = ui.studio.thumbnail(key, lambda: small, SIZE)
+    picture = ui.studio.thumbnail(key, lambda: small, SIZE, SAMPLES)
     if picture.film is not None:
         if len(work.found) - len(state.dull) > COUNT and not worthwhile(picture.film):
             state.dull.add(number)

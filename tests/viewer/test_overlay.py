@@ -1,0 +1,299 @@
+"""What is told over the picture: the figures of known scenes, messages that come and go, and the help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from imgui_bundle import imgui
+
+from clfractal.files.document import read_document
+from clfractal.optics import stereo as geometry
+from clfractal.optics.view import scene_view
+from clfractal.scene.load import SceneText, load_scene
+from clfractal.scene.model import Scene
+from clfractal.viewer import zoom_box
+from clfractal.viewer.actions import ACTIONS
+from clfractal.viewer.keys import KeyMap
+from clfractal.viewer.panels import help as help_panel
+from clfractal.viewer.panels import messages, overlay
+from clfractal.viewer.panels.ui import Speed, Ui
+from clfractal.viewer.studio import MESSAGE_SECONDS, Message
+from tests.viewer.panel_harness import Stage, headless, make_ui
+
+BULB = "version: 1\nformula: {name: mandelbulb, iterations: 9}\ncamera: {}\n"
+VOLUME = (
+    BULB + "renderer: {type: volume, resolution: 64, zoom: [{center: [0, 0, 0], scale: 4},"
+    " {center: [0.1, 0, 0], scale: 3}]}\n"
+)
+PLANE = BULB + "renderer: {type: cut_plane, plane: {height: 2.5}}\n"
+STEREO = BULB + (
+    "stereo: {mode: split_half, screen_width: 0.5, screen_distance: 0.7, interpupillary_distance: 0.06, swap: true}\n"
+)
+
+
+def ui_of(text: str) -> Ui:
+    """What panels are given for a scene's text."""
+    return make_ui(scene(text))[0]
+
+
+def scene(text: str) -> Scene:
+    """The scene of a text."""
+    return load_scene(SceneText(read_document(text), Path()))
+
+
+def told(ui: Ui) -> dict[str, str]:
+    """All figures by their labels, each of which is there once."""
+    pairs = [pair for row in overlay.lines(ui) for pair in row]
+    assert len({label for label, _ in pairs}) == len(pairs)
+    return dict(pairs)
+
+
+def frame(ui: Ui, **changes: Any) -> None:
+    """Gives the session a frame."""
+    values = {
+        "seconds": 2.5,
+        "frame_seconds": 0.0123,
+        "divider": 1,
+        "samples": 3,
+        "finished": False,
+        "job": SimpleNamespace(samples=16, precision="float32"),
+        "arrangement": SimpleNamespace(size=lambda look: (640, 360)),
+        **changes,
+    }
+    ui.studio.session.frame = SimpleNamespace(**values)  # type: ignore[assignment]
+    ui.studio.session.paused = False
+
+
+def test_a_picture_s_figures() -> None:
+    ui = ui_of(BULB)
+    ui.speed = Speed(29.6, 0.04, "shared")
+    frame(ui)
+    found = told(ui)
+    assert found["render"] == "2.5 s"
+    assert found["frames"] == "30/s"
+    assert found["samples"] == "3 of 16"
+    assert found["size"] == "640 x 360"
+    assert found["number"] == "float32"
+    assert found["picture"] == "shared"
+    assert found["device"] == "Processor of the tests"
+
+
+def test_a_coarse_picture_tells_its_divider_and_its_own_time() -> None:
+    ui = ui_of(BULB)
+    frame(ui, divider=4, samples=1)
+    found = told(ui)
+    assert found["size"].endswith("1/4")
+    assert found["render"] == "12 ms"
+    assert "frames" not in found  # nothing moves
+
+
+def test_a_paused_picture_says_so_until_it_is_finished() -> None:
+    ui = ui_of(BULB)
+    frame(ui)
+    ui.studio.session.paused = True
+    assert told(ui)["samples"] == "3 of 16, paused"
+    frame(ui, samples=16, finished=True)
+    ui.studio.session.paused = True
+    assert told(ui)["samples"] == "16 of 16"
+
+
+def test_without_a_frame_there_is_still_what_the_scene_tells() -> None:
+    found = told(ui_of(BULB))
+    assert found["iterations"] == "9"
+    assert "render" not in found
+
+
+def test_the_method_follows_the_renderer() -> None:
+    surface = told(ui_of(BULB))
+    assert (surface["method"], surface["step"]) == ("distance, gradient", "1 px")
+    steps = told(ui_of(BULB + "renderer: {search: steps, step: 0.02, normal: least_squares}\n"))
+    assert (steps["method"], steps["step"]) == ("steps, least squares", "0.02")
+    assert told(ui_of(VOLUME))["method"] == "volume, inside, gradient"
+    assert told(ui_of(PLANE))["method"] == "cut plane"
+    assert "2.5" in told(ui_of(PLANE))["plane"]
+
+
+def test_a_fixed_search_without_a_step_has_figures_too() -> None:
+    """Its step is null: the hundredth part of the bounds' radius."""
+    ui = ui_of(BULB + "renderer: {search: steps, bounds: {radius: 3.5}}\n")
+    assert told(ui)["step"] == "0.035"
+
+
+def test_a_volume_tells_its_zoom_and_the_next_one() -> None:
+    ui = ui_of(VOLUME)
+    assert told(ui)["zoom"] == "12x"
+    assert "new zoom" not in told(ui)
+    box = zoom_box.ZoomBox((0.1, 0.0, 0.0), 5.0)
+    ui.memory["controls"] = SimpleNamespace(box=box, marking=True)
+    assert told(ui)["new zoom"] == "60x"
+    ui.memory["controls"].marking = False
+    assert "new zoom" not in told(ui)
+
+
+def pick_at(ui: Ui, point: tuple[float, float, float] | None, depth: float) -> None:
+    """Puts the pointer over a point of the scene."""
+    ui.pick = SimpleNamespace(point=point, depth=depth)  # type: ignore[assignment]
+
+
+def test_depth_and_place_under_the_pointer() -> None:
+    ui = ui_of(BULB)
+    assert told(ui)["depth"] == "-"
+    pick_at(ui, (0.5, -1.25, 0.125), 1.75)
+    assert told(ui)["depth"] == "1.75"
+    assert told(ui)["point"] == "0.5, -1.25, 0.125"
+    pick_at(ui, None, float("inf"))
+    assert told(ui)["depth"] == "-"
+    assert "point" not in told(ui)
+
+
+def test_stereo_tells_mode_distances_and_parallax() -> None:
+    ui = ui_of(STEREO)
+    found = told(ui)
+    assert found["stereo"] == "split half, swapped"
+    assert "0.5" in found["screen"]
+    assert "0.7" in found["screen"]
+    assert "0.06" in found["eyes"]
+    assert not {"stereo", "screen", "eyes", "parallax"} & set(told(ui_of(BULB)))
+
+
+@given(st.floats(0.3, 8.0))
+def test_parallax_is_that_of_the_thesis(distance: float) -> None:
+    """e (1 - d / z) for a point at depth z on the middle eye's axis, screen at depth d (section 3.3.1)."""
+    ui = ui_of(STEREO)
+    shown = ui.studio.shown_scene
+    assert shown.stereo is not None
+    middle = geometry.eye_views(shown)["middle"]
+    assert middle.eye is not None
+    screen = geometry.eye_distance(middle)
+    point = middle.eye + middle.axis * screen * distance
+    x, y, z = point.tolist()
+    pick_at(ui, (x, y, z), distance)
+    on_screen = float(told(ui)["parallax"].split(",")[0])
+    assert on_screen == pytest.approx(0.06 * (1 - 1 / distance), abs=6e-5, rel=1e-3)
+
+
+def test_the_point_that_cameras_look_at_lies_on_the_screen() -> None:
+    ui = ui_of(STEREO)
+    target = ui.studio.scene.camera.target
+    assert np.allclose(scene_view(ui.studio.scene).center, target)
+    pick_at(ui, target, 3.0)
+    assert abs(float(told(ui)["parallax"].split(",")[0])) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "0 ms"),
+        (0.0421, "42 ms"),
+        (0.999, "999 ms"),
+        (1.0, "1.0 s"),
+        (59.94, "59.9 s"),
+        (600, "10.0 min"),
+    ],
+)
+def test_times(seconds: float, text: str) -> None:
+    assert overlay.seconds_text(seconds) == text
+
+
+@pytest.mark.parametrize("text", [BULB, VOLUME, PLANE, STEREO])
+@pytest.mark.parametrize("size", [(1280.0, 720.0), (640.0, 400.0), (2560.0, 1440.0)])
+def test_rows_fit_into_the_window(text: str, size: tuple[float, float]) -> None:
+    ui = ui_of(text)
+    frame(ui)
+    with headless():
+        ui.size = size
+        stage = Stage(ui, overlay.draw, window=False)
+        stage.frame()
+        room = size[0] - 340
+        imgui.new_frame()
+        rows = overlay._wrapped(overlay.lines(ui), room)
+        widths = [sum(overlay._width(pair) for pair in row) for row in rows if len(row) > 1]
+        imgui.end_frame()
+    assert all(width <= room for width in widths)
+    assert [pair for row in rows for pair in row] == [pair for row in overlay.lines(ui) for pair in row]
+
+
+# Messages
+
+
+def test_messages_come_fade_and_go() -> None:
+    ui = ui_of(BULB)
+    ui.studio.messages = [Message("saved", False, 100.0), Message("cannot be read", True, 100.0)]
+    assert messages.visible(ui, 100.0) == [("saved", False, 1.0), ("cannot be read", True, 1.0)]
+    late = messages.visible(ui, 100.0 + MESSAGE_SECONDS - 0.25)
+    assert late[0][0] == "saved"
+    assert late[0][2] == pytest.approx(0.5)
+    assert [text for text, _, _ in messages.visible(ui, 101.0 + MESSAGE_SECONDS)] == ["cannot be read"]
+    assert messages.visible(ui, 100.0 + 3 * MESSAGE_SECONDS) == []
+
+
+def test_a_repeated_message_is_shown_once_and_begins_anew() -> None:
+    ui = ui_of(BULB)
+    ui.studio.messages = [Message("nothing more", False, 100.0), Message("nothing more", False, 104.0)]
+    assert messages.visible(ui, 104.0) == [("nothing more", False, 1.0)]
+    assert messages.visible(ui, 104.0 + MESSAGE_SECONDS - 1) == [("nothing more", False, 1.0)]
+
+
+def test_the_newest_of_many_messages_are_shown() -> None:
+    ui = ui_of(BULB)
+    ui.studio.messages = [Message(f"line {number}", False, 100.0) for number in range(30)]
+    shown = [text for text, _, _ in messages.visible(ui, 100.0)]
+    assert shown == [f"line {number}" for number in range(30 - len(shown), 30)]
+    assert 2 <= len(shown) <= 6
+
+
+def test_a_message_that_goes_asks_for_more_frames() -> None:
+    """Without them it would stay until the next event."""
+    ui = ui_of(BULB)
+    with headless():
+        stage = Stage(ui, messages.draw, window=False)
+        assert "awaited" not in ui.memory
+        ui.studio.tell("saved")
+        stage.frame()
+        assert ui.memory.pop("awaited")
+        ui.studio.messages.clear()
+        stage.frame()
+        assert "awaited" not in ui.memory
+
+
+# Help
+
+
+def test_the_help_has_every_key_and_the_pointer() -> None:
+    ui = ui_of(BULB)
+    blocks = help_panel.blocks(ui)
+    assert [title for title, _ in blocks] == [
+        "Pointer",
+        *dict.fromkeys(action.group for action in ACTIONS.values()),
+    ]
+    shown = {told for _, rows in blocks for _, told in rows}
+    assert {action.help for name, action in ACTIONS.items() if ui.keys.chords_of(name)} <= shown
+    keys = " ".join(keys for _, rows in blocks for keys, _ in rows)
+    for chord in ("F1", "F2", "F11", "Ctrl+S", "Ctrl+Z", "Ctrl+Shift+Z", "Escape"):
+        assert chord in keys
+
+
+def test_the_help_has_the_user_s_own_keys() -> None:
+    ui = ui_of(BULB)
+    ui.keys = KeyMap.from_settings({"help": "Ctrl+F9"})
+    rows = dict(help_panel.blocks(ui))["Window"]
+    assert ("Ctrl+F9", ACTIONS["help"].help) in rows
+
+
+@given(st.lists(st.integers(1, 30), min_size=1, max_size=12), st.integers(1, 4))
+def test_columns_keep_the_order_and_are_about_equally_high(heights: list[int], count: int) -> None:
+    found = [(f"{number}", [("key", "told")] * rows) for number, rows in enumerate(heights)]
+    columns = help_panel.columns_of(found, count)
+    assert [block for column in columns for block in column] == found
+    assert 1 <= len(columns) <= count
+    assert all(columns)
+    total, largest = sum(heights) + 2 * len(heights), max(heights) + 2
+    # The last column takes what is left; no other one is much higher than its share.
+    for column in columns[:-1]:
+        assert sum(len(rows) + 2 for _, rows in column) <= total / count + 1.5 * largest
