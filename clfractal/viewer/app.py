@@ -91,6 +91,7 @@ class Viewer:
         self.pick: Pick | None = None
         self.finished = False
         self._hidden = False
+        self._told: Any = None
         self._failed: set[str] = set()
         self._redraw = _REDRAWN
         self._last = time.perf_counter()
@@ -238,6 +239,11 @@ class Viewer:
             self._rest(True)
         self._mind_device()
         self.studio.tick()
+        session = self.studio.session
+        told = (session.problem, session.progress, session.paused)
+        if told != self._told:
+            self._told = told
+            self.redraw()
         self.surface.want(self.studio.frame, self.studio.look)
         shown = self.surface.shown
         self.motion.depth = self.meter.nearest(shown)

@@ -290,3 +290,22 @@ def _mark(picture: Pixels, eye: Eye) -> None:
     beyond = (-down if eye == "left" else down) - 16 * _unit(size)
     inside = (across[None, :] <= 0.5 * beyond[:, None]) & (beyond[:, None] <= cell)
     picture[top:bottom, left:right, :3][inside] = 255
+
+
+def mixed_chart(size: tuple[int, int], mode: str) -> Pixels:
+    """The chart of one eye (`left`, `right`), or of both in a way of showing them on one area.
+
+    Interlaced ways take the eyes' pixels in turn, an anaglyph the red of the left eye and the rest of the right one's: so
+    each eye must see its own letter alone.
+    """
+    if mode in ("left", "right"):
+        return chart(size, "left" if mode == "left" else "right")
+    left, right = chart(size, "left"), chart(size, "right")
+    found = left.copy()
+    if mode == "anaglyph":
+        found[..., 1:] = right[..., 1:]
+        return found
+    rows, columns = np.indices(left.shape[:2])
+    odd = {"rows": rows, "columns": columns}.get(mode, rows + columns) % 2 == 1
+    found[odd] = right[odd]
+    return found

@@ -33,6 +33,7 @@ class Files:
     Attributes:
         source: where the scene came from.
         remarks: lines for the user about the start.
+        wanted: a scene that is opened when it is clear what becomes of unsaved changes.
         recovered: unsaved changes of windows that ended without saving; panels offer them.
         reload_problem: why the file that changed on the disk cannot be shown; empty if it can.
     """
@@ -43,6 +44,7 @@ class Files:
         self.remarks: list[str] = []
         self.recovered: list[Recovered] = []
         self.reload_problem = ""
+        self.wanted: Path | None = None
         self._viewer: Viewer | None = None
         self._autosave = Autosave()
         self._autosaved = 0.0
@@ -92,12 +94,19 @@ class Files:
         if self.options.scene is None and self.options.shot is None:
             viewer.ui.show.add("gallery")
 
-    def open(self, path: Path) -> None:
-        """Shows another scene.
+    def open(self, path: Path, *, sure: bool = False) -> None:
+        """Shows another scene; asks first if the present one has unsaved changes.
+
+        Args:
+            sure: unsaved changes are given up.
 
         Raises:
             ClfractalError: it is wrong; the present one stays.
         """
+        if self.viewer.studio.unsaved and not sure:
+            self.wanted = path
+            self.viewer.ui.show.add("replace")
+            return
         source = open_source(path)
         scene = source.loaded or load_scene(path)
         self.take(source, scene, saved=scene)

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.scene.stereo import Stereo
+from clfractal.pictures.compose import BELOW, BESIDE
+from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer import gl, window
-from clfractal.viewer.chart import chart
+from clfractal.viewer.chart import mixed_chart
 from clfractal.viewer.options import Options
 from clfractal.viewer.recording import Event
 from clfractal.viewer.surface import Surface
@@ -185,13 +186,18 @@ class Outputs:
 
     def _draw_charts(self, surface: Surface, width: int, height: int) -> None:
         stereo = surface.shown.look.stereo if surface.shown is not None else None
-        if stereo is not None and stereo.mode in ("split", "split_half", "pair", "multi_view"):
+        mode = stereo.mode if stereo is not None else "left"
+        if mode in BESIDE or mode in APART:
             half = width // 2
             for number, eye in enumerate(("left", "right")):
-                place = (number * half, 0, half, height)
-                self._rectangle.draw(self._chart(half, height, eye), place)
+                self._rectangle.draw(self._chart(half, height, eye), (number * half, 0, half, height))
+        elif mode in BELOW:
+            half = height // 2
+            for number, eye in enumerate(("left", "right")):
+                place = (0, height - (number + 1) * half, width, half)
+                self._rectangle.draw(self._chart(width, half, eye), place)
         else:
-            self._rectangle.draw(self._chart(width, height, "left"), (0, 0, width, height))
+            self._rectangle.draw(self._chart(width, height, mode), (0, 0, width, height))
 
     def _chart(self, width: int, height: int, eye: Any) -> int:
         key = (width, height, eye)
@@ -199,7 +205,7 @@ class Outputs:
             while len(self._charts) > 3:
                 gl.delete_texture(self._charts.pop(next(iter(self._charts))))
             texture = gl.new_texture(width, height)
-            gl.fill_texture(texture, chart((width, height), eye))
+            gl.fill_texture(texture, mixed_chart((width, height), eye))
             self._charts[key] = texture
         return self._charts[key]
 

@@ -28,6 +28,8 @@ def draw(ui: Ui) -> None:
             ui.memory.pop(f"dialog {part}", None)  # closed by a key: it begins anew
     if "close" in ui.show:
         _closing(ui, files)
+    elif "replace" in ui.show and files.wanted is not None:
+        _replacing(ui, files, files.wanted)
     elif "save" in ui.show:
         _named(ui, files, "save", "Save the scene as", "Save", files.suggestion)
     elif "open" in ui.show:
@@ -121,6 +123,27 @@ def _closing(ui: Ui, files: Files) -> None:
     layout.in_row()
     if buttons.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
         ui.show.discard("close")
+    imgui.end()
+
+
+def _replacing(ui: Ui, files: Files, wanted: Path) -> None:
+    _begin(ui, "Unsaved changes", f"The scene differs from its file. Open {wanted.name} anyway?")
+    try:
+        if buttons.button("Save first", primary=True):
+            files.save()
+            ui.show.discard("replace")
+            if not ui.studio.unsaved:
+                files.open(wanted)
+        layout.in_row()
+        if buttons.button("Open anyway"):
+            ui.show.discard("replace")
+            files.open(wanted, sure=True)
+    except ClfractalError as error:
+        ui.studio.tell(str(error), wrong=True)
+        ui.show.discard("replace")
+    layout.in_row()
+    if buttons.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
+        ui.show.discard("replace")
     imgui.end()
 
 

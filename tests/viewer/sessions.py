@@ -1,0 +1,142 @@
+"""Sessions without a window: started, waited for, and their frames read back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+import clfractal
+from clfractal.device.select import Device
+from clfractal.pictures.film import Film
+from clfractal.scene.model import Scene
+from clfractal.viewer.display import CopyTarget, Display, Shown
+from clfractal.viewer.frame import Frame
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.session import Session
+from clfractal.work.canvas import CHANNELS
+from clfractal.work.films import JobFilms
+from clfractal.work.show import Look
+
+SIZE = (96, 64)
+BULB = f"""
+version: 1
+formula: {{name: mandelbulb, iterations: 8}}
+image: {{width: {SIZE[0]}, height: {SIZE[1]}}}
+camera: {{position: [0, -2.8, 0.6]}}
+renderer: {{samples: 4}}
+"""
+BALL = """
+version: 1
+formula:
+  iterations: 8
+  inline: {variables: [x, y, z], map: [x*x - y*y - z*z, 2*x*y, 2*x*z], add: none, degree: 2, bailout: 4,
+           bounds: {center: [0, 0, 0], radius: 1.5}}
+image: {width: 96, height: 64}
+camera: {position: [0, -4, 0]}
+renderer: {samples: 1}
+"""
+STEREO = "stereo={mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}"
+
+
+def scene_of(text: str = BULB, *overrides: str) -> Scene:
+    """A scene of a text, with values replaced as by `--set`."""
+    return clfractal.load_scene(text, overrides=overrides)
+
+
+def wait_for(true: Callable[[], object], seconds: float = 60.0) -> None:
+    """Waits until something is true; fails if that takes too long."""
+    end = time.perf_counter() + seconds
+    while not true():
+        assert time.perf_counter() < end, "waited too long"
+        time.sleep(0.002)
+
+
+@dataclass
+class Watch:
+    """A session, and all its frames."""
+
+    session: Session
+    frames: list[Frame] = field(default_factory=list)
+    progress: list[str] = field(default_factory=list)
+
+    def woken(self) -> None:
+        """Called from the session's thread."""
+        frame = self.session.frame
+        if frame is not None and (not self.frames or self.frames[-1] is not frame):
+            self.frames.append(frame)
+        if self.session.progress:
+            self.progress.append(self.session.progress)
+
+    def rest(self, seconds: float = 60.0) -> Frame:
+        """The frame when nothing is under way any more."""
+        wait_for(lambda: self.session.idle, seconds)
+        assert self.session.frame is not None, self.session.problem
+        return self.session.frame
+
+    def finished(self, scene: Scene, *, region: tuple[int, int, int, int] | None = None) -> Frame:
+        """The finished frame of a scene."""
+        number = self.session.request(scene, region=region)
+        frame = self.rest()
+        assert self.session.problem is None, self.session.problem
+        assert (frame.request, frame.finished) == (number, True)
+        return frame
+
+
+@contextmanager
+def session_on(device: Device, pacing: Pacing | None = None) -> Iterator[Watch]:
+    """A session that runs."""
+    watch: list[Watch] = []
+    session = Session(device, pacing or Pacing(), lambda: watch[0].woken())
+    watch.append(Watch(session))
+    session.start()
+    try:
+        yield watch[0]
+    finally:
+        assert session.close()
+
+
+def planes(frame: Frame) -> list[dict[str, np.ndarray]]:
+    """The channels of each view on a frame's canvas."""
+    device = frame.canvas.device
+    return [frame.canvas.read(device.transfers, number) for number in range(len(frame.canvas.parts))]
+
+
+def films_of(frame: Frame) -> JobFilms:
+    """Films that hold what is on a frame's canvas."""
+    films = JobFilms(frame.job)
+    for film, found in zip(films.films, planes(frame), strict=True):
+        film.fill({name: found[name] for name in film})
+    return films
+
+
+def equal_pictures(first: Film, second: Film) -> None:
+    """Asserts that the colours and depths of two films have the same bits."""
+    for name in CHANNELS:
+        if name in first.channels and name in second.channels:
+            np.testing.assert_array_equal(first[name].view(np.uint32), second[name].view(np.uint32), name)
+
+
+def shown_frame(device: Device, watch: Watch, frame: Frame, look: Look) -> tuple[Shown, np.ndarray]:
+    """A frame as a display brings it to the window, by copying; and its pixels, shape (height, width, 4)."""
+    display = Display(device, watch.session.pool, lambda: None, to_image=False)
+    target = CopyTarget(device, frame.arrangement.size(look))
+    try:
+        assert display.show(frame, look, target)
+        found: list[Shown | None] = [None]
+
+        def arrived() -> bool:
+            assert display.problem is None, display.problem
+            found[0] = display.take()
+            return found[0] is not None
+
+        wait_for(arrived)
+        shown = found[0]
+        assert shown is not None
+        assert target.pixels is not None
+        return shown, target.pixels.copy()
+    finally:
+        display.close()

@@ -1,0 +1,263 @@
+"""The studio: every edit is checked, undone and shown; what only concerns showing needs no new rays."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.device.select import Device
+from clfractal.viewer.live import with_live
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.studio import Studio
+from clfractal.work.canvas import CHANNELS
+from tests.viewer.sessions import BALL, BULB, STEREO, equal_pictures, films_of, scene_of, wait_for
+
+VIEW = (96, 64)
+
+
+@pytest.fixture
+def studio(device: Device) -> Iterator[Studio]:
+    made = Studio(scene_of(), device, Pacing(), lambda: None)
+    made.resize(*VIEW)
+    made.refresh()
+    yield made
+    made.close()
+
+
+def rest(studio: Studio) -> None:
+    wait_for(lambda: studio.session.idle)
+
+
+def converged(studio: Studio) -> None:
+    """Asserts that the picture at rest is the shell's."""
+    rest(studio)
+    assert studio.session.problem is None, studio.session.problem
+    frame = studio.frame
+    assert frame is not None
+    assert frame.finished
+    films, scene = films_of(frame), studio.shown_scene
+    if scene.stereo is None:
+        equal_pictures(films.picture(), clfractal.render(scene, channels=CHANNELS))
+    else:
+        pair = clfractal.render_pair(scene, channels=CHANNELS)
+        for found, wanted in zip((films.eyes()["left"], films.eyes()["right"]), pair, strict=True):
+            equal_pictures(found, wanted)
+
+
+def test_edits_are_shown(studio: Studio) -> None:
+    converged(studio)
+    assert studio.edit({"formula.parameters.power": 6, "material.color": [1, 0, 0]})
+    converged(studio)
+    assert studio.unsaved
+    assert studio.undo()
+    converged(studio)
+    assert not studio.unsaved
+    assert studio.redo()
+    converged(studio)
+    assert not studio.redo()
+
+
+def test_a_wrong_edit_changes_nothing_and_is_told(studio: Studio) -> None:
+    rest(studio)
+    scene, number = studio.scene, studio.session.newest
+    assert not studio.edit({"camera.fov": 500})
+    assert studio.scene is scene
+    assert studio.session.newest == number
+    assert studio.problems["camera.fov"]
+    assert studio.edit({"camera.fov": 50})
+    assert not studio.problems
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"output.exposure": 1.5}, {"bookmarks": {"a": {}}}, {"output.png_bits": 16}],
+)
+def test_showing_needs_no_rays(values: dict[str, object], studio: Studio) -> None:
+    rest(studio)
+    frame, number = studio.frame, studio.session.newest
+    assert studio.edit(values)
+    time.sleep(0.05)
+    rest(studio)
+    assert studio.session.newest == number
+    assert studio.frame is frame
+
+
+def test_ways_of_stereo_keep_the_samples(studio: Studio) -> None:
+    assert studio.edit({"stereo": {"mode": "anaglyph", "screen_width": 0.5, "screen_distance": 0.7}})
+    rest(studio)
+    frame, number = studio.frame, studio.session.newest
+    for values in (
+        {"stereo.swap": True},
+        {"stereo.mode": "rows"},
+        {"stereo.mode": "checkerboard"},
+        {"stereo.glasses": "amber_blue"},
+        {"stereo.mode": "left"},
+    ):
+        assert studio.edit(values)
+        assert studio.look.stereo is not None
+        assert studio.session.newest == number
+    assert studio.frame is frame
+    assert studio.edit({"stereo.mode": "split_half"})
+    assert studio.session.newest > number
+    converged(studio)
+
+
+def test_a_resize_asks_once(studio: Studio) -> None:
+    rest(studio)
+    number = studio.session.newest
+    studio.resize(*VIEW)
+    assert studio.session.newest == number
+    studio.resize(80, 50)
+    studio.resize(80, 50)
+    studio.resize(0, 50)
+    assert studio.session.newest == number + 1
+    converged(studio)
+    assert studio.scene.image.width == 96
+
+
+def test_what_is_under_way_is_not_asked_for_again(device: Device) -> None:
+    """Also before the first frame: it would begin from the start each time."""
+    studio = Studio(scene_of(BULB, "renderer.samples=9"), device, Pacing(), lambda: None)
+    studio.resize(*VIEW)
+    studio.refresh()
+    number = studio.session.newest
+    for _ in range(5):
+        studio.refresh()
+        studio.tick()
+    assert studio.session.newest == number
+    rest(studio)
+    studio.close()
+
+
+def test_a_dragged_parameter_needs_one_program(studio: Studio) -> None:
+    """While it is dragged it is live; when it rests the picture has the scene's own bits."""
+    rest(studio)
+    for step in range(1, 30):
+        assert studio.edit({"formula.parameters.power": 8 + 0.01 * step}, "power")
+        time.sleep(0.01)
+    wait_for(lambda: studio.frame is not None and studio.frame.request == studio.session.newest)
+    studio.end_gesture()
+    converged(studio)
+    assert studio.history.depth("scene") == (1, 0)
+    loaded = len(studio.session.device.loaded._programs)
+    for step in range(1, 10):
+        studio.edit({"formula.parameters.power": 7 + 0.013 * step}, "power")
+        wait_for(lambda: studio.frame is not None and studio.frame.request == studio.session.newest)
+    assert len(studio.session.device.loaded._programs) == loaded
+    studio.end_gesture()
+    converged(studio)
+
+
+def test_a_drag_that_pauses_shows_the_scenes_own_bits(studio: Studio) -> None:
+    rest(studio)
+    studio.edit({"formula.parameters.power": 7.5}, "power")
+    time.sleep(0.5)
+    studio.tick()
+    converged(studio)
+
+
+def test_live_parameters(device: Device) -> None:
+    scene = scene_of()
+    live = with_live(scene, ["power"])
+    assert live.formula.live == ("power",)
+    assert with_live(live, ["power"]) is live
+    assert with_live(scene, []) is scene
+    ball = scene_of(BALL)
+    assert with_live(ball, ["nothing"]) is ball
+
+
+def test_undo_that_does_not_fit_is_told(studio: Studio) -> None:
+    """Stereo needs a perspective camera; the camera's stack may have moved on."""
+    assert studio.edit({"stereo": {"mode": "rows"}})
+    assert studio.edit({"stereo": None})
+    flat = scene_of(BULB, "camera={projection: orthographic, position: [0, -3, 0]}").camera
+    studio.set_camera(flat)
+    scene = studio.scene
+    studio.undo("scene")
+    assert studio.scene is scene
+    assert studio.messages[-1].wrong
+    assert studio.undo("camera")
+    assert studio.undo("scene")
+    assert studio.scene.stereo is not None
+
+
+def test_a_region_is_refined_and_forgotten(studio: Studio) -> None:
+    rest(studio)
+    studio.set_region((5, 5, 20, 20))
+    rest(studio)
+    converged(studio)  # the rest was there
+    studio.resize(90, 60)
+    assert studio.region is None
+
+
+def test_a_thumbnail_is_made_once(studio: Studio) -> None:
+    loads: list[int] = []
+
+    def load() -> clfractal.Scene:
+        loads.append(1)
+        return scene_of(BALL)
+
+    first = studio.thumbnail("ball", load, (24, 16))
+    assert studio.thumbnail("ball", load, (24, 16)) is first
+    wait_for(lambda: first.finished)
+    assert len(loads) == 1
+    studio.forget_thumbnails(lambda key: key == "ball")
+    assert studio.thumbnail("ball", load, (24, 16)) is not first
+
+
+def test_another_device_takes_over_all_work(studio: Studio, device: Device, tmp_path: Path) -> None:
+    still = studio.render_still((tmp_path / "still.exr",), (120, 80), 3)
+    thumbs = [studio.thumbnail(number, lambda: scene_of(BALL), (16, 12)) for number in range(3)]
+    studio.use_device(device.reopened())
+    converged(studio)
+    wait_for(lambda: still.finished and all(thumb.finished for thumb in thumbs))
+    assert still.written
+    assert all(thumb.pixels is not None for thumb in thumbs)
+
+
+def test_a_still_is_the_shells_picture(studio: Studio, tmp_path: Path) -> None:
+    from clfractal.files.exr import read_exr
+
+    still = studio.render_still((tmp_path / "still.exr",), (70, 50), 3)
+    wait_for(lambda: still.finished)
+    assert still.problem == ""
+    wanted = clfractal.render(scene_of(BULB, "image.width=70", "image.height=50", "renderer.samples=3"))
+    wanted.save(tmp_path / "shell.exr")
+    found, right = (read_exr(tmp_path / name)[0] for name in ("still.exr", "shell.exr"))
+    for name in right:
+        np.testing.assert_array_equal(found[name], right[name])
+
+
+def test_opening_a_scene_begins_anew(studio: Studio) -> None:
+    studio.edit({"camera.fov": 33})
+    studio.edit({"camera.fov": 999})
+    studio.open(scene_of(BALL))
+    assert not studio.problems
+    assert not studio.undo("camera")
+    assert not studio.unsaved
+    converged(studio)
+
+
+def test_a_file_that_is_wrong_leaves_the_scene(studio: Studio, tmp_path: Path) -> None:
+    path = tmp_path / "bad.yaml"
+    path.write_text("version: 1\n")
+    scene = studio.scene
+    assert not studio.open_file(path)
+    assert studio.scene is scene
+    assert studio.messages[-1].wrong
+    path.write_text(BALL)
+    assert studio.open_file(path)
+    assert studio.scene == scene_of(BALL)
+
+
+def test_stereo_that_is_fitted(studio: Studio) -> None:
+    assert studio.edit({"stereo": scene_of(BULB, STEREO, "stereo.fit=auto").resolved()["stereo"]})
+    converged(studio)
+    studio.set_camera(studio.scene.camera.model_copy(update={"position": (0.4, -2.8, 0.5)}), "orbit")
+    studio.end_gesture()
+    converged(studio)
