@@ -46,3 +46,11 @@ class Watched:
         """Asks kernels that read the records to end, or takes that back."""
         if self._shared:
             self._records[CANCELLED] = int(cancelled)
+
+    def put(self, queue: cl.CommandQueue, records: npt.NDArray[Any]) -> None:
+        """Replaces the first records, when no kernel reads them; behind what is in the queue where memory is not shared."""
+        data = np.ascontiguousarray(records).reshape(-1).view(np.uint8)
+        if self._shared:
+            self._bytes[: data.nbytes] = data
+        else:
+            cl.enqueue_copy(queue, self.buffer, data)

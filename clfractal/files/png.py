@@ -82,7 +82,9 @@ def write_png_pixels(
     """
     height, width = pixels.shape[:2]
     with atomic_writer(path) as beside, open(beside, "wb", buffering=1 << 20) as stream:
-        writer = _Writer(width=width, height=height, greyscale=False, bitdepth=8, compression=3, texts=texts or {})
+        writer = _Writer(
+            width=width, height=height, greyscale=False, bitdepth=8, compression=3, texts=texts or {}
+        )
         writer.write_packed(stream, (row.tobytes() for row in pixels))
 
 

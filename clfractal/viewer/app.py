@@ -38,6 +38,8 @@ from clfractal.viewer.window import Window
 
 _IDLE_SECONDS = 0.5
 """How long the loop sleeps at most when nothing happens."""
+_PANEL_SECONDS = 0.1
+"""While only the picture moves, panels are built anew after this time."""
 _REDRAWN = 3
 """Frames that are drawn after an event: panels need some to take it in."""
 
@@ -306,8 +308,31 @@ class Viewer:
         """Draws the picture and the panels, and shows them."""
         self.window.use()
         framebuffer = self.window.framebuffer
-        scene = self.studio.scene
-        self.places = places_of(self.outputs.panel_stereo(scene.stereo), framebuffer)
+        places = places_of(self.outputs.panel_stereo(self.studio.scene.stereo), framebuffer)
+        if places != self.places or not self._panels_may_stay(now):
+            self.places = places
+            self._build_panels(now)
+        self.outputs.draw(
+            self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
+        )
+        self._redraw_while_busy()
+        self.files.after_draw(framebuffer)
+        self.outputs.swap()
+        self.meter.swapped(time.perf_counter())
+
+    def _panels_may_stay(self, now: float) -> bool:
+        """Whether the panels of the frame before are shown again, while only the picture moves.
+
+        Building them takes the time of a third of a frame. What they tell then changes ten times a second.
+        """
+        if now - self._drawn_at >= _PANEL_SECONDS or self.files.options.shot is not None:
+            return False
+        controls = self.controls
+        marked = controls.marking or controls.region_start is not None or "lights" in self.ui.show
+        return (controls.dragging or self.motion.active) and not marked
+
+    def _build_panels(self, now: float) -> None:
+        """Asks all panels what they show, and takes in what was done to them."""
         scale = self.window.scale * self.settings.panel_scale
         size = (self.places.ui_size[0] / scale, self.places.ui_size[1] / scale)
         self.renderer.begin(size, (scale, scale), now - self._drawn_at)
@@ -322,13 +347,6 @@ class Viewer:
         imgui.render()
         if imgui.get_io().want_text_input or imgui.is_any_item_active():
             self._redraw = max(self._redraw, 1)
-        self.outputs.draw(
-            self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
-        )
-        self._redraw_while_busy()
-        self.files.after_draw(framebuffer)
-        self.outputs.swap()
-        self.meter.swapped(time.perf_counter())
 
     def _draw_panels(self, ui: Ui) -> None:
         """A mistake in a panel costs that frame's panels, never the window."""

@@ -140,6 +140,7 @@ class Still:
         self._films: JobFilms | None = None
         self._token: CancelToken | None = None
         self._writing = False
+        self._writer: threading.Thread | None = None
         self._cancelled = threading.Event()
 
     @property
@@ -155,6 +156,11 @@ class Still:
         token = self._token
         if token is not None:
             token.cancel()
+
+    def finish_writing(self) -> None:
+        """Waits until its files are complete, if they are being written; a process must not end before."""
+        if self._writer is not None:
+            self._writer.join()
 
     @property
     def cancelled(self) -> bool:
@@ -172,8 +178,11 @@ class Still:
         run(films.job, films.films, executor, token=token, progress=self._told)
         self._films = self._token = None
         self._writing = True
-        # The device is free for the next picture meanwhile. The process waits for this thread before it ends.
-        threading.Thread(target=self._write, args=(films,), name="clfractal-still").start()
+        # The device is free for the next picture meanwhile.
+        self._writer = threading.Thread(
+            target=self._write, args=(films,), name="clfractal-still", daemon=True
+        )
+        self._writer.start()
 
     def failed(self, error: ClfractalError) -> None:
         """See `Task`."""

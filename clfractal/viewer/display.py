@@ -238,9 +238,14 @@ class Display:
             self._shower.enqueue(
                 frame.canvas, frame.arrangement, order.look, order.target.shown, reduced=order.reduced
             )
-            order.target.end(queue)
-        if self._depths[0] != frame.number:
-            self._depths = (frame.number, frame.canvas.read_depths(queue))
+            if self._depths[0] == frame.number:
+                order.target.end(queue)
+            else:
+                # Before anything is waited for: each wait may last until PoCL's cores are done with a launch.
+                depths, event = frame.canvas.start_reading_depths(queue)
+                order.target.end(queue)
+                event.wait()
+                self._depths = (frame.number, depths)
         return Shown(frame, order.look, order.target, self._depths[1], order.reduced)
 
 

@@ -290,8 +290,10 @@ class Studio:
         self.woken()
 
     def close(self) -> None:
-        """Ends all work."""
+        """Ends all work; files that are being written become complete."""
         self.session.close()
+        for still in self.stills:
+            still.finish_writing()
 
     def _replace(self, scene: Scene, gesture: str | None) -> None:
         self.history.add(self.scene, scene, gesture)

@@ -152,15 +152,23 @@ class Canvas:
         planes = {name: np.ascontiguousarray(colors[..., index]) for index, name in enumerate("RGBA")}
         return {**planes, "Z": depths}
 
-    def read_depths(self, queue: cl.CommandQueue) -> list[Floats]:
-        """Depths of all views: arrays of shape (rows, columns)."""
+    def start_reading_depths(self, queue: cl.CommandQueue) -> tuple[list[Floats], cl.Event]:
+        """Depths of all views, arrays of shape (rows, columns), which are there when the event is complete."""
         depths = np.empty(self.pixels, np.float32)
         with self.device.failures("reading depths"):
-            cl.enqueue_copy(queue, depths, self.depths)
-        return [
+            event = cl.enqueue_copy(queue, depths, self.depths, is_blocking=False)
+        parts = [
             depths[part.offset : part.offset + part.pixels].reshape(part.region.height, part.region.width)
             for part in self.parts
         ]
+        return parts, event
+
+    def read_depths(self, queue: cl.CommandQueue) -> list[Floats]:
+        """The same, when they are there."""
+        depths, event = self.start_reading_depths(queue)
+        with self.device.failures("reading depths"):
+            event.wait()
+        return depths
 
 
 class CanvasStore:

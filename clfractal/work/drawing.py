@@ -117,7 +117,8 @@ class Drawing:
         self._buffers: list[cl.Buffer] = []
         self._given: list[KernelArgument] = []
         self._watched: dict[int, Watched] = {}
-        self._places: dict[int, npt.NDArray[np.int32]] = {}
+        self._places: dict[int, cl.Event] = {}
+        self._sending: list[cl.Event] = []
         self._kept: cl.Buffer | None = None
         self._kept_count = 0
 
@@ -202,9 +203,9 @@ class Drawing:
         numbers = (first, end, *span.samples, span.mode)
         with self.device.failures("rendering"):
             # In the kernels' own queue, and nobody waits: while every core is at work PoCL lets a write wait for the
-            # launch before. The array has to live that long.
-            self._places[span.slot] = places
-            cl.enqueue_copy(self.device.queue, self.outputs.sets[span.slot].places, places, is_blocking=False)
+            # launch before. The event holds the array, and waits for the write when it is dropped: so it is kept.
+            target = self.outputs.sets[span.slot].places
+            self._places[span.slot] = cl.enqueue_copy(self.device.queue, target, places, is_blocking=False)
             for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
                 kernel.set_arg(index, np.int32(number))
             count = -(-(end - first) // self.group) * self.group
@@ -256,6 +257,7 @@ class Drawing:
     def _upload(self, arguments: list[KernelArgument]) -> None:
         """Brings arguments to the device that differ from those of the view before."""
         given = [each if isinstance(each, cl.Buffer) else np.ascontiguousarray(each) for each in arguments]
+        self._sending.clear()  # of the view before, whose launches have ended
         buffers = []
         for index, argument in enumerate(given):
             if isinstance(argument, cl.Buffer):
@@ -279,8 +281,9 @@ class Drawing:
         if buffer is None:
             buffer = self.device.buffer(max(data.nbytes, 16), "constants", read_only=True)
         with self.device.failures("uploading constants"):
-            # Before all launches to come, and nobody waits: the array is kept until the next one.
-            cl.enqueue_copy(self.device.queue, buffer, data.reshape(-1).view(np.uint8), is_blocking=False)
+            # Before all launches to come, and nobody waits: see `start`.
+            bytes_of = data.reshape(-1).view(np.uint8)
+            self._sending.append(cl.enqueue_copy(self.device.queue, buffer, bytes_of, is_blocking=False))
         return buffer
 
     def _set_arguments(self) -> None:

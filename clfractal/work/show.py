@@ -15,6 +15,7 @@ from clfractal.device.compiler import Argument, Warm
 from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Field, Struct
+from clfractal.device.watched import Watched
 from clfractal.files import srgb
 from clfractal.pictures.anaglyph import matrices
 from clfractal.pictures.compose import BELOW, BESIDE, Side, eye_size, picture_size
@@ -197,8 +198,9 @@ class Shower:
             self.queue = cl.CommandQueue(device.context)
         table = srgb.table8()
         self._table = self._sent(table)
-        self._views = device.buffer(SHOWN_VIEW.dtype("float32").itemsize * MOST_VIEWS, "views")
-        self._show = device.buffer(SHOW.dtype("float32").itemsize, "how it is shown")
+        # A write is a command, and would wait until PoCL's cores are done with a picture's launch.
+        self._views = Watched(device, np.zeros(MOST_VIEWS, SHOWN_VIEW.dtype("float32")))
+        self._show = Watched(device, np.zeros(1, SHOW.dtype("float32")))
 
     def enqueue(
         self, canvas: Canvas, arrangement: Arrangement, look: Look, shown: Any, *, reduced: bool = False
@@ -215,9 +217,9 @@ class Shower:
         width, height = int(record["width"][0]), int(record["height"][0])
         size = whole_groups((width, height), GROUP)
         with self.device.failures("showing the picture"):
-            cl.enqueue_copy(self.queue, self._views, views)
-            cl.enqueue_copy(self.queue, self._show, record)
-            self._kernel.set_args(canvas.colors, self._views, self._show, self._table, shown)
+            self._views.put(self.queue, views)
+            self._show.put(self.queue, record)
+            self._kernel.set_args(canvas.colors, self._views.buffer, self._show.buffer, self._table, shown)
             event = cl.enqueue_nd_range_kernel(self.queue, self._kernel, size, GROUP)
             self.queue.flush()
         return event

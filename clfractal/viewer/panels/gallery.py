@@ -18,6 +18,7 @@ KINDS = {"all": "All", "surface": "Surfaces", "volume": "Volumes", "cut": "Cut p
 """What the gallery can be narrowed to, and its words."""
 _LEAST = 190.0  # points of a card
 _COLUMNS = 6.5  # at most
+_NARROW = 640.0  # points: below, switches and search have lines of their own
 _LARGEST = 0.8  # of the window
 _ABOUT = 320  # characters
 
@@ -122,18 +123,29 @@ def _top(ui: Ui, state: Gallery) -> None:
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec(theme.FAINT), words)
     close = imgui.get_frame_height()
-    find = min(220.0, 0.24 * wide)
-    chips = min(430.0, wide - 190.0 - find - close - 18)
-    imgui.same_line(start + wide - chips - find - close - 18)
+    narrow = wide < _NARROW
+    find = wide if narrow else min(220.0, 0.24 * wide)
+    chips = wide if narrow else min(430.0, wide - 190.0 - find - close - 18)
+    if narrow:
+        imgui.same_line(start + wide - close)
+        _close(ui)
+    else:
+        imgui.same_line(start + wide - chips - find - close - 18)
     found = w.segments("gallery.kind", KINDS, state.kind, chips)
     if found is not None:
         state.kind = found
-    w.in_row(8)
+    if not narrow:
+        w.in_row(8)
     w.search(ui, "gallery.filter", "Find a scene", find)
-    w.in_row(8)
+    if not narrow:
+        w.in_row(8)
+        _close(ui)
+    imgui.dummy(imgui.ImVec2(0, 4))
+
+
+def _close(ui: Ui) -> None:
     if w.icon_button(theme.CROSS, f"Close ({ui.keys.hint('cancel')})", name="gallery.close"):
         ui.show.discard("gallery")
-    imgui.dummy(imgui.ImVec2(0, 4))
 
 
 def _text(ui: Ui) -> str:

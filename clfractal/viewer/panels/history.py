@@ -19,6 +19,7 @@ _NAMES: dict[Kind, tuple[str, str, str]] = {
     "camera": ("Camera", "undo_camera", "redo_camera"),
 }
 _MOST_PATHS = 2
+_MOST_NAMES = 3
 
 
 def draw(ui: Ui) -> None:
@@ -45,7 +46,9 @@ def _stack(ui: Ui, kind: Kind) -> None:
     w.in_row(8)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec(theme.FAINT), f"{done} back, {undone} forth")
-    imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - 2 * imgui.get_frame_height() - 3)
+    imgui.same_line(
+        imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - 2 * imgui.get_frame_height() - 3
+    )
     hint = ui.keys.hint(undo)
     if w.icon_button(theme.UNDO, f"Undo ({hint})", name=undo, enabled=done > 0):
         ui.act(undo)
@@ -116,12 +119,32 @@ def _label(ui: Ui, step: Step) -> str:
 
 def label(step: Step) -> str:
     """What a step has changed, in few words: the last parts of the paths, and a value that is new."""
+    if set(step.after) == {"bookmarks"}:
+        return _bookmark_label(step.before["bookmarks"], step.after["bookmarks"])
     found: list[tuple[str, Any]] = []
     for name in step.after:
         found += changes(name, plain(step.before[name]), plain(step.after[name]))
     if len(found) > _MOST_PATHS:
-        return ", ".join(w.label_of(name) for name in step.after)
+        return _listed([_section(name) for name in step.after])
     return ", ".join(f"{_place(path)}{_value(value)}" for path, value in found)
+
+
+def _bookmark_label(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    gone, new = [n for n in before if n not in after], [n for n in after if n not in before]
+    if len(gone) == len(new) == 1:
+        return f"Bookmark {gone[0]}: now {new[0]}"
+    return f"Bookmark {new[0]}" if new else f"Bookmark {gone[0]} deleted" if gone else "Bookmarks"
+
+
+def _section(name: str) -> str:
+    return "Colouring" if name == "coloring" else w.label_of(name)
+
+
+def _listed(names: list[str]) -> str:
+    """`Formula, camera, lights and 2 more`."""
+    shown = [name if not place else name.lower() for place, name in enumerate(names[:_MOST_NAMES])]
+    more = len(names) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")
 
 
 def changes(path: str, before: Any, after: Any) -> Iterator[tuple[str, Any]]:
@@ -141,16 +164,12 @@ def _sections(value: Any) -> bool:
 
 
 def _place(path: str) -> str:
-    parts = [part for part in path.split(".") if part != "parameters"]
-    first, last = parts[0], parts[-1]
-    if len(parts) == 1:
-        return w.label_of(first)
+    """`lights.0.intensity` as `Lights 1: intensity`."""
+    first, *parts = [part for part in path.split(".") if part != "parameters"]
+    names = [part for part in parts if not part.isdigit()]
     number = next((f" {int(part) + 1}" for part in parts if part.isdigit()), "")
-    return (
-        f"{w.label_of(first)}{number}: {w.label_of(last).lower()}"
-        if not last.isdigit()
-        else w.label_of(first)
-    )
+    where = f"{_section(first)}{number}"
+    return f"{where}: {w.label_of(names[-1]).lower()}" if names else where
 
 
 def _value(value: Any) -> str:

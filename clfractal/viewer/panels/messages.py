@@ -1,4 +1,4 @@
-"""Lines for the user that come and go at the lower right: what was saved, what was not possible."""
+"""Lines for the user that come and go at the top: what was saved, what was not possible."""
 
 from __future__ import annotations
 
@@ -28,17 +28,18 @@ def visible(ui: Ui, now: float) -> list[tuple[str, bool, float]]:
 
 
 def draw(ui: Ui) -> None:
-    """Draws them from the bottom up; the newest is the lowest."""
+    """Draws them at the top of the picture's middle, where no dock is; the newest is the uppermost."""
     canvas = imgui.get_foreground_draw_list()
-    bottom = ui.size[1] - theme.MARGIN - (64 if "overlay" in ui.show else 0)
     width = min(_WIDTH, ui.size[0] - 2 * theme.MARGIN)
-    left = ui.size[0] - theme.MARGIN - width
+    dock = theme.DOCK_LEFT + theme.MARGIN if "panels" in ui.show else 0.0
+    left = max((ui.size[0] - width) / 2, min(dock + theme.MARGIN, ui.size[0] - width - theme.MARGIN))
+    top = 2 * theme.MARGIN
     shown = visible(ui, time.perf_counter())
     if shown:
         ui.memory["awaited"] = True  # they have to go, though nothing else may happen
     for text, wrong, alpha in reversed(shown):
         size = imgui.calc_text_size(text, False, width - 34)
-        top = bottom - size.y - 16
+        bottom = top + size.y + 16
         canvas.add_rect_filled(
             imgui.ImVec2(left, top),
             imgui.ImVec2(left + width, bottom),
@@ -60,4 +61,4 @@ def draw(ui: Ui) -> None:
             text,
             width - 34,
         )
-        bottom = top - 6
+        top = bottom + 6

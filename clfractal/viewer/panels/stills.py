@@ -72,6 +72,8 @@ def paths_of(name: str, kind: str, folder: Path | None = None) -> tuple[Path, ..
     if place.suffix.lower() in (".png", ".exr"):
         place = place.with_suffix("")
     whole = (folder or Path.cwd()) / place
+    if place.name in ("", ".."):
+        return tuple(whole / ending for ending in _ENDINGS[kind])  # without a name: refused by `check`
     return tuple(whole.with_name(f"{whole.name}{ending}") for ending in _ENDINGS[kind])
 
 
@@ -93,9 +95,11 @@ def check(paths: Iterable[Path], taken: Collection[Path], stereo: Stereo | None)
     Raises:
         FileError: what is wrong with one of them.
     """
+    paths = list(paths)
+    for path in paths:
+        if path.name in (".png", ".exr"):
+            raise FileError("needs a name, not a folder alone", Where(str(path.parent)))
     for path in _all(paths, stereo):
-        if path.name.startswith("."):
-            raise FileError("a still needs a name", Where(str(path)))
         check_output(path)
         if _is_taken(path, taken):
             raise FileError("is there already; choose another name", Where(path.name))
@@ -263,10 +267,10 @@ def _still(ui: Ui, still: Still) -> None:
     imgui.text_colored(theme.vec(color), icon)
     w.in_row(7)
     imgui.align_text_to_frame_padding()
-    names = ", ".join(path.name for path in _all(still.paths, still.scene.stereo))
+    files = _all(still.paths, still.scene.stereo)
     room = imgui.get_content_region_avail().x - (side + 6 if not still.finished else 0)
-    imgui.text(clipped(names, room))
-    w.tip("\n".join(str(path) for path in _all(still.paths, still.scene.stereo)))
+    imgui.text(clipped(names_of(files), room))
+    w.tip("\n".join(str(path) for path in files))
     if not still.finished:
         imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - side)
         if w.icon_button(theme.CROSS, "Cancel it: nothing is written", name="cancel"):
@@ -279,6 +283,14 @@ def _still(ui: Ui, still: Still) -> None:
         imgui.text_unformatted(state_text(still))
         imgui.pop_text_wrap_pos()
     imgui.dummy(imgui.ImVec2(0, 2))
+
+
+def names_of(files: list[Path]) -> str:
+    """The names of files in a line; endings alone where the rest is the same: `still-1.png, .exr`."""
+    first = files[0]
+    return ", ".join(
+        file.suffix if place and file.stem == first.stem else file.name for place, file in enumerate(files)
+    )
 
 
 def _sign(still: Still) -> tuple[str, theme.Rgba]:

@@ -35,7 +35,7 @@ SIZE = (264, 148)
 SAMPLES = 4
 """Of a pixel."""
 _KEPT = ("image", "output", "stereo", "bookmarks")
-_LEAST = 118.0  # points of a card
+_LEAST = 84.0  # points of a card
 _GAP = 6.0
 _KIND_WORDS: dict[Kind, str] = {"formula": "Formula", "camera": "Camera", "colors": "Colours"}
 _KIND_TIPS: dict[Kind, str] = {
@@ -126,7 +126,9 @@ def draw(ui: Ui) -> None:
         state.history, state.trail = ui.studio.history, []
         begin(ui, state, scene)
     elif state.work is None:
+        taken = state.taken
         begin(ui, state, state.base, state.seed)
+        state.taken = taken
     with right_dock.window(ui, "variations", "Variations", theme.RANDOM):
         _settings(ui, state)
         _grid(ui, state)
@@ -206,11 +208,7 @@ def _grid(ui: Ui, state: Choice) -> None:
         if not work.finished:
             ui.memory["awaited"] = True
         room = imgui.get_content_region_avail()
-        columns, width = cards.grid(room.x - 1, _LEAST, _GAP)
-        # Fewer points than there are: smaller cards, so that all are seen without scrolling.
-        rows = -(-COUNT // columns)
-        high = (room.y - _GAP * (rows - 1)) / rows
-        width = min(width, max(16 / 9 * high, 80.0))
+        columns, width = layout_of(room.x - 1, room.y)
         corner = imgui.get_cursor_pos()
         left = corner.x + (room.x - columns * width - _GAP * (columns - 1)) / 2
         numbers = shown(state)
@@ -220,9 +218,24 @@ def _grid(ui: Ui, state: Choice) -> None:
             imgui.set_cursor_pos(imgui.ImVec2(left + column * (width + _GAP), corner.y + row * step))
             if place < len(numbers):
                 _card(ui, state, work, numbers[place], width)
+                if state.work is not work:
+                    break  # a double click has begun a new set
             else:
                 cards.draw(ui, f"waiting.{place}", cards.Card("", None), width)
     imgui.end_child()
+
+
+def layout_of(width: float, height: float) -> tuple[int, float]:
+    """How many columns of cards a part of the panel has, and how wide they are: as large as they all fit, points."""
+    found = []
+    for columns in range(1, COUNT + 1):
+        rows = -(-COUNT // columns)
+        across = (width - _GAP * (columns - 1)) / columns
+        down = (height - _GAP * (rows - 1)) / rows * 16 / 9
+        found.append((min(across, down), columns))
+    most, columns = max(found)
+    # In a part that is too small they scroll.
+    return (columns, most) if most >= _LEAST else cards.grid(width, _LEAST, _GAP)
 
 
 def _card(ui: Ui, state: Choice, work: Draw, number: int, width: float) -> None:
@@ -249,12 +262,17 @@ def _card(ui: Ui, state: Choice, work: Draw, number: int, width: float) -> None:
         ui.studio.set_scene(taken)
 
 
+def _alike(one: Scene, other: Scene) -> bool:
+    """Whether two scenes differ at most in what is no part of a variation."""
+    return one is other or one.model_copy(update={name: getattr(other, name) for name in _KEPT}) == other
+
+
 def _number_of(ui: Ui, state: Choice) -> int | None:
     """The number of the variation that the window shows, -1 for the base, None for another scene."""
     scene = ui.studio.scene
     if state.place is None or state.place[0] is not scene:
-        found = next((number for number, each in state.taken.items() if each == scene), None)
-        if found is None and (scene is state.base or taken_over(state.base, scene) == scene):
+        found = next((number for number, each in state.taken.items() if _alike(each, scene)), None)
+        if found is None and _alike(state.base, scene):
             found = -1
         state.place = (scene, found)
     return state.place[1]
