@@ -131,7 +131,7 @@ _TABLE: Mapping[str, tuple[tuple[str, str, str], ...]] = {
         ("spin_left", "Alt+PageUp", "turn the plane about its normal"),
         ("spin_right", "Alt+PageDown", "turn the plane about its normal"),
         ("cut", "Y", "cut the object open at the plane, or close it"),
-        ("zoom_mark", "Z", "show or hide the cube of a volume's next zoom"),
+        ("zoom_mark", "U", "show or hide the cube of a volume's next zoom"),
         ("zoom_apply", "Enter NumEnter", "zoom into the cube"),
         ("zoom_back", "Backspace", "step back out of the last zoom"),
     ),

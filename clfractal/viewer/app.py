@@ -138,8 +138,11 @@ class Viewer:
         while self.events:
             if moved and self.events[0].kind in ("button", "scroll"):
                 break  # panels learn only with a frame that the pointer is over them now
-            moved = moved or self.events[0].kind == "move"
-            self.inputs.handle(self.events.popleft(), now)
+            event = self.events.popleft()
+            moved = moved or event.kind == "move"
+            if event.kind == "move" and self.events and self.events[0].kind == "move":
+                continue  # a mouse reports ten times as often as there are pictures: the newest place counts
+            self.inputs.handle(event, now)
             self._redraw = _REDRAWN
         if self.window.closing:
             self.window.closing = False
@@ -151,10 +154,11 @@ class Viewer:
         self.controls.rest(now)
         self.files.tick(now)
         self._follow()
-        if self.surface.update():
+        arrived = self.surface.update()
+        if arrived:
             self._redraw = max(self._redraw, 1)
             self.meter.shown(self.surface.shown, now)
-        if self._redraw > 0 and not self.window.minimised:
+        if self._redraw > 0 and (arrived or self._until_drawn(now) <= 0) and not self.window.minimised:
             self._redraw -= 1
             self.draw(now)
         limit = self.options.seconds
@@ -398,11 +402,21 @@ class Viewer:
 
     _wake_at = 0.0
 
+    def _until_drawn(self, now: float) -> float:
+        """Seconds until the next frame is due. While a drag waits for its picture, frames without it would delay it."""
+        if not self.controls.dragging:
+            return 0.0
+        return self._drawn_at + 1 / self.settings.frame_rate - now
+
     def _patience(self) -> float:
         """How long the loop may sleep, seconds."""
-        if self._redraw > 0 or self.motion.active or self.events:
+        if self.motion.active or self.events:
             return 0.0
         wait = _IDLE_SECONDS
+        if self._redraw > 0 and not self.window.minimised:
+            wait = self._until_drawn(time.perf_counter())
+            if wait <= 0:
+                return 0.0
         due = self.inputs.next_due
         if due is not None:
             wait = min(wait, max(due - time.perf_counter(), 0.0))

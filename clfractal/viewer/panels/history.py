@@ -179,6 +179,9 @@ def _value(value: Any) -> str:
         return f" {value:.4g}".replace("-", "\u2212")
     if isinstance(value, str):
         return f" {value.replace('_', ' ')}"
+    if isinstance(value, Mapping):  # a section of another kind, or one that was switched on
+        kind = value.get("type") or value.get("mode")
+        return f": {kind.replace('_', ' ')}" if isinstance(kind, str) else ""
     return " off" if value is None else ""
 
 
