@@ -3,6 +3,9 @@
 #   make demo          render a first picture
 #   make test          all tests, on the installed program
 #   make lint          style, types, import directions: with exact versions of tools, so that it says the same everywhere
+#   make view          the window (needs a display)
+#   make window        tests of the window, on a screen of their own (needs Xvfb, xdotool, openbox and Mesa)
+#   make soak          ten minutes of random events for the window, from a seed
 #   make lowest        render, voxelize and mesh once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
@@ -28,7 +31,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo test lint lowest bench portability install clean
+.PHONY: demo view test window soak lint lowest bench portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -36,10 +39,20 @@ demo: $(VENV)/.installed
 	@echo out/bulb.exr
 	@echo out/bulb.png
 
+view: $(VENV)/.viewer
+	@$(BIN)/clfractal view scenes/mandelbulb.yaml
+
 install: $(VENV)/.installed
 
 test: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest $(PARALLEL) $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window $(PARALLEL) $(ARGUMENTS)
+
+# Windows show what they show in time only if nothing else keeps the cores busy: so one test at a time.
+window: $(VENV)/.tested-with $(STAGE)/.linked
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest tests/window $(ARGUMENTS)
+
+soak: $(VENV)/.tested-with $(STAGE)/.linked
+	cd $(STAGE) && $(BIN)/python -P -m tests.window.soak $(or $(ARGUMENTS),--minutes 10)
 
 lint: $(LINT)/.installed
 	$(LINT)/bin/ruff check .
@@ -83,6 +96,10 @@ $(LOWEST)/bin/python:
 
 $(VENV)/.installed: $(SOURCES) | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check .
+	@touch $@
+
+$(VENV)/.viewer: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[viewer]'
 	@touch $@
 
 $(VENV)/.tested-with: $(VENV)/.installed

@@ -23,6 +23,9 @@ OWNERS = {
     "typer": {"commands/app.py"},
     "cmap": {"scene/palette.py"},
     "skimage": {"voxels/mesh.py"},
+    "glfw": {"viewer/window.py", "commands/view.py"},
+    "OpenGL": {"viewer/gl.py", "commands/view.py"},
+    "ruamel": {"files/spans.py", "commands/view.py"},
 }
 
 

@@ -59,6 +59,7 @@ def small(pixels: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
     return np.asarray(np.rint(blocks.mean(axis=(1, 3))), np.uint8)
 
 
+@pytest.mark.usefixtures("screen")
 @pytest.mark.parametrize("name", CASES)
 def test_a_panel_looks_as_before(name: str) -> None:
     scene, draw, prepare = CASES[name]

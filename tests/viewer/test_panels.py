@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -485,7 +484,7 @@ def test_the_parallax_under_the_pointer(depth: float) -> None:
 # In a window
 
 
-@pytest.mark.skipif(not os.environ.get("DISPLAY"), reason="there is no display")
+@pytest.mark.usefixtures("screen")
 @pytest.mark.parametrize(("size", "scale"), [((1280, 720), 1.0), ((2560, 1440), 2.0)])
 def test_the_dock_leaves_the_middle_of_the_picture_free(size: tuple[int, int], scale: float) -> None:
     found = screenshot("scenes/mandelbulb.yaml", scene_dock.draw, size, scale)

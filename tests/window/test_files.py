@@ -1,0 +1,199 @@
+"""Scenes on the disk: saved with Ctrl+S, never over what is shipped, loaded again when they change, kept over a crash."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from clfractal import resources
+from clfractal.scene.load import load_scene
+from clfractal.viewer.autosave import Autosave
+from tests.window.display import Display
+from tests.window.driver import Window, wait_for
+from tests.window.film import film
+from tests.window.scenes import SURFACE
+
+SIZE = (360, 240)
+PLAIN = ("--size", "360x240", "--no-panels")
+
+
+def test_a_saved_scene_is_the_picture_that_was_seen(display: Display, folder: Path) -> None:
+    """And the text that it came from, with its comments; only what was changed is another."""
+    (folder / "s.yaml").write_text(SURFACE)
+    with Window(display, folder, "s.yaml", *PLAIN) as window:
+        window.drag((180, 120), (230, 100))
+        window.wheel(150, 100, 2)
+        window.keys("minus", "bracketleft")
+        window.still()
+        assert window.title.endswith("*")
+        saved = window.save()
+        wait_for(lambda: not window.title.endswith("*"), "the title of a saved scene")
+        assert "saved.yaml" in window.title
+        expected = film(folder, saved, SIZE)
+        wait_for(lambda: np.array_equal(window.pixels(), expected), "the shell's picture")
+    text = saved.read_text()
+    assert "# A bulb" in text
+    assert "# not the window's" in text
+    kept = [line for line in SURFACE.splitlines() if not line.startswith(("camera", "output"))]
+    assert [line for line in kept if line not in text.splitlines()] == []
+    assert (folder / "s.yaml").read_text() == SURFACE
+
+
+def test_without_a_name_it_is_saved_where_it_came_from(display: Display, folder: Path) -> None:
+    (folder / "s.yaml").write_text(SURFACE)
+    with Window(display, folder, "s.yaml", *PLAIN, save=False) as window:
+        window.saves = folder / "s.yaml"
+        window.keys("minus")
+        window.still()
+        window.save()
+        assert load_scene(folder / "s.yaml").output.exposure == 0.25
+        # And again: the file that the window wrote is no change of somebody else's.
+        window.keys("minus")
+        window.still()
+        window.save()
+        assert load_scene(folder / "s.yaml").output.exposure == 0.0
+
+
+def test_a_shipped_scene_is_not_overwritten(display: Display, folder: Path) -> None:
+    shipped = resources.folder("scenes") / "sierpinski_tetrahedron.yaml"
+    before = shipped.read_bytes()
+    with Window(display, folder, shipped, *PLAIN, save=False) as window:
+        window.keys("minus")
+        plain = window.still()
+        window.keys("ctrl+s")
+        window.still()
+        assert shipped.read_bytes() == before
+        assert window.title.endswith("*")
+        assert (window.still() != plain).any(), "nothing asks for a name"
+    assert sorted(path.name for path in folder.glob("*.yaml")) == []
+
+
+def test_a_link_to_a_shipped_scene_is_not_followed(display: Display, folder: Path) -> None:
+    shipped = resources.folder("scenes") / "sierpinski_tetrahedron.yaml"
+    before = shipped.read_bytes()
+    (folder / "mine.yaml").symlink_to(shipped)
+    with Window(display, folder, "mine.yaml", *PLAIN, save=False) as window:
+        window.keys("minus", "ctrl+s")
+        window.still()
+    assert shipped.read_bytes() == before
+
+
+def test_a_scene_that_changes_on_the_disk_is_loaded_again(display: Display, folder: Path) -> None:
+    scene = folder / "s.yaml"
+    scene.write_text(SURFACE)
+    with Window(display, folder, "s.yaml", *PLAIN) as window:
+        scene.write_text(SURFACE.replace("fov: 50", "fov: 30"))
+        window.shows(film(folder, scene, SIZE))
+        # A mistake: the last picture stays.
+        good = window.still()
+        scene.write_text(SURFACE.replace("mandelbulb", "mandelblub"))
+        assert np.array_equal(window.still(1.5), good)
+        assert window.process.poll() is None
+        # An editor that writes beside and renames.
+        (folder / "other").write_text(SURFACE.replace("fov: 50", "fov: 70"))
+        (folder / "other").replace(scene)
+        window.shows(film(folder, scene, SIZE))
+
+
+def test_changes_are_not_lost_when_the_file_changes(display: Display, folder: Path) -> None:
+    scene = folder / "s.yaml"
+    scene.write_text(SURFACE)
+    with Window(display, folder, "s.yaml", *PLAIN) as window:
+        window.keys("minus")
+        mine = window.still()
+        scene.write_text(SURFACE.replace("fov: 50", "fov: 30"))
+        assert np.array_equal(window.still(1.5), mine)
+        window.keys("F5")
+        window.shows(film(folder, scene, SIZE))
+        window.keys("ctrl+z")
+        window.shows(mine)
+
+
+def test_a_formula_file_that_changes_is_loaded_again(display: Display, folder: Path) -> None:
+    library = resources.folder("formulas/library")
+    shutil.copy(library / "mandelbulb.yaml", folder / "own.yaml")
+    scene = folder / "s.yaml"
+    scene.write_text(SURFACE.replace("name: mandelbulb", "file: own.yaml"))
+    with Window(display, folder, "s.yaml", *PLAIN) as window:
+        text = (folder / "own.yaml").read_text()
+        before = window.still()
+        changed = text.replace("default: 8", "default: 5")
+        assert changed != text
+        (folder / "own.yaml").write_text(changed)
+        window.shows(film(folder, scene, SIZE))
+        assert (window.still() != before).any()
+
+
+def test_screenshot_and_export(display: Display, folder: Path) -> None:
+    (folder / "s.yaml").write_text(SURFACE)
+    with Window(display, folder, "s.yaml", *PLAIN) as window:
+        seen = window.still()
+        window.keys("F12", "ctrl+e")
+        wait_for((folder / "s-001.exr").exists, "the export", 60)
+        wait_for((folder / "s-001.png").exists, "the screenshot")
+        from tests.pictures import read_picture
+
+        assert np.array_equal(read_picture(folder / "s-001.png"), seen)
+    assert np.array_equal(film(folder, "s-001.exr", SIZE), seen)
+
+
+def test_unsaved_changes_survive_a_crash(display: Display, folder: Path) -> None:
+    (folder / "s.yaml").write_text(SURFACE)
+    (folder / "settings.yaml").write_text("autosave: 0.2\n")
+    cache = folder / "cache"
+    extra = {"CLFRACTAL_SETTINGS": str(folder / "settings.yaml"), "CLFRACTAL_CACHE": str(cache)}
+    with Window(display, folder, "s.yaml", *PLAIN, extra=extra) as window:
+        window.drag((180, 120), (230, 100))
+        window.still()
+        wait_for(lambda: list((cache / "autosave").glob("*.json")), "the safety copy")
+        wait_for(lambda: window.title.endswith("*"))
+        window.still(1.0)
+        edited = window.still()
+        window.kill()
+    with Window(display, folder, "s.yaml", "--size", "1280x720", extra=extra) as window:
+        # It belongs to this window, which offers it.
+        assert Autosave(cache / "autosave").found() == []
+        window.kill()
+    kept = Autosave(cache / "autosave").found()
+    assert len(kept) == 1
+    assert kept[0].path is not None
+    assert kept[0].path.name == "s.yaml"
+    (folder / "kept.yaml").write_text(kept[0].text)
+    assert np.array_equal(film(folder, "kept.yaml", SIZE), edited)
+    kept[0].release()
+
+
+def test_the_next_window_offers_what_a_crash_left(display: Display, folder: Path) -> None:
+    (folder / "s.yaml").write_text(SURFACE)
+    (folder / "settings.yaml").write_text("autosave: 0.2\n")
+    extra = {"CLFRACTAL_SETTINGS": str(folder / "settings.yaml")}
+    shown = []
+    for cache, crashes in (("clean", False), ("crashed", True)):
+        used = {**extra, "CLFRACTAL_CACHE": str(folder / cache)}
+        with Window(display, folder, "s.yaml", *PLAIN, extra=used) as window:
+            if crashes:
+                window.keys("minus")
+                wait_for(lambda: list((folder / "crashed" / "autosave").glob("*.json")), "the safety copy")
+            window.kill()
+        with Window(display, folder, "s.yaml", "--size", "1280x720", extra=used) as window:
+            window.move(640, 700)
+            window.still(1.0)
+            shown.append(window.still())
+    different = (shown[0] != shown[1]).any(axis=2)
+    assert different.sum() > 2000, "nothing is offered"
+
+
+def test_what_was_saved_is_not_kept(display: Display, folder: Path) -> None:
+    (folder / "s.yaml").write_text(SURFACE)
+    (folder / "settings.yaml").write_text("autosave: 0.2\n")
+    cache = folder / "cache"
+    extra = {"CLFRACTAL_SETTINGS": str(folder / "settings.yaml"), "CLFRACTAL_CACHE": str(cache)}
+    with Window(display, folder, "s.yaml", *PLAIN, extra=extra) as window:
+        window.keys("minus")
+        wait_for(lambda: list((cache / "autosave").glob("*.json")), "the safety copy")
+        window.save()
+        wait_for(lambda: not list((cache / "autosave").glob("*.json")), "the end of the safety copy")
+        window.kill()
+    assert Autosave(cache / "autosave").found() == []

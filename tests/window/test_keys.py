@@ -1,0 +1,177 @@
+"""Keys: flight by position on any layout, views, turns, undo, help, Escape; what they do to the scene."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from clfractal.scene.parts import OrthographicCamera
+from tests.window.display import Display, needed
+from tests.window.driver import Window, wait_for
+from tests.window.scenes import SPHERE
+
+# Where W and Q are on a keyboard of any layout, as X numbers places.
+PLACE_W, PLACE_A = "25", "38"
+
+
+@pytest.fixture(scope="module")
+def opened(display: Display, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Window]:
+    """One window for all tests of this module."""
+    folder = tmp_path_factory.mktemp("keys")
+    (folder / "sphere.yaml").write_text(SPHERE)
+    with Window(display, folder, "sphere.yaml", "--size", "480x360", "--no-panels") as window:
+        window.move(240, 180)
+        yield window
+        assert window.process.poll() is None, window.told
+
+
+@pytest.fixture
+def window(opened: Window) -> Iterator[Window]:
+    """The window; what a test changes is taken back."""
+    before = opened.scene()
+    yield opened
+    opened.keys(*["alt+z"] * 12, *["ctrl+z"] * 12)
+    opened.still()
+    assert opened.scene() == before
+
+
+@pytest.fixture
+def french(display: Display) -> Iterator[None]:
+    """A keyboard on which A and Q, Z and W have changed their places."""
+    needed("setxkbmap")
+    subprocess.run(["setxkbmap", "fr"], env=display.environment(), check=True)
+    yield
+    subprocess.run(["setxkbmap", "us"], env=display.environment(), check=True)
+
+
+def position(window: Window) -> np.ndarray:
+    window.still()
+    return np.array(window.scene().camera.position)
+
+
+def test_flight_forward_is_towards_the_target_and_slows_down(window: Window) -> None:
+    before = position(window)
+    window.hold("w", 0.5)
+    after = position(window)
+    assert after[1] > before[1] + 0.05
+    assert np.abs(after[[0, 2]]).max() < 1e-9
+    assert after[1] < -1  # not into the sphere
+    assert (position(window) == after).all()
+
+
+def test_keys_of_flight_are_places(window: Window, french: None) -> None:
+    """On a French keyboard Z is where W was; it flies, and the key that is called W there does not fly forward."""
+    window.still()
+    before = position(window)
+    window.hold(PLACE_W, 0.3)
+    ahead = position(window)
+    assert ahead[1] > before[1] + 0.02
+    window.hold(PLACE_A, 0.3)
+    aside = position(window)
+    assert aside[0] < ahead[0] - 0.02
+    # Other keys are letters: Ctrl+Z of this layout is where Ctrl+W was.
+    window.keys("equal")
+    window.still()
+    lighter = window.scene()
+    window.keys(f"ctrl+{PLACE_W}")
+    window.still()
+    assert window.scene().output.exposure != lighter.output.exposure
+
+
+@pytest.mark.parametrize(
+    ("key", "axis"),
+    [
+        ("1", (0, -1, 0)),
+        ("shift+1", (0, 1, 0)),
+        ("3", (1, 0, 0)),
+        ("shift+3", (-1, 0, 0)),
+        ("7", (0, 0, 1)),
+        ("shift+7", (0, 0, -1)),
+    ],
+)
+def test_the_six_views(window: Window, key: str, axis: tuple[int, int, int]) -> None:
+    window.keys(key)
+    found = position(window)
+    assert np.allclose(found / np.linalg.norm(found), axis, atol=1e-6)
+
+
+def test_perspective_and_orthographic(window: Window) -> None:
+    before = window.still(8.0)  # messages have gone
+    window.keys("5")
+    window.still()
+    camera = window.scene().camera
+    assert isinstance(camera, OrthographicCamera)
+    assert camera.height == pytest.approx(2 * 3 * np.tan(np.radians(30)))
+    window.keys("5")
+    wait_for(lambda: np.array_equal(window.pixels(), before), "the picture of before")
+
+
+def test_arrows_turn_and_the_other_way_turns_back(window: Window) -> None:
+    before = window.scene().camera
+    window.keys("Left", "Left")
+    window.still()
+    turned = window.scene().camera
+    angle = np.degrees(np.arctan2(*np.array(turned.position)[:2]))
+    assert abs(abs(angle) - 180) == pytest.approx(2 * 24 / 360 * 180, abs=1e-6)
+    window.keys("Right", "Right")
+    window.still()
+    assert np.allclose(window.scene().camera.position, before.position, atol=1e-6)
+
+
+def test_help_opens_and_escape_closes_it(window: Window) -> None:
+    plain = window.still(8.0)
+    window.keys("F1")
+    helped = window.still()
+    assert (helped != plain).any(axis=2).mean() > 0.2
+    window.keys("Escape")
+    wait_for(lambda: np.array_equal(window.pixels(), plain), "the picture without help")
+
+
+def test_panels_come_and_go(window: Window) -> None:
+    plain = window.still(8.0)
+    window.keys("F2")
+    assert (window.still() != plain).any(axis=2).mean() > 0.2
+    window.keys("F2")
+    wait_for(lambda: np.array_equal(window.pixels(), plain), "the picture without panels")
+
+
+def test_a_held_key_ends_when_the_window_loses_the_keyboard(window: Window) -> None:
+    window.display.xdotool("keydown", "w", "sleep", 0.1)
+    window.display.xdotool("windowunmap", window.id, "sleep", 0.2, "windowmap", window.id)
+    window.display.xdotool("keyup", "w", "sleep", 0.3)
+    one = position(window)
+    assert (position(window) == one).all()
+
+
+def test_stereo_modes_go_round(window: Window) -> None:
+    window.keys("n")
+    window.still()
+    first = window.scene().stereo
+    window.keys("n")
+    window.still()
+    second = window.scene().stereo
+    assert first is not None
+    assert second is not None
+    assert first.mode != second.mode
+    window.keys("x")
+    window.still()
+    assert window.scene().stereo == second.model_copy(update={"swap": True})
+    window.keys("shift+n", "shift+n")
+    window.still()
+    assert window.scene().stereo is None
+
+
+def test_bookmarks_are_kept_in_the_scene(window: Window) -> None:
+    camera = window.scene().camera
+    window.keys("b")
+    window.keys("7")
+    window.still()
+    kept = window.scene()
+    assert [bookmark for bookmark in kept.bookmarks.values()] == [camera]
+    assert kept.camera != camera
+    window.keys("ctrl+1")
+    window.still()
+    assert np.allclose(window.scene().camera.position, camera.position, atol=1e-9)
