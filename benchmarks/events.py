@@ -54,7 +54,9 @@ class Events:
     def key(self, name: str, down: bool) -> float:
         """A key goes down or up, by X's name of its symbol."""
         symbol = ctypes.c_ulong(self._x11.XStringToKeysym(name.encode()))
-        return self._sent(self._test.XTestFakeKeyEvent, self._x11.XKeysymToKeycode(self._display, symbol), int(down))
+        return self._sent(
+            self._test.XTestFakeKeyEvent, self._x11.XKeysymToKeycode(self._display, symbol), int(down)
+        )
 
     def close(self) -> None:
         """Leaves the display."""

@@ -152,7 +152,7 @@ def latencies(
     handled: Sequence[tuple[str, tuple[Any, ...], int]],
     swaps: Sequence[tuple[float, int, int, int]],
 ) -> tuple[list[float], int]:
-    """Seconds from sending to the first swap that answers, for each move and step of the wheel; and how many have no answer.
+    """Seconds from sending to the first swap that answers, for each move and step of the wheel; and how many have none.
 
     Moves are told apart by their places, which are all different; steps of the wheel by their order. A move that the
     window skipped is answered with the next one that it took.
@@ -204,7 +204,7 @@ def dragged(sent: Sequence[Sequence[Any]]) -> list[Sequence[Any]]:
 
 def single_script(size: tuple[int, int], count: int) -> list[list[Any]]:
     """Steps of the wheel to and fro, half a second between them."""
-    width, height = size
+    _width, _height = size
     steps: list[list[Any]] = []
     for n in range(count):
         steps += [["sleep", 0.5], ["wheel", 1 if n % 4 < 2 else -1]]
@@ -283,13 +283,15 @@ def measure(
         settle(viewer, watch.turn, 1.0)
         watch.clear()
         sent = send(stream_script(size, seconds), watch.turn)
-        sent = dragged(sent)
-        times = [at for at, *_ in sent]
-        pictures = {number: time for time, _, number, _ in reversed(watch.swaps) if times[0] <= time <= times[-1]}
+        drags = dragged(sent)
+        times = [at for at, *_ in drags]
+        pictures = {
+            number: time for time, _, number, _ in reversed(watch.swaps) if times[0] <= time <= times[-1]
+        }
         found.frames = len(pictures) / (times[-1] - times[0])
         found.dividers = [divider for time, *_, divider in watch.swaps if times[0] <= time <= times[-1]]
         settle(viewer, watch.turn, 0.5)
-        found.stream, missing = latencies(sent, watch.handled, watch.swaps)
+        found.stream, missing = latencies(drags, watch.handled, watch.swaps)
         handled, swaps = len(watch.handled), len(watch.swaps)
         send([["move", size[0] // 2 + 20, size[1] // 2]], watch.turn)
         sent = send(single_script(size, singles), watch.turn)
@@ -348,7 +350,9 @@ def start_xvfb() -> subprocess.Popen[bytes]:
     """A screen that nobody sees, on a free number, as DISPLAY."""
     reading, writing = os.pipe()
     command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "-noreset"]
-    server = subprocess.Popen(command, pass_fds=(writing,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    server = subprocess.Popen(
+        command, pass_fds=(writing,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     os.close(writing)
     with os.fdopen(reading) as pipe:
         os.environ["DISPLAY"] = f":{pipe.readline().strip()}"

@@ -18,7 +18,11 @@ from types import FrameType
 GRACE_SECONDS = 0.35
 """How long the orderly way may take. A child process that compiles is given 0.25 s by Python itself."""
 
-wake: Callable[[], None] = lambda: None
+def _sleep_on() -> None:
+    """Nobody waits outside of Python."""
+
+
+wake: Callable[[], None] = _sleep_on
 """Called from another thread when Ctrl-C has come: makes a main thread that waits outside of Python go on."""
 
 

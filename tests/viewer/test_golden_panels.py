@@ -17,7 +17,7 @@ from PIL import Image
 
 from clfractal.viewer.panels import help, scene_dock, theme
 from clfractal.viewer.panels.ui import Ui
-from tests.viewer.panel_harness import screenshot
+from tests.viewer.panel_harness import Pixels, screenshot
 
 GOLDEN = Path(__file__).resolve().parents[1] / "golden" / "panels"
 SIZE = (1280, 720)
@@ -52,7 +52,7 @@ CASES: dict[str, tuple[str, Callable[[Ui], None], Callable[[Ui], None] | None]] 
 }
 
 
-def small(pixels: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+def small(pixels: Pixels) -> Pixels:
     """The left part of a screenshot, where the dock is (all of it for the help), at a quarter of the size."""
     height, width = (side // 4 * 4 for side in pixels.shape[:2])
     blocks = pixels[:height, :width].astype(np.float64).reshape(height // 4, 4, width // 4, 4, 3)

@@ -59,7 +59,7 @@ class Window:
     ) -> None:
         self.display, self.folder = display, folder
         self.saves = folder / "saved.yaml"
-        given = [*arguments, *(["--save", self.saves] if save else [])]
+        given = [*map(str, arguments), *(["--save", str(self.saves)] if save else [])]
         self._out, self._errors = folder / "standard-output", folder / "standard-error"
         with self._out.open("wb") as out, self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
@@ -106,7 +106,9 @@ class Window:
         # (xdotool counts a manager's frame twice.)
         told = self.display.ask("xwininfo", "-id", self.id)
         assert told, f"the window is gone: {self.told}"
-        found = {name.strip(): value for name, _, value in (line.partition(":") for line in told.splitlines())}
+        found = {
+            name.strip(): value for name, _, value in (line.partition(":") for line in told.splitlines())
+        }
         names = ("Absolute upper-left X", "Absolute upper-left Y", "Width", "Height")
         x, y, width, height = (int(found[name]) for name in names)
         return x, y, width, height

@@ -29,7 +29,17 @@ from tests.window import scenes
 SIZE = (640, 400)
 SLOWEST_TURN = 1.0
 # Those that would end the run, write files wherever they please, or leave the X server's screen.
-_NEVER = {"quit", "open", "save", "save_as", "screenshot", "export", "render_still", "span_monitors", "window_per_monitor"}
+_NEVER = {
+    "quit",
+    "open",
+    "save",
+    "save_as",
+    "screenshot",
+    "export",
+    "render_still",
+    "span_monitors",
+    "window_per_monitor",
+}
 _MODIFIERS = {"Ctrl": "Control_L", "Shift": "Shift_L", "Alt": "Alt_L"}
 _NAMES = {
     "-": "minus", "=": "equal", "[": "bracketleft", "]": "bracketright", "\\": "backslash", ",": "comma", ".": "period",
@@ -190,7 +200,9 @@ class Soak:
                     self.memory.append((now - start, _memory()))
                     self._told(now - start, user)
         except Exception as error:
-            self.problems.append(f"after {time.perf_counter() - start:.0f} s: {type(error).__name__}: {error}")
+            self.problems.append(
+                f"after {time.perf_counter() - start:.0f} s: {type(error).__name__}: {error}"
+            )
             if self.say is not None:
                 import traceback
 
@@ -237,7 +249,9 @@ class Soak:
     def _told(self, seconds: float, user: User) -> None:
         if int(seconds) % 10 == 0:
             used = self.memory[-1][1]
-            self.say(f"{seconds:5.0f} s  {user.done:6d} doings  {used:7.1f} MiB  {len(self.problems)} problems")
+            self.say(
+                f"{seconds:5.0f} s  {user.done:6d} doings  {used:7.1f} MiB  {len(self.problems)} problems"
+            )
 
     def _judge_memory(self) -> None:
         gc.collect()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,10 @@ PLAIN = ("--size", "480x320", "--no-panels")
 LIMIT_SECONDS, PROMISE_SECONDS = 1.5, 0.5
 # Gathers samples for minutes.
 LONG = SURFACE.replace("samples: 3", "samples: 4096").replace("iterations: 7", "iterations: 40")
+
+
+def _shows_something(window: Window) -> bool:
+    return bool(window.pixels().any())
 
 
 def interrupted(window: Window) -> float:
@@ -37,7 +42,7 @@ def test_ctrl_c_ends_it_at_once(display: Display, folder: Path, text: str) -> No
         with Window(display, folder, "s.yaml", *PLAIN, open=text is SURFACE) as window:
             if text is LONG:
                 window.id = wait_for(window._found)
-                wait_for(lambda shown=window: shown.pixels().any(), "a picture")
+                wait_for(partial(_shows_something, window), "a picture")
             took.append(interrupted(window))
         assert took[-1] < LIMIT_SECONDS
         if took[-1] < PROMISE_SECONDS:

@@ -170,7 +170,7 @@ def test_bookmarks_are_kept_in_the_scene(window: Window) -> None:
     window.keys("7")
     window.still()
     kept = window.scene()
-    assert [bookmark for bookmark in kept.bookmarks.values()] == [camera]
+    assert list(kept.bookmarks.values()) == [camera]
     assert kept.camera != camera
     window.keys("ctrl+1")
     window.still()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +30,15 @@ def shows_its_film(window: Window) -> None:
     window.shows(film(window.folder, "s.yaml", (width, height)))
 
 
+def _has_size(window: Window, size: tuple[int, int]) -> bool:
+    return window.place[2:] == size
+
+
 def test_resized_again_and_again(window: Window) -> None:
     shows_its_film(window)
     for size in ((500, 300), (333, 401), (640, 200), (321, 233)):
         window.resize(*size)
-        wait_for(lambda size=size: window.place[2:] == size, f"the size {size}")
+        wait_for(partial(_has_size, window, size), f"the size {size}")
         shows_its_film(window)
 
 
