@@ -296,7 +296,12 @@ def commands() -> dict[str, Any]:
 def test_every_command_and_option_is_described() -> None:
     assert {code(row[0]).split()[1] for row in table("command-line.md", "Commands")} == set(commands())
     for name, command in commands().items():
-        known = {option for each in command.params for option in each.opts if option.startswith("-")}
+        known = {
+            option
+            for each in command.params
+            for option in (*each.opts, *each.secondary_opts)
+            if option.startswith("-")
+        }
         told = set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", section("command-line.md", f"clfractal {name}")))
         assert told == known, name
 
