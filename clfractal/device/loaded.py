@@ -6,8 +6,11 @@ import threading
 import time
 from typing import Any
 
-_MOST = 64
-"""A picture has one program and a grid of voxels five; loading one from the disk takes PoCL some 50 ms."""
+MOST = 24
+"""A picture has one program and a grid of voxels five; loading one from the disk takes PoCL some 50 ms.
+
+Each takes some 8 MB, and in a window every value of a power is a program of its own.
+"""
 
 
 class BuildTime:
@@ -58,7 +61,7 @@ class LoadedPrograms:
         with self._lock:
             self._programs.pop(key, None)
             self._programs[key] = program
-            if len(self._programs) > _MOST:
+            if len(self._programs) > MOST:
                 del self._programs[next(iter(self._programs))]
 
     def clear(self) -> None:

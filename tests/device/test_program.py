@@ -13,7 +13,7 @@ import pytest
 
 from clfractal.device import cache, compiler
 from clfractal.device.compiler import Argument, Warm
-from clfractal.device.loaded import LoadedPrograms
+from clfractal.device.loaded import MOST, LoadedPrograms
 from clfractal.device.program import Program, build, math_flags
 from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
@@ -81,12 +81,12 @@ def test_programs_in_memory_are_the_devices_own(device: Device, empty_cache: Pat
 
 def test_the_program_used_longest_ago_is_forgotten() -> None:
     loaded = LoadedPrograms()
-    for number in range(64):
+    for number in range(MOST):
         loaded.keep(str(number), number)
     assert loaded.get("0") == 0
-    loaded.keep("64", 64)
+    loaded.keep("more", MOST)
     assert loaded.get("1") is None
-    assert [loaded.get(key) for key in ("0", "2", "64")] == [0, 2, 64]
+    assert [loaded.get(key) for key in ("0", "2", "more")] == [0, 2, MOST]
     loaded.clear()
     assert loaded.get("0") is None
 
