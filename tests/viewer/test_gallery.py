@@ -20,6 +20,7 @@ from imgui_bundle import imgui
 from clfractal.device import cache
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.resources import folder
 from clfractal.scene.load import check_scene, load_scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.background import Thumbnail
@@ -269,7 +270,7 @@ def test_a_click_opens_a_scene_and_closes_the_gallery(monkeypatch: pytest.Monkey
     assert len(done) == 1
     kind, _, path = done[0].partition(":")
     assert kind == "open"
-    assert Path(path).samefile("scenes/bulbox.yaml")
+    assert Path(path).samefile(folder("scenes") / "bulbox.yaml")
     assert "gallery" not in ui.show
 
 
