@@ -18,6 +18,7 @@ from types import FrameType
 GRACE_SECONDS = 0.35
 """How long the orderly way may take. A child process that compiles is given 0.25 s by Python itself."""
 
+
 def _sleep_on() -> None:
     """Nobody waits outside of Python."""
 

@@ -13,6 +13,7 @@ from clfractal.files.atomic import check_output
 from clfractal.scene.model import Scene
 from clfractal.viewer import window
 from clfractal.viewer.files import Files
+from clfractal.viewer.memory import give_memory_back
 from clfractal.viewer.options import Options
 from clfractal.viewer.recording import Recording, read_recording
 
@@ -47,6 +48,7 @@ def begin(options: Options) -> Begun:
         ClfractalError: a wrong option or scene, or a file that cannot be read or written: status 2.
         DeviceError: no device; no display (status 3).
     """
+    give_memory_back()
     files = Files(options)
     recording = read_recording(options.play) if options.play is not None else None
     if options.record is not None:
