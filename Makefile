@@ -6,7 +6,7 @@
 #   make view          the window (needs a display)
 #   make window        tests of the window, on a screen of their own (needs Xvfb, xdotool, openbox and Mesa)
 #   make soak          ten minutes of random events for the window, from a seed
-#   make lowest        render, voxelize and mesh once with the lowest versions of libraries that pyproject.toml allows
+#   make lowest        render, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
 #
@@ -71,7 +71,9 @@ lowest: $(LOWEST)/.installed
 		&& $$program render bulb.exr -o again.png \
 		&& $$program voxelize $$scene --resolution 32 -o bulb.nrrd \
 		&& $$program mesh bulb.nrrd -o bulb.ply && $$program mesh $$scene --resolution 32 -o bulb.glb \
-		&& test -s bulb.exr -a -s bulb.png -a -s again.png -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb
+		&& test -s bulb.exr -a -s bulb.png -a -s again.png -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb \
+		&& if command -v xvfb-run >/dev/null; then xvfb-run -a $$program view $$scene --size 640x360 --shot view.png \
+		&& test -s view.png; fi
 
 bench: $(VENV)/.installed
 	$(BIN)/clfractal bench
@@ -117,7 +119,7 @@ $(LINT)/.installed: requirements-lint.txt | $(LINT)/bin/python
 $(LOWEST)/.installed: $(SOURCES) | $(LOWEST)/bin/python
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
 	$(LOWEST)/bin/uv pip compile --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
-		--only-binary :all: --extra mesh --output-file $(LOWEST)/versions.txt pyproject.toml
+		--only-binary :all: --extra mesh --extra viewer --output-file $(LOWEST)/versions.txt pyproject.toml
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --only-binary :all: \
 		--requirement $(LOWEST)/versions.txt
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps .

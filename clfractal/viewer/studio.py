@@ -5,6 +5,7 @@ Panels, keys and pointers change the scene only through this class; so all of th
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
@@ -31,6 +32,9 @@ from clfractal.work.show import Look
 
 Camera = PerspectiveCamera | OrthographicCamera
 MESSAGE_SECONDS = 6.0
+# How long the window waits for a device to end what it does, seconds.
+_PATIENCE = 0.25
+_PATIENCE_AT_END = 2.0
 MOST_MESSAGES = 200
 MOST_THUMBNAILS = 300
 
@@ -237,14 +241,22 @@ class Studio:
 
     def use_device(self, device: Device) -> None:
         """Goes on with another device; the last picture stays until the new one is there."""
-        self.session.close()
-        tasks = self.session.take_tasks()
+        before = self.session
+        ended = before.close(_PATIENCE)
         self.session = Session(device, self.pacing, self.woken)
         self.session.start()
-        for task in tasks:
-            self.session.add(task)
+        if ended:
+            self._take_over(before)
+        else:
+            threading.Thread(target=self._take_over, args=(before,), daemon=True).start()
         self._requested = None
         self.refresh()
+
+    def _take_over(self, before: Session) -> None:
+        """Goes on with the tasks of a session that is closed, when it has ended: measuring a device takes seconds."""
+        before.close(None)
+        for task in before.take_tasks():
+            self.session.add(task)
 
     # Beside the picture
 
@@ -291,7 +303,7 @@ class Studio:
 
     def close(self) -> None:
         """Ends all work; files that are being written become complete."""
-        self.session.close()
+        self.session.close(_PATIENCE_AT_END)
         for still in self.stills:
             still.finish_writing()
 

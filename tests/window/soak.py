@@ -4,8 +4,8 @@ Opens the window in this process, on DISPLAY or a screen of its own, and sends i
 the seed: drags, wheel, clicks, every key but those that quit or write files, edits, other sizes, other devices, scenes that
 change on the disk. It fails (status 1) on an exception, on a message of an internal error, on a turn of the main loop that
 takes longer than a second (what every thread did then is on standard error), and if memory grows: after nine tenths of the
-time it may be at most 5 % above what it was after two tenths; in short runs 15 %, and the programs that a device keeps. Both
-times the window shows the same scene, at rest.
+time it may be at most 5 % above what it was after two tenths; in short runs 15 %, and the programs that a device keeps.
+Both times the window shows the same scene, at rest.
 """
 
 from __future__ import annotations
