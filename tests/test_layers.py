@@ -20,7 +20,10 @@ OWNERS = {
     "OpenEXR": {"files/exr.py"},
     "png": {"files/png.py"},
     "rich": {"commands/progress.py"},
-    "typer": {"commands/app.py"},
+    "typer": {
+        f"commands/{name}.py"
+        for name in ("app", "options", "list_facts", "list_grids", "list_pictures", "list_window")
+    },
     "cmap": {"scene/palette.py"},
     "skimage": {"voxels/mesh.py"},
     "glfw": {"viewer/window.py", "commands/view.py"},

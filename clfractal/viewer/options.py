@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """The options of `clfractal view`; see `commands/app.py` for their meanings."""
+    """The options of `clfractal view`; see `commands/list_window.py` for their meanings."""
 
     scene: str | None = None
     device: str | None = None

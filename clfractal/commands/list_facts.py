@@ -1,0 +1,85 @@
+"""The commands that check and tell, and their options; see `options.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from clfractal.commands.options import DeviceOption, Overrides, Quiet, Scene, Verbose, Work, app, shell_of
+
+
+@app.command()
+def check(
+    context: typer.Context,
+    scene: Scene,
+    overrides: Overrides = None,
+    parallax: Annotated[
+        bool,
+        typer.Option(
+            "--parallax", help="Measure the depth of a stereo scene and print its range of parallax."
+        ),
+    ] = False,
+    device: DeviceOption = None,
+    verbose: Verbose = False,
+) -> Work:
+    """Check a scene and print it with every default filled in."""
+    from clfractal.commands.check import check_scene
+
+    shell = shell_of(context, verbose=verbose)
+    return lambda: check_scene(scene, tuple(overrides or ()), shell, parallax=parallax, device=device)
+
+
+@app.command()
+def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = False) -> Work:
+    """List every OpenCL device and its speed, which is measured once and then remembered."""
+    from clfractal.commands.devices import list_devices
+
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: list_devices(shell)
+
+
+@app.command()
+def formulas(
+    context: typer.Context,
+    name: Annotated[str | None, typer.Argument(help="Name of a formula in the library.")] = None,
+) -> Work:
+    """List the library of formulas, or describe one."""
+    from clfractal.commands.formulas import list_formulas, tell_formula
+
+    shell = shell_of(context)
+    return lambda: shell.print(list_formulas() if name is None else tell_formula(name))
+
+
+@app.command()
+def schema(context: typer.Context) -> Work:
+    """Print the JSON Schema of scene files, for editors."""
+    import json
+
+    from clfractal.scene import load
+
+    shell = shell_of(context)
+    return lambda: shell.print(json.dumps(load.schema(), indent=2))
+
+
+@app.command()
+def bench(
+    context: typer.Context,
+    device: DeviceOption = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE.json", help="Also write the table as JSON.")
+    ] = None,
+    rows: Annotated[
+        list[str] | None,
+        typer.Option("--row", metavar="NAME", help="Measure only this row; repeatable."),
+    ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Measure this machine's speed and print a table."""
+    from clfractal.commands.bench import run
+
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    shell.mute_drivers()
+    return lambda: run(device=device, json_file=json_file, shell=shell, wanted=rows or ())

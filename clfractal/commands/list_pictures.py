@@ -1,0 +1,160 @@
+"""The commands that make pictures, and their options; see `options.py`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from clfractal.commands.options import DeviceOption, Overrides, Quiet, Scene, Verbose, Work, app, shell_of
+
+
+@app.command()
+def render(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o", "--output", help="An .exr or .png file; repeatable.  [default: the scene's name with .png]"
+        ),
+    ] = None,
+    device: DeviceOption = None,
+    precision: Annotated[
+        str | None,
+        typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option("--size", metavar="WxH", help="Size in pixels; the camera stays where it is."),
+    ] = None,
+    overrides: Overrides = None,
+    region: Annotated[
+        str | None,
+        typer.Option(
+            "--region",
+            metavar="X,Y,W,H",
+            help="Render only this part of the picture; pixels from the top left.",
+        ),
+    ] = None,
+    samples: Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the work kept in OUTPUT.partial.")
+    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    stats: Annotated[
+        Path | None, typer.Option("--stats", metavar="FILE.json", help="Write times and counts as JSON.")
+    ] = None,
+) -> Work:
+    """Render a scene to one or more picture files."""
+    from clfractal.commands.render import Order, render_scene
+
+    order = Order(
+        scene=scene,
+        outputs=tuple(output or ()),
+        device=device,
+        precision=precision,
+        size=size,
+        overrides=tuple(overrides or ()),
+        region=region,
+        samples=samples,
+        resume=resume,
+        stats=stats,
+    )
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: render_scene(order, shell)
+
+
+@app.command()
+def slices(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="A .png or .exr file; slice.png becomes slice_0001.png, ...; repeatable.  [default: slice.png]",
+        ),
+    ] = None,
+    count: Annotated[int, typer.Option("--count", help="Number of slices.")] = 10,
+    spacing: Annotated[
+        float | None,
+        typer.Option(
+            "--spacing", help="Scene units between two slices.  [default: slices fill the formula's bounds]"
+        ),
+    ] = None,
+    start: Annotated[
+        int, typer.Option("--start", metavar="N", help="Number of the first slice to render.")
+    ] = 1,
+    device: DeviceOption = None,
+    precision: Annotated[
+        str | None,
+        typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option("--size", metavar="WxH", help="Size in pixels; the plane stays where it is.")
+    ] = None,
+    overrides: Overrides = None,
+    samples: Annotated[int | None, typer.Option("--samples", help="Samples per pixel, in total.")] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Render a stack of parallel cut planes to numbered picture files."""
+    from clfractal.commands.render import Order
+    from clfractal.commands.slices import Stack, render_slices
+
+    order = Order(
+        scene=scene,
+        outputs=tuple(output or ()),
+        device=device,
+        precision=precision,
+        size=size,
+        overrides=tuple(overrides or ()),
+        samples=samples,
+    )
+    stack = Stack(count, spacing, start)
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: render_slices(order, stack, shell)
+
+
+@app.command()
+def vary(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Where the files go.  [default: here]")
+    ] = Path(),
+    count: Annotated[int, typer.Option("--count", help="Number of variations.")] = 12,
+    strength: Annotated[str, typer.Option("--strength", help="slight, medium or heavy.")] = "medium",
+    seed: Annotated[int, typer.Option("--seed", help="Number that selects the variations.")] = 0,
+    only: Annotated[
+        str | None,
+        typer.Option(
+            "--only", metavar="KINDS", help="What may change: formula,camera,colors or some of them."
+        ),
+    ] = None,
+    sheet: Annotated[
+        Path | None, typer.Option("--sheet", metavar="FILE.png", help="Also write one picture of all.")
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(
+            "--size", metavar="WxH", help="Size of the small pictures.  [default: the longer side is 320]"
+        ),
+    ] = None,
+    device: DeviceOption = None,
+    overrides: Overrides = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Write variations of a scene to choose from, each with a small picture."""
+    from clfractal.commands.order import Order
+    from clfractal.commands.vary import Choice, vary_scene
+
+    order = Order(scene=scene, device=device, size=size, overrides=tuple(overrides or ()))
+    choice = Choice(output, count, strength, seed, sheet, only)
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: vary_scene(order, choice, shell)

@@ -1,0 +1,62 @@
+"""What the lists of commands share: the Typer application and options that several commands have.
+
+Each command's work is imported when it is called.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated
+
+import typer
+
+from clfractal.commands.shell import Shell
+
+Work = Callable[[], None]
+
+app = typer.Typer(
+    name="clfractal",
+    help="Renders 3D fractals with OpenCL: YAML scenes in, finished pictures out.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Scene = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene file, or a picture that clfractal wrote.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Replace a value of the scene, such as camera.fov=30; repeatable."
+    ),
+]
+DeviceOption = Annotated[
+    str | None,
+    typer.Option("--device", help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]"),
+]
+Resolution = Annotated[
+    str | None,
+    typer.Option(
+        "--resolution",
+        metavar="N",
+        help="Voxels along the longest side, or NX,NY,NZ.  [default: as in the scene, else 512]",
+    ),
+]
+Precision = Annotated[
+    str | None,
+    typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Show more: statistics, causes of errors, drivers' messages.")
+]
+
+
+def shell_of(context: typer.Context, *, quiet: bool = False, verbose: bool = False) -> Shell:
+    """The shell that `call` was given."""
+    shell = context.obj
+    assert isinstance(shell, Shell)
+    shell.quiet, shell.verbose = quiet, verbose
+    return shell
