@@ -31,9 +31,9 @@ def render_scene(order: Order, shell: Shell) -> None:
     scene = ordered_scene(order)
     outputs = _outputs(order, scene)
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
-    from clfractal.commands import stats
     from clfractal.commands.unfinished import Unfinished
     from clfractal.pictures.outputs import output_files
+    from clfractal.work import stats
     from clfractal.work.comfort import comfort_of_job
     from clfractal.work.engine import Engine
     from clfractal.work.run import run
@@ -58,10 +58,8 @@ def render_scene(order: Order, shell: Shell) -> None:
         comfort = comfort_of_job(job, unfinished.films, engine.look)
     shell.state = lambda: "clfractal: interrupted"
     values = stats.statistics(
-        job, state, wall_ms=1e3 * (written - start), write_ms=1e3 * (written - rendered)
+        job, state, wall_ms=1e3 * (written - start), write_ms=1e3 * (written - rendered), comfort=comfort
     )
-    if job.scene.stereo is not None:
-        values["stereo"] = stats.of_stereo(job, comfort)
     if order.stats is not None:
         stats.write_statistics(order.stats, values)
     files = [file for path in outputs for file in output_files(job.scene.stereo, path)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,34 @@ from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from xarray import Dataset
+
+Facts: TypeAlias = Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+"""Values by their names, or a function that finds them."""
+
+
+class _Known:
+    """Facts that are found when they are first asked for, and those that were added before that."""
+
+    def __init__(self, facts: Facts) -> None:
+        self._find = facts if callable(facts) else None
+        self._found: dict[str, Any] = {} if callable(facts) else dict(facts)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        if self._find is not None:
+            self._found = {**self._find(), **self._found}
+            self._find = None
+        return self._found
+
+    def add(self, name: str, value: Any) -> None:
+        self._found[name] = value
+
+    def __reduce__(self) -> tuple[type[_Known], tuple[dict[str, Any]]]:
+        return _Known, (self.facts,)
 
 
 class Film:
@@ -34,7 +62,7 @@ class Film:
         channels: Sequence[str] = DEFAULT_CHANNELS,
         display: tuple[int, int] = (1, 1),
         region: Region | None = None,
-        header: Mapping[str, Any] | Callable[[], Mapping[str, Any]] | None = None,
+        header: Facts | None = None,
     ) -> None:
         self.channels: tuple[str, ...] = check_channels(channels)
         self.display = display
@@ -42,15 +70,14 @@ class Film:
         if not self.region.inside(*display):
             raise ValueError(f"{self.region} is not inside a picture of {display[0]} x {display[1]}")
         self.grid = TileGrid(self.region)
-        self._make_header = header if callable(header) else None
-        self._header: dict[str, Any] | None = None if callable(header) else dict(header or {})
-        self._told: dict[str, Any] = {}
+        self._header = _Known(header or {})
+        self._stats = _Known({})
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
         # Not `zeros`: NumPy asks for large pages only for memory that it does not want cleared, and small ones take the
         # system ten times as long.
         self._data = np.empty((len(self.channels), self.region.height, self.region.width), np.float32)
-        self._planes = dict(zip(self.channels, self._data, strict=True))
+        self._planes = dict(zip(self.channels, self._data, strict=True))  # views of it
         for name, plane in self._planes.items():
             plane.fill(CHANNELS[name].fill)
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
@@ -58,14 +85,23 @@ class Film:
     @property
     def header(self) -> dict[str, Any]:
         """The header of picture files; made at first use if it was given as a function."""
-        if self._header is None:
-            assert self._make_header is not None
-            self._header = {**self._make_header(), **self._told}
-        return self._header
+        return self._header.facts
+
+    @property
+    def stats(self) -> dict[str, Any]:
+        """What the render took and what it counted, with the keys of `--stats`; empty if nothing was rendered.
+
+        Times of a film of a refinement are those of all its passes so far. `wall_ms` has no time for files.
+        """
+        return self._stats.facts
 
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header, even if the header has not been made yet."""
-        (self._told if self._header is None else self._header)[key] = value
+        self._header.add(key, value)
+
+    def tell_stats(self, stats: Facts) -> None:
+        """Says what the render took; a function is called when `stats` is first asked for."""
+        self._stats = _Known(stats)
 
     @property
     def width(self) -> int:
@@ -98,6 +134,25 @@ class Film:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.channels)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in self.__dict__.items() if name != "_planes"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._planes = dict(zip(self.channels, self._data, strict=True))
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        """The colours R, G, B, float32 of shape (height, width, 3); `np.asarray(film)` calls this.
+
+        Raises:
+            KeyError: the film has no R, G, B.
+            ValueError: `copy` is False: channels lie one after the other in memory, colours side by side.
+        """
+        if copy is False:
+            raise ValueError("the colours of a film cannot be an array without copying them")
+        colors = np.stack([self["R"], self["G"], self["B"]], axis=-1)
+        return colors if dtype is None else colors.astype(dtype, copy=False)
 
     def __repr__(self) -> str:
         part = "" if self.region == Region(0, 0, *self.display) else f", {self.region}"
@@ -166,6 +221,28 @@ class Film:
         if exposure:
             linear *= np.float32(2.0**exposure)
         return encode8(linear, origin=(self.region.x, self.region.y))
+
+    def to_image(self) -> Image:
+        """The picture as an image of Pillow: the pixels of an 8-bit PNG; RGBA if the background is transparent.
+
+        Raises:
+            KeyError: the film has no R, G, B.
+        """
+        from clfractal.pictures.convert import to_image
+
+        for name in "RGB":
+            _ = self[name]
+        return to_image(self)
+
+    def to_xarray(self) -> Dataset:
+        """The channels as a data set of xarray, see `convert.to_xarray`.
+
+        Raises:
+            FileError: xarray is not installed.
+        """
+        from clfractal.pictures.convert import to_xarray
+
+        return to_xarray(self, self._planes)
 
     def _repr_png_(self) -> bytes | None:
         """The picture that a notebook shows; None (it then shows the text form) if there are no colours."""

@@ -178,17 +178,15 @@ def comfort_of_job(job: Job, stores: Sequence[Picture], look: Look) -> Comfort |
     Raises:
         DeviceError, KernelBuildError: a look failed.
     """
-    scene = job.scene
-    if scene.stereo is None:
+    if job.scene.stereo is None:
         return None
-    exact = (
-        "Z" in job.channels
-        and scene.layout is None
-        and scene.renderer.type != "cut_plane"
-        and scene.image.width * scene.image.height <= _MOST_PIXELS
-    )
-    if not exact:
-        return measured(scene, look)
+    return comfort_of_films(job, stores) if _has_depth(job) else measured(job.scene, look)
+
+
+def comfort_of_films(job: Job, stores: Sequence[Picture]) -> Comfort | None:
+    """The same without a look: None also for pictures that lack the depth channel."""
+    if job.scene.stereo is None or not _has_depth(job):
+        return None
     found = []
     for view, store in zip(job.views, stores, strict=True):
         for row, band in store.bands():
@@ -196,6 +194,17 @@ def comfort_of_job(job: Job, stores: Sequence[Picture], look: Look) -> Comfort |
             if part is not None:
                 found.append(part)
     return Comfort.joined(found)
+
+
+def _has_depth(job: Job) -> bool:
+    """Whether the depth of everything that a stereo job shows is in its pixels, and these are not too many."""
+    scene = job.scene
+    return (
+        "Z" in job.channels
+        and scene.layout is None
+        and scene.renderer.type != "cut_plane"
+        and scene.image.width * scene.image.height <= _MOST_PIXELS
+    )
 
 
 def points_of_depth(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -18,7 +19,7 @@ from clfractal.pictures.film import Film
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.work.comfort import Look, fitted
-from clfractal.work.films import JobFilms
+from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
@@ -129,6 +130,7 @@ class Engine:
         Args:
             token: ends the render when any thread cancels it; `clfractal.Stopped` is then raised.
         """
+        start = time.perf_counter()
         with self._alone():
             job = self.prepare(scene, precision=precision, samples=samples, region=region, channels=channels)
             if job.stays_apart:
@@ -138,8 +140,8 @@ class Engine:
                     Where(path="stereo.mode"),
                 )
             films = JobFilms(job)
-            run(job, films.films, self.executor, progress=progress, token=token)
-            return films.picture()
+            state = run(job, films.films, self.executor, progress=progress, token=token)
+            return films.picture(Took(state, 1e3 * (time.perf_counter() - start)))
 
     def render_pair(
         self,
@@ -152,6 +154,7 @@ class Engine:
         token: CancelToken | None = None,
     ) -> tuple[Film, Film]:
         """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
+        start = time.perf_counter()
         with self._alone():
             loaded = scene if isinstance(scene, Scene) else load_scene(scene)
             if loaded.stereo is None:
@@ -162,8 +165,8 @@ class Engine:
                 loaded = loaded.model_copy(update={"stereo": stereo})
             job = self.prepare(loaded, precision=precision, samples=samples, channels=channels)
             films = JobFilms(job)
-            run(job, films.films, self.executor, progress=progress, token=token)
-            eyes = films.eyes()
+            state = run(job, films.films, self.executor, progress=progress, token=token)
+            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start)))
             return eyes["left"], eyes["right"]
 
     def refine(

@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
 from clfractal.pictures.compose import Side
 from clfractal.pictures.film import Film, in_memory
+from clfractal.work.comfort import comfort_of_films
 from clfractal.work.job import Job
+from clfractal.work.run import Progress
+from clfractal.work.stats import statistics
+
+
+@dataclass(frozen=True, slots=True)
+class Took:
+    """What a render took: its counts, and the time of the whole call in ms."""
+
+    state: Progress
+    wall_ms: float
 
 
 class JobFilms:
@@ -25,14 +37,30 @@ class JobFilms:
         """The header of the whole picture's files."""
         return self.job.header()
 
-    def picture(self) -> Film:
-        """The picture, as far as it is finished. Not for a pair whose pictures stay apart."""
-        composed = len(self.films) != 1
-        return in_memory(self.job.picture(self.films, self.header if composed else None))
+    def picture(self, took: Took | None = None) -> Film:
+        """The picture, as far as it is finished. Not for a pair whose pictures stay apart.
 
-    def eyes(self) -> dict[Side, Film]:
-        """Each eye's picture."""
-        return {side: in_memory(picture) for side, picture in self.job.eyes(self.films).items()}
+        Args:
+            took: what it took so far, for `Film.stats`.
+        """
+        composed = len(self.films) != 1
+        film = in_memory(self.job.picture(self.films, self.header if composed else None))
+        if took is not None:
+            film.tell_stats(partial(self._statistics, took))
+        return film
+
+    def eyes(self, took: Took | None = None) -> dict[Side, Film]:
+        """Each eye's picture; `took` as for `picture`: both films have the statistics of the pair."""
+        films = {side: in_memory(picture) for side, picture in self.job.eyes(self.films).items()}
+        if took is not None:
+            for film in films.values():
+                film.tell_stats(partial(self._statistics, took))
+        return films
+
+    def _statistics(self, took: Took) -> dict[str, Any]:
+        return statistics(
+            self.job, took.state, wall_ms=took.wall_ms, comfort=comfort_of_films(self.job, self.films)
+        )
 
     def _header_of(self, number: int) -> dict[str, Any]:
         return self.job.view_header(number, self.header)

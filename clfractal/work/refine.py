@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Generator, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from importlib import import_module
 from itertools import pairwise
 
@@ -12,10 +13,10 @@ import numpy as np
 from clfractal.device.cancel import CancelToken
 from clfractal.errors import DeviceError
 from clfractal.pictures.film import Film
-from clfractal.work.films import JobFilms
+from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
-from clfractal.work.run import run
+from clfractal.work.run import Progress, Tally, run
 
 DIVIDERS = (8, 4, 2)
 """Every how many pixels, in each direction, the first passes render.
@@ -53,17 +54,32 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
     """
-    seconds = 0.0
+    start, total, seconds = time.perf_counter(), Tally(), 0.0
+
+    def passed(films: JobFilms, samples: tuple[int, int] | None = None) -> Progress:
+        """Makes one pass, and gives the counts and times of all passes so far."""
+        nonlocal seconds
+        state = run(films.job, films.films, executor, token=token, samples=samples)
+        seconds += state.seconds
+        total.add(state)
+        return replace(state, **asdict(total))
+
+    def shown(films: JobFilms, state: Progress, stage: str) -> Film:
+        film = films.picture(Took(state, 1e3 * (time.perf_counter() - start)))
+        film.tell("seconds", seconds)
+        film.stage = stage
+        return film
+
     try:
         for divider in DIVIDERS:
             coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
             small = JobFilms(coarse)
-            seconds += run(coarse, small.films, executor, token=token).seconds
+            state = passed(small)
             whole = JobFilms(job)
             for film, found in zip(whole.films, small.films, strict=True):
                 _enlarge(found, film, divider)
             stage = {8: "8th", 4: "4th", 2: "2nd"}[divider]
-            yield _shown(whole, seconds, f"every {stage} pixel")
+            yield shown(whole, state, f"every {stage} pixel")
         ranges = pass_ranges(job.samples) if has_room(job, executor, token) else [(0, job.samples)]
         films = JobFilms(job)
         for samples in ranges:
@@ -71,9 +87,9 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
             for view, film, old in zip(job.views, films.films, before.films, strict=True):
                 if view.plan.samples <= samples[0]:  # finished before the others
                     film.take(old)
-            seconds += run(job, films.films, executor, token=token, samples=samples).seconds
+            state = passed(films, samples)
             last = samples[1] == job.samples
-            yield _shown(films, seconds, "" if last else f"{samples[1]} of {job.samples} samples")
+            yield shown(films, state, "" if last else f"{samples[1]} of {job.samples} samples")
     finally:
         executor.forget()
 
@@ -109,10 +125,3 @@ def _enlarge(small: Film, whole: Film, divider: int) -> None:
     rows = np.arange(region.y, region.bottom) // divider - small.region.y
     columns = np.arange(region.x, region.right) // divider - small.region.x
     whole.fill({name: small[name][np.ix_(rows, columns)] for name in whole})
-
-
-def _shown(films: JobFilms, seconds: float, stage: str) -> Film:
-    film = films.picture()
-    film.tell("seconds", seconds)
-    film.stage = stage
-    return film

@@ -1,4 +1,4 @@
-"""The statistics that `--stats` and `--verbose` show."""
+"""The statistics of a render: what `--stats` writes, `--verbose` shows and `film.stats` holds."""
 
 from __future__ import annotations
 
@@ -7,27 +7,30 @@ import resource
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import clfractal
 from clfractal.files.atomic import atomic_writer
 from clfractal.optics.view import scene_view
+from clfractal.work.comfort import Comfort
 from clfractal.work.job import Job
 from clfractal.work.run import Progress
 
-if TYPE_CHECKING:
-    from clfractal.work.comfort import Comfort
 
+def statistics(
+    job: Job, state: Progress, *, wall_ms: float, write_ms: float = 0.0, comfort: Comfort | None = None
+) -> dict[str, Any]:
+    """Times and counts as plain data; for a stereo scene also its view, under `stereo`.
 
-def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) -> dict[str, Any]:
-    """Times and counts as plain data.
-
-    `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the command's start
-    to its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray`
+    `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the start of the command, or
+    of the call, to its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray`
     includes the steps of shadow rays.
+
+    Args:
+        comfort: the parallax of a stereo scene, where it is known.
     """
     info, region = job.device, job.region
-    return {
+    values = {
         "device": info.name,
         "platform": info.platform,
         "driver": info.driver,
@@ -51,10 +54,13 @@ def statistics(job: Job, state: Progress, *, wall_ms: float, write_ms: float) ->
         "bad_distances": state.bad_distances,
         "peak_memory_mb": round(peak_memory_mb(), 1),
     }
+    if job.scene.stereo is not None:
+        values["stereo"] = _of_stereo(job, comfort)
+    return values
 
 
-def of_stereo(job: Job, comfort: Comfort | None) -> dict[str, Any]:
-    """The stereo view of a pair, as plain data; parallax is None for an empty picture."""
+def _of_stereo(job: Job, comfort: Comfort | None) -> dict[str, Any]:
+    """The stereo view of a pair, as plain data; parallax is None for an empty picture, and where it is unknown."""
     middle, stereo = scene_view(job.scene), job.scene.stereo
     assert stereo is not None
     return {
