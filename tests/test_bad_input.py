@@ -237,7 +237,7 @@ def test_a_picture_cut_short_as_a_scene(here: Path, shell: InProcess, name: str)
 
 def test_a_picture_is_not_replaced_by_its_own(here: Path, shell: InProcess) -> None:
     assert shell("render", "scene.yaml", "-o", "mine.png", "--quiet").status == 0
-    assert shell("render", "mine.png").is_one_line(2, "mine.png: would be overwritten", "-o")
+    assert shell("render", "mine.png").is_one_line(2, "mine.png: would be overwritten", "name another")
 
 
 def test_a_full_disk(here: Path, shell: InProcess) -> None:

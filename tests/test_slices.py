@@ -103,6 +103,6 @@ def test_a_slice_does_not_replace_the_scene_that_it_shows(clf: InProcess) -> Non
     before = Path("slice_0002.png").read_bytes()
     ended = clf("slices", "slice_0002.png", "--count", "2")
     assert ended.is_one_line(
-        2, "slice_0002.png: would be overwritten by its own slice; name another output with -o"
+        2, "slice_0002.png: would be overwritten, but it is read for this; name another output"
     )
     assert Path("slice_0002.png").read_bytes() == before

@@ -143,7 +143,7 @@ REFUSED = {
     ("-o", "none/there"): "none/there: cannot be made: No such file or directory",
     ("-o", "scene.yaml"): "scene.yaml: cannot be made: File exists",
     ("--sheet", "sheet.jpg"): "sheet.jpg: unknown extension '.jpg'; known: .png",
-    ("--sheet", "scene-01.png"): "scene-01.png: is the name of a variation's own picture; choose another",
+    ("--sheet", "scene-01.png"): "scene-01.png: would be written twice",
     ("--device", "abacus"): "abacus",
 }
 

@@ -19,7 +19,7 @@ from clfractal.commands.shell import Shell
 from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, DeviceError, Where
-from clfractal.files.atomic import atomic_writer
+from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.formulas.opencl import operations_per_application
 from clfractal.renderers.volume import settings_of
 from clfractal.scene.load import load_scene
@@ -127,6 +127,8 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
     for name in wanted:
         if name not in row_names():
             raise ClfractalError(f"unknown row {name!r}; known: {', '.join(row_names())}", Where("--row"))
+    if json_file is not None:
+        check_output(json_file, (json_file.suffix.lower(),))
     names = [name for name in row_names() if name in wanted or not wanted]
     chosen = choose(device)
     shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")

@@ -25,6 +25,7 @@ from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
 from clfractal.files.document import write_document
+from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.files.mesh import EXTENSIONS, SINGLE_PRECISION, TOO_FINE, Mesh, is_too_fine, write_mesh
 from clfractal.files.nrrd import MAGIC
 from clfractal.files.regular import read_bytes
@@ -110,6 +111,7 @@ def _check_library() -> None:
 def _of_scene(order: GridOrder, level: float | None, shell: Shell) -> _Found:
     """The scene's grid, filled; a level is in the unit of the scene's values, by default the scene's level."""
     scene, coloring = load_order(order)
+    refuse_overwriting([order.output], scene.files)
     volume = given_volume(order, scene)
     if volume is not None:
         return _of_given(order, scene, volume, level, shell)
@@ -151,7 +153,9 @@ def _of_file(order: GridOrder, level: float | None, shell: Shell) -> _Found:
             raise SceneError("applies to scenes only; the source is a volume", Where(option))
     from clfractal.voxels.mesh import value_range
 
-    volume = read_volume(order.source)
+    with noting() as files:
+        volume = read_volume(order.source)
+    refuse_overwriting([order.output], files)
     made = _made(order, volume, shell)
     if level is None and made is not None and _has_level(made.job.scene):
         level = _stored(None, volume, made.job.scene)

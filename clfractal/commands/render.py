@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -12,8 +11,9 @@ from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
 from clfractal.commands.progress import Reporter
 from clfractal.commands.shell import Shell
-from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
+from clfractal.errors import ClfractalError, SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 
@@ -119,18 +119,16 @@ def numbers_of(option: str, text: str, separator: str, count: int, form: str) ->
 
 def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
     """The files to write, all of them checked before anything is rendered."""
-    source = Path(order.scene)
-    outputs = order.outputs or (Path(source.with_suffix(".png").name),)
-    if not order.outputs and os.path.realpath(outputs[0]) == os.path.realpath(source):
-        raise FileError(
-            "would be overwritten by its own picture; name another output with -o", Where(order.scene)
-        )
+    outputs = order.outputs or (Path(Path(order.scene).with_suffix(".png").name),)
+    from clfractal.commands.unfinished import possible_paths
     from clfractal.pictures.outputs import check_output as check_picture
     from clfractal.pictures.outputs import output_files
 
-    for path in outputs:
-        for file in output_files(scene.stereo, path):
-            check_picture(file, scene.output.channels)
+    files = [file for path in outputs for file in output_files(scene.stereo, path)]
+    for file in files:
+        check_picture(file, scene.output.channels)
     if order.stats is not None:
         check_output(order.stats, (order.stats.suffix.lower(),))
+        files.append(order.stats)
+    refuse_overwriting([*files, *possible_paths(scene, outputs[0])], scene.files)
     return outputs

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,11 @@ from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
+from clfractal.commands.order import PARTIAL
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
-from clfractal.errors import FileError, SceneError, Where
+from clfractal.errors import SceneError, Where
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.plane import moved
@@ -59,7 +60,7 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
         raise SceneError(f"must be cut_plane for slices, got {scene.renderer.type}", where)
     numbers = range(stack.start, stack.count + 1)
     files = [_numbered(order.outputs, number, stack.count) for number in numbers]
-    _check_files(order, scene, files)
+    _check_files(scene, files)
     scenes = [slice_scene(scene, stack, number) for number in numbers]
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.work.engine import Engine
@@ -118,21 +119,19 @@ def _numbered(outputs: tuple[Path, ...], number: int, count: int) -> tuple[Path,
     return tuple(path.with_name(f"{path.stem}_{number:0{digits}d}{path.suffix}") for path in paths)
 
 
-def _check_files(order: Order, scene: Scene, files: list[tuple[Path, ...]]) -> None:
+def _check_files(scene: Scene, files: list[tuple[Path, ...]]) -> None:
     """Checks all files before anything is rendered."""
-    from clfractal.pictures.outputs import check_output
+    from clfractal.pictures.outputs import check_output, output_files
 
-    source = os.path.realpath(order.scene)
-    for path in files[0]:
-        check_output(path, scene.output.channels)
+    written = []
     for paths in files:
         for path in paths:
-            if os.path.realpath(path) == source:
-                raise FileError(
-                    "would be overwritten by its own slice; name another output with -o", Where(order.scene)
-                )
-            if path.exists():
-                check_output(path)
+            for file in output_files(scene.stereo, path):
+                if paths is files[0] or file.exists() or file.is_symlink():
+                    check_output(file, scene.output.channels)
+                written.append(file)
+        written.append(paths[0].with_name(paths[0].name + PARTIAL))
+    refuse_overwriting(written, scene.files)
 
 
 def _precision(scenes: list[Scene], device: Device) -> str:

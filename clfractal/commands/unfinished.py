@@ -12,6 +12,7 @@ from clfractal.commands.order import PARTIAL
 from clfractal.commands.shell import Shell
 from clfractal.pictures.compose import Side
 from clfractal.pictures.store import JournalFilm
+from clfractal.scene.model import Scene
 from clfractal.work.job import Job
 
 
@@ -83,8 +84,8 @@ class Unfinished:
 
     def _drop_others(self, output: Path, shell: Shell) -> None:
         """Removes the journals of views that an earlier render to the same output had, but this one does not."""
-        for stale in output.parent.glob(f"{glob.escape(output.name)}.*{PARTIAL}"):
-            if stale not in self.paths and _names_a_view(stale.name[len(output.name) : -len(PARTIAL)]):
+        for stale in _of_views(output):
+            if stale not in self.paths:
                 shell.say(f"{stale}: earlier work is discarded")
                 stale.unlink(missing_ok=True)
 
@@ -100,6 +101,26 @@ def partial_paths(job: Job, output: Path) -> list[Path]:
         ]
         found.append(output.with_name("".join([output.name, *(f".{word}" for word in words), PARTIAL])))
     return found
+
+
+def possible_paths(scene: Scene, output: Path) -> list[Path]:
+    """All files that a render of the scene to `output` may use for unfinished work, or remove as an earlier one's."""
+    views = [
+        "",
+        *(f".view{number + 1}" for number in range(1, len(scene.layout.views) if scene.layout else 1)),
+    ]
+    eyes = [""] if scene.stereo is None else ["", ".right"]
+    names = [f"{output.name}{eye}{view}{PARTIAL}" for eye in eyes for view in views]
+    return list(dict.fromkeys([*map(output.with_name, names), *_of_views(output)]))
+
+
+def _of_views(output: Path) -> list[Path]:
+    """The journals of views that are there, beside the first one."""
+    return [
+        path
+        for path in output.parent.glob(f"{glob.escape(output.name)}.*{PARTIAL}")
+        if _names_a_view(path.name[len(output.name) : -len(PARTIAL)])
+    ]
 
 
 def _names_a_view(words: str) -> bool:

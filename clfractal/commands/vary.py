@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import os
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from clfractal.commands.shell import Shell
 from clfractal.errors import FileError, SceneError, Where, speaking_of, unknown_name
 from clfractal.files.atomic import atomic_writer, check_output, file_error
 from clfractal.files.document import write_document
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.work.variations import (
@@ -87,7 +87,7 @@ def vary_scene(order: Order, choice: Choice, shell: Shell) -> None:
         if first is None:
             raise nothing_to_vary(kinds)
     drawn = chain([first], drawn)
-    _check_files(choice, names)
+    _check_files(scene, choice, names)
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.work.engine import Engine
 
@@ -135,7 +135,7 @@ def _small(scene: Scene) -> tuple[int, int]:
     return max(1, round(width * shrink)), max(1, round(height * shrink))
 
 
-def _check_files(choice: Choice, names: Sequence[str]) -> None:
+def _check_files(scene: Scene, choice: Choice, names: Sequence[str]) -> None:
     """Makes the folder if it is missing, and refuses files that exist, before anything is rendered."""
     if choice.sheet is not None:
         check_output(choice.sheet, (".png",))
@@ -145,13 +145,12 @@ def _check_files(choice: Choice, names: Sequence[str]) -> None:
             raise FileError(
                 "exists already and is not replaced; choose another folder with -o", Where(str(file))
             )
-    if choice.sheet is not None and os.path.realpath(choice.sheet) in map(os.path.realpath, files):
-        raise FileError("is the name of a variation's own picture; choose another", Where(str(choice.sheet)))
     try:
         choice.folder.mkdir(exist_ok=True)
     except OSError as error:
         raise file_error(choice.folder, "cannot be made", error) from error
     check_output(files[0], (".yaml",))
+    refuse_overwriting([*files, *([choice.sheet] if choice.sheet is not None else ())], scene.files)
 
 
 def _worthwhile(scene: Scene, drawn: Iterator[Variation], count: int, engine: Engine) -> Iterator[Variation]:

@@ -17,6 +17,7 @@ from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.volume import BESIDE, EXTENSIONS, SCENE_KEY, Volume, write_volume
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_coloring, load_scene, read_scene
@@ -77,13 +78,16 @@ def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
     start = time.perf_counter()
     shell.mute_drivers()
     check_output(order.output, EXTENSIONS)
+    files: list[str | Path] = [order.output]
     if order.output.suffix.lower() == ".npy":
         if compress:
             raise FileError(
                 "cannot be compressed: NPY has no compression; use .nrrd", Where(str(order.output))
             )
-        check_output(f"{order.output}{BESIDE}", (BESIDE,))
+        files.append(f"{order.output}{BESIDE}")
+        check_output(files[-1], (BESIDE,))
     scene, coloring = load_order(order)
+    refuse_overwriting(files, scene.files)
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
     volume = given_volume(order, scene)
     if volume is None:

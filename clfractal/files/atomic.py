@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from clfractal.errors import FileError, Where
+from clfractal.files.inputs import note
 
 PICTURES = (".exr", ".png")
 """Extensions of the picture formats that can be written, in lower case."""
@@ -56,10 +57,14 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
         )
     try:
         target = _target(path)
+        if target.is_symlink():
+            raise file_error(path, "cannot be written: it is a link that leads to itself", "")
+        # Of a link, the folder of the file that it leads to.
+        folder = str(target.parent if shown.is_symlink() else shown.parent)
         if not target.parent.exists():
-            raise file_error(path, f"cannot be written: there is no folder {str(shown.parent)!r}", "")
+            raise file_error(path, f"cannot be written: there is no folder {folder!r}", "")
         if not target.parent.is_dir():
-            raise file_error(path, f"cannot be written: {str(shown.parent)!r} is not a folder", "")
+            raise file_error(path, f"cannot be written: {folder!r} is not a folder", "")
         if target.is_dir():
             raise file_error(path, "cannot be written: it is a folder", "")
         if target.exists():
@@ -120,6 +125,7 @@ def open_regular(path: str | Path) -> BinaryIO:
     Raises:
         FileError: there is none, or it cannot be read.
     """
+    note(path)
     try:
         # Without O_NONBLOCK, opening a pipe would wait for somebody to write into it.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))

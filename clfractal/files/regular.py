@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 
 from clfractal.errors import FileError, Where
+from clfractal.files.inputs import note
 
 MAX_BYTES = 1_000_000
 
@@ -31,6 +32,7 @@ def read_bytes(
         FileError: it cannot be read, is no regular file, or is too large.
     """
     shown = name or str(path)
+    note(path)
     try:
         # Without O_NONBLOCK opening a FIFO would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))

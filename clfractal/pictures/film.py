@@ -72,6 +72,8 @@ class Film:
         self.grid = TileGrid(self.region)
         self._header = _Known(header or {})
         self._stats = _Known({})
+        self.inputs: tuple[Path, ...] = ()
+        """Files that were read for the picture; `save` replaces none of them."""
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
         # Not `zeros`: NumPy asks for large pages only for memory that it does not want cleared, and small ones take the
@@ -203,10 +205,12 @@ class Film:
         """Writes an `.exr` or `.png` file; settings as in `outputs.save_outputs`.
 
         Raises:
-            FileError: it cannot be written.
+            FileError: it cannot be written, or is one of the files that were read for the picture.
         """
+        from clfractal.files.inputs import refuse_overwriting
         from clfractal.pictures.outputs import save_outputs
 
+        refuse_overwriting([path], self.inputs)
         save_outputs(self, [path], **settings)
 
     def to_rgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
+from clfractal.files.inputs import noting
 from clfractal.files.marks import Document, Node, node_from_plain, option
 from clfractal.files.regular import read_bytes, read_text_file
 from clfractal.scene.checks import check_parts
@@ -29,10 +30,14 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 @dataclass(frozen=True, slots=True)
 class SceneText:
-    """A scene as it was read, before it is checked: its values with their places, and the folder it stands in."""
+    """A scene as it was read, before it is checked: its values with their places, and the folder it stands in.
+
+    `files` are those that were read for it, absolute.
+    """
 
     document: Document
     folder: Path
+    files: tuple[Path, ...] = ()
 
     def value(self, *path: str) -> Any:
         """The plain value at a path; None if there is none."""
@@ -62,9 +67,12 @@ def load_scene(
         FileError: a file cannot be read, is no regular file, too large, or out of the scene's folder.
     """
     text = source if isinstance(source, SceneText) else read_scene(source)
-    document, scene = _validated(text, overrides, folder or text.folder)
-    with _located(document):
-        check_scene(scene)
+    with noting() as files:
+        document, scene = _validated(text, overrides, folder or text.folder)
+        scene.note_files((*text.files, *files))
+        with _located(document):
+            check_scene(scene)
+    scene.note_files(files)
     return scene
 
 
@@ -101,7 +109,9 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
     path = Path(source)
     if str(source) == "":
         raise FileError("a scene needs a file name")
-    return SceneText(read_document(read_text(path), str(source)), path.parent)
+    with noting() as files:
+        text = read_text(path)
+    return SceneText(read_document(text, str(source)), path.parent, tuple(files))
 
 
 def read_text(path: Path) -> str:

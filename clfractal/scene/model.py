@@ -4,12 +4,13 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 `formula` and `camera` has a default.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 from pydantic import Field, PrivateAttr
 
+from clfractal.files.inputs import noting
 from clfractal.scene.base import Section
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
@@ -64,6 +65,7 @@ class Scene(Section):
     # Not fields: they are not part of the scene's values, and not compared.
     _folder: Path = PrivateAttr(default_factory=Path)
     _read: dict[str, Any] = PrivateAttr(default_factory=dict)
+    _files: tuple[Path, ...] = PrivateAttr(default=())
 
     def __eq__(self, other: object) -> bool:
         """Whether both have equal values, wherever they were loaded from."""
@@ -74,6 +76,15 @@ class Scene(Section):
     def folder(self) -> Path:
         """Where the environment's file is looked for: the folder that the scene was loaded from, or the current one."""
         return self._folder
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that have been read for the scene: its own, and those that it names. No output replaces them."""
+        return self._files
+
+    def note_files(self, files: Iterable[Path]) -> None:
+        """Adds to `files`."""
+        self._files = tuple(dict.fromkeys((*self._files, *files)))
 
     def placed(self, folder: Path) -> Self:
         """The same scene, as loaded from another folder."""
@@ -88,7 +99,7 @@ class Scene(Section):
         Files of sections that are not replaced are not read again: the copy keeps the checked data.
         """
         copied = super().model_copy(update=update, deep=deep)
-        copied._folder = self._folder
+        copied._folder, copied._files = self._folder, self._files
         copied._read = {
             name: found
             for name, found in self._read.items()
@@ -99,7 +110,9 @@ class Scene(Section):
     def _once(self, name: str, read: Callable[[], T]) -> T:
         """The data kept under a name; they are read first if there are none."""
         if name not in self._read:
-            self._read[name] = read()
+            with noting() as files:
+                self._read[name] = read()
+            self.note_files(files)
         found: T = self._read[name]
         return found
 

@@ -6,16 +6,20 @@ PyOpenGL decides where to look for functions when it is imported. So this module
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from clfractal.device.select import Device, choose
 from clfractal.files.atomic import check_output
+from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.scene.model import Scene
 from clfractal.viewer import window
 from clfractal.viewer.files import Files
 from clfractal.viewer.memory import give_memory_back
 from clfractal.viewer.options import Options
 from clfractal.viewer.recording import Recording, read_recording
+from clfractal.viewer.sources import same_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +54,26 @@ def begin(options: Options) -> Begun:
     """
     give_memory_back()
     files = Files(options)
-    recording = read_recording(options.play) if options.play is not None else None
+    with noting() as played:
+        recording = read_recording(options.play) if options.play is not None else None
     if options.record is not None:
         check_output(options.record, (options.record.suffix.lower(),))
     scene = files.first_scene()
+    _check_files(options, [*played, *scene.files])
     device = choose(options.device)
     window.start()
     return Begun(options, files, scene, device, recording)
+
+
+def _check_files(options: Options, read: Sequence[Path]) -> None:
+    """Raises FileError if a file that is written is one that is read, or another one that is written."""
+    written = [path for path in (options.shot, options.record, options.save) if path is not None]
+    own = (
+        options.save is not None
+        and options.scene is not None
+        and same_file(options.save, Path(options.scene))
+    )
+    # A scene may be saved over itself, as Ctrl+S does without the option.
+    others = [path for path in written if path is not options.save] if own else written
+    refuse_overwriting(others, read)
+    refuse_overwriting(written)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from clfractal import resources
 from clfractal.errors import ClfractalError, FileError, SceneError
 from clfractal.files.document import read_document
+from clfractal.files.inputs import noting
 from clfractal.files.regular import read_bytes
 from clfractal.scene.load import SceneText, load_scene, read_text
 from clfractal.scene.model import Scene
@@ -79,8 +80,9 @@ def open_source(path: str | Path) -> SceneSource:
         FileError: a file cannot be read.
     """
     found = Path(path)
-    text = read_text(found)
-    loaded = load_scene(SceneText(read_document(text, str(path)), found.parent))
+    with noting() as files:
+        text = read_text(found)
+    loaded = load_scene(SceneText(read_document(text, str(path)), found.parent, tuple(files)))
     kind: Kind = "picture" if is_picture(found) else "shipped" if is_own(found) else "scene"
     return SceneSource(kind, found, text, loaded)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from clfractal.pictures.compose import Side
 from clfractal.pictures.film import Film, in_memory
+from clfractal.pictures.tiled import Picture
 from clfractal.work.comfort import comfort_of_films
 from clfractal.work.job import Job
 from clfractal.work.run import Progress
@@ -44,18 +45,18 @@ class JobFilms:
             took: what it took so far, for `Film.stats`.
         """
         composed = len(self.films) != 1
-        film = in_memory(self.job.picture(self.films, self.header if composed else None))
-        if took is not None:
-            film.tell_stats(partial(self._statistics, took))
-        return film
+        return self._whole(self.job.picture(self.films, self.header if composed else None), took)
 
     def eyes(self, took: Took | None = None) -> dict[Side, Film]:
         """Each eye's picture; `took` as for `picture`: both films have the statistics of the pair."""
-        films = {side: in_memory(picture) for side, picture in self.job.eyes(self.films).items()}
+        return {side: self._whole(picture, took) for side, picture in self.job.eyes(self.films).items()}
+
+    def _whole(self, picture: Picture, took: Took | None) -> Film:
+        film = in_memory(picture)
+        film.inputs = self.job.scene.files
         if took is not None:
-            for film in films.values():
-                film.tell_stats(partial(self._statistics, took))
-        return films
+            film.tell_stats(partial(self._statistics, took))
+        return film
 
     def _statistics(self, took: Took) -> dict[str, Any]:
         return statistics(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,26 @@ def test_check_tells_what_is_wrong(tmp_path: Path) -> None:
         assert caught.value.message.startswith(message.strip()), name
         assert caught.value.where.file == f"{tmp_path}/{name}"
         assert caught.value.status == 2
+
+
+def test_check_follows_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A link that leads to itself, one into a folder that is not there, and one to a file that is still to come."""
+    monkeypatch.chdir(tmp_path)
+    Path("loop.png").symlink_to("back.png")
+    Path("back.png").symlink_to("loop.png")
+    Path("dangling.png").symlink_to("missing/picture.png")
+    Path("into.png").symlink_to("loop.png/picture.png")
+    messages = {
+        "loop.png": "loop.png: cannot be written: it is a link that leads to itself",
+        "dangling.png": f"dangling.png: cannot be written: there is no folder '{tmp_path}/missing'",
+        "into.png": "into.png: cannot be written",
+    }
+    for name, message in messages.items():
+        with pytest.raises(FileError, match=f"^{re.escape(message)}"):
+            check_output(name)
+    Path("new.png").symlink_to("picture.png")
+    check_output("new.png")
+    assert not Path("picture.png").exists()
 
 
 def test_check_refuses_what_the_system_does_not_let_write(
