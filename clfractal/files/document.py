@@ -52,9 +52,13 @@ def read_document(
 def read_value(text: str, file: str) -> Node:
     """A value written in an option: every place in it is `file` alone, without line and column.
 
+    A text that begins with `#` is a word here, such as a colour, although it would be a comment in a file.
+
     Raises:
         SceneError: as for read_document.
     """
+    if text.lstrip().startswith("#"):
+        return node_from_plain(text.strip(), file)
     try:
         root = read_document(text, file).root
     except SceneError as error:

@@ -47,7 +47,7 @@ def updated(
         return text
     try:
         found = _Editor(text, root, sparse is not None).edited(before, after, shorter)
-        if _stands_for(read_document(found).plain(), before, after, shorter):
+        if _stands_for(read_document(found).plain(), root.plain(), before, after, shorter):
             return found
     except (UnusualError, SceneError):
         pass
@@ -64,13 +64,21 @@ def written(data: Mapping[str, Any], head: str = "") -> str:
     return "\n".join([*lines, *block_lines(data, 0)]) + "\n"
 
 
-def _stands_for(found: Any, before: Any, after: Any, sparse: Any) -> bool:
-    """Whether data that were read stand for `after`: what they lack must be a default, or as it was."""
+def _stands_for(found: Any, original: Any, before: Any, after: Any, sparse: Any) -> bool:
+    """Whether data that were read stand for `after`: what they lack must be a default, or as it was.
+
+    A value may be written in a short way that reads as other data, such as a colour in hexadecimal. Where it has not
+    changed, it has to be written as in the original text.
+    """
+    if same(before, after) and original is not _NONE and same(found, original):
+        return True
     if isinstance(after, Mapping):
         if not isinstance(found, Mapping) or any(found[key] for key in found.keys() - after.keys()):
             return False
         return all(
-            _stands_for(found[key], _child(before, key), after[key], _child(sparse, key))
+            _stands_for(
+                found[key], _child(original, key), _child(before, key), after[key], _child(sparse, key)
+            )
             if key in found
             else _child(sparse, key) is _NONE or same(_child(before, key), after[key])
             for key in after
@@ -78,8 +86,17 @@ def _stands_for(found: Any, before: Any, after: Any, sparse: Any) -> bool:
     if isinstance(after, list):
         if not isinstance(found, list) or len(found) != len(after):
             return False
+        # An entry that was matched with one at another place is written as that one was.
+        old = {j: i for i, j in _matched(before, after)[0]} if isinstance(before, list) else {}
         return all(
-            _stands_for(found[i], _child(before, i), after[i], _child(sparse, i)) for i in range(len(after))
+            _stands_for(
+                found[j],
+                _child(original, old.get(j, j)),
+                _child(before, old.get(j, j)),
+                after[j],
+                _child(sparse, j),
+            )
+            for j in range(len(after))
         )
     return same(found, after)
 

@@ -10,6 +10,8 @@ from typing import Annotated, Any, ClassVar, Self, TypeAlias
 from pydantic import BaseModel, ConfigDict, Discriminator, Field
 from pydantic_core import PydanticCustomError
 
+from clfractal.scene.hex_color import AS_TEXT
+
 Vector: TypeAlias = tuple[float, float, float]
 
 Coordinate = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
@@ -19,8 +21,8 @@ Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12, allow_inf_nan=Fa
 
 # Strict tuples would refuse the lists of YAML and JSON; their entries stay strict.
 Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
-Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False)]
-Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False)]
+Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False), AS_TEXT]
+Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False), AS_TEXT]
 
 
 class Section(BaseModel):

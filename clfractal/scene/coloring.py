@@ -1,7 +1,7 @@
 """Where the surface's colour comes from."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
@@ -15,6 +15,7 @@ from clfractal.scene.base import (
     length,
     problem,
 )
+from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, linear_color
 from clfractal.scene.surface import Length
 
 
@@ -23,6 +24,39 @@ class Stop(Section):
 
     at: Fraction = Field(description="place in the palette, 0 to 1")
     color: Color = Field(description="linear Rec. 709")
+
+
+def _placed_stops(value: Any) -> Any:
+    """Colours alone become stops at equal distances from 0 to 1: entry i of n lies at i / (n - 1)."""
+    if not isinstance(value, (list, tuple)):
+        return value
+    last = max(len(value) - 1, 1)
+    found = []
+    for index, entry in enumerate(value):
+        if isinstance(entry, (str, list, tuple)):
+            color = linear_color(entry) if isinstance(entry, str) else entry
+            if color is None:
+                raise problem(
+                    f"must be a stop, or a colour as '#ff8800' or '#f80', got {entry[:40]!r}", str(index)
+                )
+            entry = {"at": index / last, "color": color}
+        found.append(entry)
+    return found
+
+
+Palette = Annotated[
+    Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
+    | Annotated[
+        tuple[Annotated[Stop, AlsoAs(lambda entry: entry, COLOR_SCHEMA)], ...],
+        Field(strict=False, min_length=2, max_length=256),
+        AlsoAs(_placed_stops, None),
+        Tag("stops"),
+    ],
+    Field(
+        discriminator=chosen_by_word("name", "stops"),
+        description="a palette's name; or stops in order of `at`; or colours alone, at equal distances",
+    ),
+]
 
 
 def check_order(palette: str | Sequence[Stop]) -> None:
@@ -70,14 +104,7 @@ class Coloring(Section):
     by: Literal["solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap"] = Field(
         "solid", description="the quantity that chooses the colour"
     )
-    palette: (
-        Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
-        | Annotated[tuple[Stop, ...], Field(strict=False, min_length=2, max_length=256), Tag("stops")]
-    ) = Field(
-        "viridis",
-        discriminator=chosen_by_word("name", "stops"),
-        description="a palette's name, or stops in order of `at`",
-    )
+    palette: Palette = "viridis"
     scale: Coordinate = Field(0.1, description="palette lengths per unit of the quantity")
     offset: Coordinate = Field(0.0, description="position in the palette where the quantity is 0")
     repeat: bool = Field(

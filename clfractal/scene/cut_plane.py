@@ -2,21 +2,12 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from clfractal.scene.base import Color, Coordinate, Fraction, Section, chosen_by_word
-from clfractal.scene.coloring import Stop, check_order
+from clfractal.scene.base import Color, Coordinate, Fraction, Section
+from clfractal.scene.coloring import Palette, check_order
 from clfractal.scene.plane import Plane
 from clfractal.scene.sampled import Sampled
-
-Palette = Annotated[
-    Annotated[str, Field(min_length=1, max_length=200), Tag("name")]
-    | Annotated[tuple[Stop, ...], Field(strict=False, min_length=2, max_length=256), Tag("stops")],
-    Field(
-        discriminator=chosen_by_word("name", "stops"),
-        description="a palette's name, or stops in order of `at`",
-    ),
-]
 
 Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 

@@ -204,7 +204,7 @@ def _word(details: ErrorDetails) -> Problem:
     place = _place(details["loc"])
     allowed = details["ctx"]["expected"].replace("'", "")
     if place.models:
-        allowed += f" or a mapping with {' and '.join(place.keys())}"
+        allowed += f", a colour, or a mapping with {' and '.join(place.keys())}"
     guess = _nearest_word(details["input"], allowed)
     return Problem(tuple(place.path), f"must be {allowed}, got {shown_value(details['input'])}{guess}")
 
@@ -216,8 +216,19 @@ def _nearest_word(given: Any, allowed: str) -> str:
     return f"; did you mean {guess!r}?" if guess else ""
 
 
+def _color(details: ErrorDetails) -> Problem:
+    """The message for what is no colour. Without quotes a `#` begins a comment, and the value is nothing."""
+    given = details["input"]
+    quoted = "; a # needs quotes" if given is None else ""
+    return Problem(
+        tuple(_place(details["loc"]).path),
+        f"must be a list of 3 numbers, or a colour as '#ff8800' or '#f80', got {shown_value(given)}{quoted}",
+    )
+
+
 _SPECIAL: Mapping[str, Callable[[ErrorDetails], Problem | None]] = {
     "clfractal": _own,
+    "color": _color,
     "extra_forbidden": _unknown_key,
     "missing": _missing,
     "tuple_type": _tuple,

@@ -5,7 +5,7 @@ kind, write its class and add it to the union.
 """
 
 from math import radians, tan
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, Tag, model_validator
 
@@ -25,6 +25,7 @@ from clfractal.scene.base import (
     minus,
     problem,
 )
+from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
 
 MAX_SIDE = 65_536
 MAX_PIXELS = 2**30
@@ -189,7 +190,17 @@ class Output(Section):
         )
 
 
+def _one_color(value: Any) -> Any:
+    """A colour alone stands for a gradient that is the same everywhere."""
+    if is_hex(value) or value is None:
+        value = listed(value)
+    return {"top": value, "bottom": value} if isinstance(value, (list, tuple)) else value
+
+
 Background = Annotated[
-    Annotated[Gradient, Tag("gradient")] | Annotated[Literal["transparent"], Tag("transparent")],
-    chosen_by_word("transparent", "gradient"),
+    Annotated[
+        Annotated[Gradient, Tag("gradient")] | Annotated[Literal["transparent"], Tag("transparent")],
+        chosen_by_word("transparent", "gradient"),
+    ],
+    AlsoAs(_one_color, COLOR_SCHEMA),
 ]

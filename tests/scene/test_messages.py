@@ -20,6 +20,8 @@ def error_of(text: str, *overrides: str, folder: Path | None = None) -> str:
     return str(caught.value)
 
 
+COLOR = "must be a list of 3 numbers, or a colour as '#ff8800' or '#f80'"
+
 # In the texts below the sign § stands where the message must point to.
 CASES = [
     # The camera.
@@ -72,7 +74,21 @@ CASES = [
     ("lights: §[" + "{}, " * 65 + "]", "lights: must have at most 64 entries, got 65"),
     ("material: {color: [1, §2, 3]}", "material.color.1: must be at most 1, got 2"),
     ("material: {color: [1, §.inf, 3]}", "material.color.1: must be a finite number, got .inf"),
-    ("background: §black", "background: must be transparent or a mapping with top and bottom, got 'black'"),
+    (
+        "background: §black",
+        "background: must be transparent, a colour, or a mapping with top and bottom, got 'black'",
+    ),
+    ("background: §'#33669'", f"background: {COLOR}, got '#33669'"),
+    ("background: §[1, 2, x]", "background.top.2: must be a number, got 'x'"),
+    ("background:§  #336699", f"background: {COLOR}, got nothing; a # needs quotes"),
+    ("material: {color: §'#12345g'}", f"material.color: {COLOR}, got '#12345g'"),
+    ("material: {color: §3}", f"material.color: {COLOR}, got 3"),
+    ("material: {color: §[1, 2]}", "material.color: must be a list of 3 numbers, got a list of 2"),
+    ("stereo: {colors: ['#f00', §'#0fff']}", f"stereo.colors.1: {COLOR}, got '#0fff'"),
+    (
+        "coloring: {palette: ['#000', §'#f8', '#fff']}",
+        "coloring.palette.1: must be a stop, or a colour as '#ff8800' or '#f80', got '#f8'",
+    ),
     ("background: {§tpo: 1}", "background: unknown key 'tpo'; did you mean 'top'?"),
     (
         "coloring: {by: §depth}",
