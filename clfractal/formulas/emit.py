@@ -138,6 +138,19 @@ class Emitter:
         function, operands = self.origins.get(value.text, ("", ()))
         return operands[0] if function == "sqrt" else None
 
+    def _never_negative(self, value: Value) -> bool:
+        """Whether its operations alone show that a value is not below 0: a sum of squares, say."""
+        if value.number is not None:
+            return value.number >= 0
+        function, operands = self.origins.get(value.text, ("", ()))
+        if function in ("abs", "sqrt", "rsqrt", "exp"):
+            return True
+        if function == "mul" and operands[0].text == operands[1].text:
+            return True
+        if function == "max":
+            return any(map(self._never_negative, operands))
+        return function in ("add", "mul", "div", "min") and all(map(self._never_negative, operands))
+
     # --- operations ---
 
     def _constant(self, node: Node, operands: Iterable[Value]) -> Value:
@@ -190,18 +203,22 @@ class Emitter:
             # The host divides once; the kernel multiplies.
             inverse = self._constant(Call("div", (Number(1.0), b.node or Number(1.0))), [literal(1.0), b])
             return self._operation("mul", a, inverse)
+        result = self._call(function, operands)
+        self.origins.setdefault(result.text, (function, operands))
+        return result
+
+    def _call(self, function: str, operands: tuple[Value, ...]) -> Value:
+        """The statement of one operation over the number type."""
+        a = operands[0]
+        b = operands[1] if len(operands) > 1 else None
         varying = any(operand.kind == "varying" for operand in operands)
         if self.number_type == "real" or not varying:
             kind: Literal["flat", "varying"] = "varying" if self.number_type == "real" and varying else "flat"
-            result = self._statement("real", kind, f"real_{function}", *(o.text for o in operands))
-            self.origins.setdefault(result.text, (function, operands))
-            return result
+            return self._statement("real", kind, f"real_{function}", *(o.text for o in operands))
         if function in ("sign", "floor"):
             return self._statement("real", "flat", f"real_{function}", self._plain(a))
         if b is None:
-            result = self._statement("dual", "varying", f"dual_{function}", a.text)
-            self.origins.setdefault(result.text, (function, operands))
-            return result
+            return self._statement("dual", "varying", f"dual_{function}", a.text)
         if function == "mul" and a.text == b.text:
             return self._statement("dual", "varying", "dual_square", a.text)
         if function in _LIFTED or len(operands) > 2:
@@ -261,6 +278,9 @@ class Emitter:
             if square is None:
                 re, im = self._whole_complex_power(x, y, int(abs(n)))
             else:
+                if not self._never_negative(square):
+                    # The root of a negative number is 0, and so is its square.
+                    square = self._operation("max", square, literal(0.0))
                 re, share = self._power_over_root(x, square, int(abs(n)))
                 im = self._operation("mul", share, y)
             if n > 0:
@@ -421,9 +441,11 @@ class Emitter:
             p, q = a.number, b.number
             truths = {"lt": p < q, "le": p <= q, "gt": p > q, "ge": p >= q, "eq": p == q, "ne": p != q}
             return truths[node.function]
-        if b.number == 0 and node.function in ("gt", "eq", "ne"):
-            # sqrt(x) > 0 where x > 0: the root need not be waited for.
-            a = self.radicand(a) or a
+        radicand = self.radicand(a)
+        if radicand is not None and b.number == 0 and node.function in ("gt", "eq", "ne"):
+            # The root need not be waited for. It is 0 for x < 0 too: sqrt(x) > 0 and sqrt(x) != 0 where x > 0.
+            text = f"less({self._plain(b)}, {self._plain(radicand)})"
+            return f"(~{text})" if node.function == "eq" else text
         left, right = self._plain(a), self._plain(b)
         if node.function in ("gt", "ge"):
             left, right = right, left

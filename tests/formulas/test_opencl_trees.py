@@ -27,7 +27,8 @@ from tests.formulas.trees import VARIABLES, tame_tree
 # Three trees make a formula; a formula is applied once to points of space.
 FORMULAS = 16
 POINTS = 64
-# Faults of the past, and what random trees seldom have: bounds of a clamp that cross, nested powers, unlike branches.
+# Faults of the past, and what random trees seldom have: bounds of a clamp that cross, nested powers, unlike branches,
+# roots of negative numbers (which are 0) in conditions and in complex powers.
 CHOSEN = (
     *("clamp(x, 1, y)", "clamp(y, x, -1)", "clamp(z, x, y)*clamp(x, -1, 0.5)"),
     *("log(x) + log(y*y)", "min(max(x, y, z), x*y, 0.3)**2", "cpow_re(x, y, -3) - cpow_im(x*y, z, 2.5)"),
@@ -37,6 +38,12 @@ CHOSEN = (
         "(x*x + 0.1)**(y*z)",
     ),
     *("x**3.5 - abs(y)**-0.5", "atan2(y, x)*atan2(x*x, -z)", "asin(x)*acos(y)/(1 + exp(-z))"),
+    *("where(sqrt(x) == 0, y*z, z)", "where(sqrt(x) != 0, y*z, z)", "where(sqrt(x - y) > 0, z, x*z)"),
+    *(
+        "where(not (sqrt(y) == 0 or sqrt(z) <= 0), x*x, z)",
+        "cpow_re(x, sqrt(y), 2)",
+        "cpow_im(y, sqrt(z), 3)",
+    ),
 )
 PLANES = ("real", "dual", "d/dx", "d/dy", "d/dz")
 PRECISION: Precision = "float64"
