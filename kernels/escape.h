@@ -1,6 +1,7 @@
 // Escape of points of a plane: exact counts without distances, and early detection of periodic orbits.
 //
-// From the build: PERIOD_CHECK, applications between two tests for a periodic orbit, a multiple of the chain's cycle.
+// From the build: PERIOD_CHECK, applications between two tests for a periodic orbit, a multiple of the chain's cycle;
+// REPEATS_FROM, the application from which on a chain's turns repeat themselves.
 
 // Whether two numbers have the same bits: unlike `equal`, this distinguishes +0 and -0.
 #if REAL_IS_DOUBLE
@@ -42,6 +43,8 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
     state kept = z;
     real highest = square;  // |z|^2 since then
     int next_keep = FIRST_COUNT + PERIOD_CHECK;
+    // Equal states have equal futures only where the turns repeat.
+    int comparable = FIRST_COUNT >= REPEATS_FROM;
 #endif
     int n = FIRST_COUNT, limit = orbit->iterations;
     for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
@@ -69,9 +72,12 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
 #endif
                 // An orbit that comes and goes between the two radii is inside or not by the last application.
                 if (smooth) back &= less_equal(highest, (real)(orbit->bailout_square));
-                inside |= back;
-                alive &= ~back;
+                if (comparable) {
+                    inside |= back;
+                    alive &= ~back;
+                }
                 if (n >= next_keep) {
+                    comparable = n >= REPEATS_FROM;
                     kept = z;
                     highest = square;
                     next_keep = 2 * n;

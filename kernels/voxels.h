@@ -1,7 +1,8 @@
 // Voxels as the fill evaluates them: bricks of 8 x 8 x 8, each voxel in one brick only (stored bricks have a ninth layer).
 //
 // From the build: FILL_INSIDE, FILL_COVERAGE, FILL_ITERATIONS and which of them FILL_KIND is; SAMPLE, the type of a value;
-// CHUNK, applications between two looks at a packet, a multiple of the chain's cycle.
+// CHUNK, applications between two looks at a packet, a multiple of the chain's cycle; REPEATS_FROM, the application from which
+// on a chain's turns repeat themselves.
 // A brick's or node's place is packed into 64 bits: x, y and z in 21 bits each, x lowest.
 
 #define BRICK 8
@@ -77,6 +78,7 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
         open |= alive[p];
     }
     int n = FIRST_COUNT, renewed = 1, chunks = 0;
+    int comparable = FIRST_COUNT >= REPEATS_FROM;  // equal states have equal futures only where the turns repeat
     while (n + CHUNK <= limit && any_lane(open)) {
         if ((chunks & 1023) == 1023 && orbit_cancelled(orbit)) return;
         #pragma unroll
@@ -101,12 +103,15 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
 #if STATE_SIZE == 4
             apart.s3 -= past[p].s3;
 #endif
-            periodic[p] |= alive[p] & equal(state_square(apart), R(0.0)) & settled(square[p], orbit);
+            if (comparable) periodic[p] |= alive[p] & equal(state_square(apart), R(0.0)) & settled(square[p], orbit);
             if (chunks == renewed) past[p] = z[p];
 #endif
             open |= alive[p] & ~periodic[p];
         }
-        if (chunks == renewed) renewed *= 2;
+        if (chunks == renewed) {
+            comparable = n >= REPEATS_FROM;
+            renewed *= 2;
+        }
     }
     if (any_lane(open)) {
         for (; n < limit; ++n) {

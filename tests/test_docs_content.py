@@ -25,7 +25,7 @@ from clfractal.files import document, regular
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser
+from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser, turns
 from clfractal.renderers import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.scene.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
@@ -280,6 +280,7 @@ def test_limits_of_formulas() -> None:
         "`repeat`": model.MAX_REPEAT,
         "formulas in a chain": chain.MAX_LINKS,
         "`count` of a formula in a chain": chain.MAX_COUNT,
+        "`start`, `stop` of a formula in a chain": turns.MAX_START,
         "`bounds.radius`": binding.MAX_RADIUS,
         "`bailout`, `distance_bailout`": binding.MAX_BAILOUT,
     }

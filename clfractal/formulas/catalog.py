@@ -14,11 +14,13 @@ from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_fr
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
 from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.model import Formula, inside
+from clfractal.formulas.turns import MAX_START
 from clfractal.resources import folder
 
 _SOURCES = ("name", "file", "inline", "chain")
 _OPTIONS = ("parameters", "live", "julia", "bailout", "distance_bailout")
 _IGNORED = ("iterations",)
+_TURNS = ("count", "start", "stop")
 _CHAIN_KEYS = (
     *("title", "reference", "description", "chain", "bounds", "bailout", "distance_bailout"),
     "step_scale",
@@ -175,11 +177,14 @@ class _Resolver:
             distance_bailout=spec.get("distance_bailout"),
             live=spec.get("live") or (),
         )
-        count = spec.get("count", 1)
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_COUNT:
-            message = f"must be a whole number, 1 to {MAX_COUNT}, got {str(count)[:60]}"
-            raise FormulaError(message, inside(where, "count"))
-        return Link(bound, count)
+        count = _whole(spec.get("count", 1), 1, MAX_COUNT, inside(where, "count"))
+        start = _whole(spec.get("start", 0), 0, MAX_START, inside(where, "start"))
+        stop = spec.get("stop")
+        if stop is not None:
+            stop = _whole(stop, 1, MAX_START, inside(where, "stop"))
+            if stop <= start:
+                raise FormulaError(f"must be above start, {start}, got {stop}", inside(where, "stop"))
+        return Link(bound, count, start, stop)
 
     def _formula(self, data: Mapping[str, Any], place: Where, name: str) -> Formula:
         if place.file is None or self.base_folder is None:
@@ -207,13 +212,14 @@ class _Resolver:
             at = inside(here, str(index))
             if not isinstance(entry, Mapping):
                 raise FormulaError("must be a mapping with name, file or inline", at)
-            entry_key = _source_key(entry, at, (*_OPTIONS, "count"))
+            entry_key = _source_key(entry, at, (*_OPTIONS, *_TURNS))
             entry_data, entry_place, entry_source = self._data(entry_key, entry, at)
             if "chain" in entry_data:
                 raise FormulaError("a chain cannot hold another chain", inside(at, entry_key))
             merged = self._with_julia(entry, spec, entry_data)
             links.append(self._link(merged, at, entry_data, entry_place, entry_source))
-            sources.append({**entry_source, **_options(merged), "count": links[-1].count})
+            turns = {option: merged[option] for option in _TURNS if merged.get(option) is not None}
+            sources.append({**entry_source, **_options(merged), **turns})
         radii = {
             option: check_radius(
                 spec.get(option, data.get(option)), inside(where if option in spec else place, option)
@@ -290,6 +296,12 @@ def _source_key(spec: Mapping[str, Any], where: Where, others: tuple[str, ...]) 
         got = " and ".join(given) if given else "none"
         raise FormulaError(f"needs exactly one of {', '.join(_SOURCES)}, got {got}", where)
     return given[0]
+
+
+def _whole(value: object, low: int, high: int, where: Where) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise FormulaError(f"must be a whole number, {low} to {high}, got {str(value)[:60]}", where)
+    return value
 
 
 def _options(spec: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.model import Add, BoundFormula
+from clfractal.formulas.turns import MAX_START, Span, spans_of
 
 MAX_LINKS = 64
 MAX_COUNT = 1000
@@ -17,15 +18,26 @@ MAX_COUNT = 1000
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """A formula and how often it is applied, each time with repeats and addition, before the next link."""
+    """A formula and how often it is applied, each time with repeats and addition, before the next link.
+
+    It takes part in applications `start` to `stop` - 1, counted from 0; with no `stop` it goes on for ever. See
+    `turns.py`.
+    """
 
     bound: BoundFormula
     count: int = 1
+    start: int = 0
+    stop: int | None = None
 
     @property
     def structure(self) -> tuple[object, ...]:
         """What its text depends on beside values of parameters."""
-        return (self.bound.formula, self.bound.add, self.count, self.bound.live)
+        return (self.bound.formula, self.bound.add, self.turns, self.bound.live)
+
+    @property
+    def turns(self) -> tuple[int, int, int | None]:
+        """What decides its turns."""
+        return (self.count, self.start, self.stop)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +70,9 @@ class Chain:
         for link in self.links:
             if not 1 <= link.count <= MAX_COUNT:
                 raise FormulaError(f"count must be 1 to {MAX_COUNT}, got {link.count}", Where())
+            if not 0 <= link.start <= MAX_START or (link.stop is not None and link.stop <= link.start):
+                raise FormulaError(f"start must be 0 to {MAX_START} and below stop", Where())
+        _ = self.spans
         self._check_live()
 
     def _check_live(self) -> None:
@@ -65,7 +80,7 @@ class Chain:
         first = self.first
         if first.live and first.add == "point" and not first.formula.point_map and first.start is None:
             raise FormulaError(f"f(0) is not a finite number with {_live_values(first)}", Where())
-        for link in self.links:
+        for link in self.lasting:
             if link.bound.depends_on_live(link.bound.formula.degree) and self.degree <= 1:
                 raise FormulaError(
                     f"degree must be above 1 where it follows from a live parameter, got {self.degree:g}"
@@ -76,7 +91,7 @@ class Chain:
     @cached_property
     def key(self) -> tuple[object, ...]:
         """All that a picture of the chain depends on."""
-        links = tuple((link.bound.key, link.count) for link in self.links)
+        links = tuple((link.bound.key, link.turns) for link in self.links)
         radii = (self.bailout_override, self.distance_bailout_override, self.step_scale_override)
         return (links, self.bounds_override, radii)
 
@@ -94,10 +109,20 @@ class Chain:
         """The fields alone: the hash is another one in another process."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
+    @cached_property
+    def spans(self) -> tuple[Span, ...]:
+        """The parts of an orbit in which the same links take part."""
+        return spans_of(self.links)
+
+    @cached_property
+    def first_index(self) -> int:
+        """The number of the link of application 0."""
+        return self._index_at(0)
+
     @property
     def first(self) -> BoundFormula:
-        """The first link's formula: it decides where iteration starts and slices a space of four."""
-        return self.links[0].bound
+        """The formula of application 0: it decides where iteration starts and slices a space of four."""
+        return self.links[self.first_index].bound
 
     @property
     def size(self) -> int:
@@ -110,26 +135,47 @@ class Chain:
         return self.first.add
 
     @cached_property
+    def lasting(self) -> tuple[Link, ...]:
+        """The links that have no `stop`: those that decide how |z| grows in the end."""
+        return tuple(self.links[index] for index in self.spans[-1].members)
+
+    @property
+    def repeats_from(self) -> int:
+        """The application from which on the turns repeat themselves, with the period `cycle_length`."""
+        return self.spans[-1].begin
+
+    @property
     def cycle_length(self) -> int:
-        """Applications until the first link comes again."""
-        return sum(link.count for link in self.links)
+        """Applications of one turn of each lasting link."""
+        return self.spans[-1].cycle
 
     def link_at(self, application: int) -> Link:
         """The link of an application, counted from 0."""
-        place = application % self.cycle_length
-        for link in self.links:
+        return self.links[self._index_at(application)]
+
+    def _index_at(self, application: int) -> int:
+        span = next(span for span in self.spans if span.end is None or application < span.end)
+        place = span.place(application)
+        for index, link in enumerate(self.links):
             if place < link.count:
-                return link
+                return index
             place -= link.count
-        raise AssertionError("a place in the cycle belongs to a link")
+        raise AssertionError("a place in the turns belongs to a link")
 
     @cached_property
     def degree(self) -> float:
-        """Growth of |z| over one cycle: the product of the links' degrees (at most 1e300); 1 means linear."""
-        exponent = sum(link.count * math.log(link.bound.degree) for link in self.links)
-        if len(self.links) == 1 and self.links[0].count == 1:
-            return self.first.degree
+        """Growth of |z| over one cycle: the product of the lasting links' degrees (at most 1e300); 1 means linear."""
+        if len(self.lasting) == 1 and self.lasting[0].count == 1:
+            return self.lasting[0].bound.degree
+        exponent = sum(link.count * math.log(link.bound.degree) for link in self.lasting)
         return math.exp(min(exponent, 690.0))
+
+    @cached_property
+    def shape_index(self) -> int | None:
+        """For degree 1: the number of the last lasting link if it has a `shape`, which the last solid then is."""
+        index = self.spans[-1].members[-1]
+        has_shape = self.links[index].bound.formula.shape is not None
+        return index if has_shape and self.degree <= 1 else None
 
     @cached_property
     def bailout(self) -> float:

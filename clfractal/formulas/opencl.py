@@ -19,6 +19,7 @@ from clfractal.formulas.decisions import Decisions, Question, replayed
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
+from clfractal.formulas.turns import Span
 
 # How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
 DualMap = Literal["operations", "jacobian", "cheapest"]
@@ -152,7 +153,8 @@ def operations_per_application(chain: Chain) -> float:
     formula = write_formula(chain)
     prefix = "derivative_apply_" if formula.has_derivative else "dual_apply_"
     total = 0.0
-    for index, link in enumerate(chain.links):
+    for index in chain.spans[-1].members:
+        link = chain.links[index]
         body = formula.text.partition(f"{prefix}{index}(")[2].partition("\n}")[0]
         calls = re.findall(r"\b((?:real|dual)_\w+)\(", body)
         total += link.count * link.bound.repeat * sum(_OPERATIONS.get(call, 1) for call in calls)
@@ -169,11 +171,8 @@ class _ChainWriter:
         self.decisions = [Decisions(link.bound) for link in self.links]
         has_rule = all(link.bound.derivative is not None for link in self.links)
         self.has_derivative = scalar_rule and has_rule
-        first = self.links[0].bound
         self.offset = _offset(chain)
-        self.starts_at_zero = first.add == "point" and self.offset is None
-        # The distance of the last solid belongs to the last application's formula.
-        self.shape_link = self.links[-1] if self.links[-1].bound.formula.shape is not None else None
+        self.starts_at_zero = chain.add == "point" and self.offset is None
 
     def write(self) -> _Written:
         logarithmic = self.chain.degree > 1
@@ -182,7 +181,7 @@ class _ChainWriter:
             f"#define FIRST_COUNT {1 if self.offset is not None else 0}",
             f"#define LOGARITHMIC {int(logarithmic)}",
             f"#define HAS_DERIVATIVE {int(self.has_derivative)}",
-            f"#define HAS_SHAPE {int(self.shape_link is not None)}",
+            f"#define HAS_SHAPE {int(self.chain.shape_index is not None)}",
             _state_functions(self.size),
         ]
         number_types: tuple[NumberType, ...] = ("real", "dual")
@@ -190,8 +189,8 @@ class _ChainWriter:
             parts.append(self._start(number_type))
             parts.extend(self._apply(index, number_type) for index in range(len(self.links)))
             parts.append(self._dispatch(number_type, derivative=False))
-            if self.shape_link is not None:
-                parts.append(self._solid_distance(number_type))
+            if self.chain.shape_index is not None:
+                parts.append(self._solid_distance(self.chain.shape_index, number_type))
         if self.has_derivative:
             parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
             parts.append(self._dispatch("real", derivative=True))
@@ -337,10 +336,8 @@ class _ChainWriter:
         tail = f"const state next = {{{', '.join(texts)}}};\n    *growth = {growth.text};\n    return next;"
         return _function(head, emitter.lines, tail)
 
-    def _solid_distance(self, number_type: NumberType) -> str:
-        assert self.shape_link is not None
-        index = len(self.links) - 1
-        bound = self.shape_link.bound
+    def _solid_distance(self, index: int, number_type: NumberType) -> str:
+        bound = self.links[index].bound
         assert bound.formula.shape is not None
         emitter = self._emitter(index, number_type)
         emitter.lets = dict(bound.formula.let)
@@ -359,7 +356,7 @@ class _ChainWriter:
         extra, passed = (", real *growth", ", growth") if derivative else ("", "")
         lines = []
         if len(self.links) > 1:
-            lines.append(f"const int turn = n % {self.chain.cycle_length};")
+            lines += _turn(self.chain.spans)
             before = 0
             for index, link in enumerate(self.links[:-1]):
                 before += link.count
@@ -372,17 +369,17 @@ class _ChainWriter:
 
         With f(0) = 0 the first application gives C; dual numbers at 0 would give 0 times infinity in many formulas.
         """
-        bound = self.links[0].bound
+        index, bound = self.chain.first_index, self.chain.first
         names = ["point.x", "point.y", "point.z"]
         state = "state" if number_type == "real" else "dual_state"
         components = names if number_type == "real" else [f"dual_coordinate_{a[-1]}({a})" for a in names]
         bindings = {v: Value(f"c->s{i}", "varying") for i, v in enumerate(bound.formula.variables[:3])}
         emitter = Emitter(
             number_type,
-            bindings | _parameters(bound, self.decisions[0]),
+            bindings | _parameters(bound, self.decisions[index]),
             self.constants,
-            0,
-            self.decisions[0],
+            index,
+            self.decisions[index],
             prefix="p",
         )
         lines = [f"c->s{i} = {component};" for i, component in enumerate(components)]
@@ -396,7 +393,7 @@ class _ChainWriter:
             lines.append("*z = *c;")
             for i, added in enumerate(self.offset or ()):
                 if added:
-                    slot = self.constants.text((0, "start", i))
+                    slot = self.constants.text((index, "start", i))
                     component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
                     lines.append(f"{component} += {slot};")
         name = "start" if number_type == "real" else "dual_start"
@@ -441,6 +438,19 @@ def _parameters(bound: BoundFormula, decisions: Decisions) -> dict[str, Value]:
         name: literal(decisions.exact(name)) if name in baked else Value("", "constant", Name(name))
         for name in bound.values
     }
+
+
+def _turn(spans: Sequence[Span]) -> list[str]:
+    """`turn`: the place that application `n` has in the turns of all links."""
+    if len(spans) == 1:
+        return [f"const int turn = n % {spans[0].cycle};"]
+    lines = ["int turn;"]
+    for span in spans:
+        condition = f"if (n < {span.end}) " if span.end is not None else ""
+        lines.append(f"{'} else ' if span is not spans[0] else ''}{condition}{{")
+        lines.append(f"    turn = (n + {span.offset}) % {span.cycle};")
+        lines += [f"    if (turn >= {first}) turn += {count};" for first, count in span.skipped]
+    return [*lines, "}"]
 
 
 def _function(head: str, lines: Sequence[str], tail: str | None) -> str:

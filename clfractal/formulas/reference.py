@@ -114,8 +114,8 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
 
     The solid is the set of points with |z| <= bailout after `iterations` applications. With J the Jacobian of
     the last z and g = |J^T z/|z||: for a degree above 1 (|z| log|z| - what is left of the bailout's) / (2 g),
-    for degree 1 (|z| - R) / g with R the chain's `solid_radius`, or the last formula's `shape` over its own
-    gradient. Iteration stops beyond the distance bailout. No step scale is applied.
+    for degree 1 (|z| - R) / g with R the chain's `solid_radius`, or the last lasting formula's `shape` over its
+    own gradient. Iteration stops beyond the distance bailout. No step scale is applied.
 
     Returns:
         Distances of shape (n,); gradients of shape (n, 3), which point out of the solid and are not
@@ -124,15 +124,15 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
     backend = DualBackend(NumpyBackend())
     with np.errstate(all="ignore"):
         state, count, inside = _dual_orbit(chain, points, iterations, backend)
-        shape = chain.links[-1].bound.formula.shape if chain.degree <= 1 else None
         radius = _norm([z.value for z in state])
         gradient = _gradient(state, radius)
-        if shape is not None:
-            bound = chain.links[-1].bound
+        if chain.shape_index is not None:
+            bound = chain.links[chain.shape_index].bound
             names = {**bound.values, **dict(zip(bound.formula.variables, state, strict=True))}
             for name, node in bound.formula.let:
                 names[name] = evaluate(node, names, backend)
-            solid = constant_dual(evaluate(shape, names, backend), 3)
+            assert bound.formula.shape is not None
+            solid = constant_dual(evaluate(bound.formula.shape, names, backend), 3)
             gradient = np.stack([np.broadcast_to(p, radius.shape) for p in solid.partials], axis=1)
             inside = solid.value <= 0
             growth = np.linalg.norm(gradient, axis=1)

@@ -61,4 +61,4 @@ def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:
 def escape_defines(chain: Chain) -> dict[str, object]:
     """What the text of `kernels/escape.h` depends on."""
     cycle = chain.cycle_length
-    return {"PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle)}
+    return {"PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle), "REPEATS_FROM": chain.repeats_from}

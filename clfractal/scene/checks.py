@@ -206,7 +206,7 @@ def _inside(scene: Scene, points: Sequence[Vector]) -> Sequence[bool]:
     iterations = min(scene.formula.iterations, _MOST_APPLICATIONS)
     array = np.array(points, dtype=float)
     inside = reference.escape(chain, array, iterations)[1]
-    if chain.degree <= 1 and chain.links[-1].bound.formula.shape is not None:
+    if chain.shape_index is not None:
         # The last solid is the shape, which is smaller than the ball of the bailout.
         inside &= reference.distance(chain, array, iterations)[0] == 0
     return [bool(each) for each in inside]

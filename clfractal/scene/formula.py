@@ -30,10 +30,21 @@ class ChainLink(_Source):
     """One member of a chain: a formula and how many times it is applied before the next one's turn."""
 
     count: int = Field(1, ge=1, le=1000, description="number of applications before the next formula's turn")
+    start: int = Field(
+        0, ge=0, le=1_000_000, description="first application, counted from 0, in which it takes part"
+    )
+    stop: int | None = Field(
+        None,
+        ge=1,
+        le=1_000_000,
+        description="first application in which it no longer takes part; null: it goes on to the end",
+    )
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         _check_source(self, ("name", "file", "inline"))
+        if self.stop is not None and self.stop <= self.start:
+            raise problem(f"must be above start, {self.start}, got {self.stop}", "stop")
         return self
 
 

@@ -217,6 +217,7 @@ def _formula_defines(chain: Chain, lanes: int, precision: Precision) -> dict[str
         "LANES": lanes,
         "REAL_IS_DOUBLE": int(precision == "float64"),
         "CHUNK": cycle * -(-CHUNK // cycle),
+        "REPEATS_FROM": chain.repeats_from,
     }
 
 

@@ -369,6 +369,7 @@ def test_first_values_are_valid() -> None:
                     "Transform",
                     "LayoutView",
                     "FormulaSpec",
+                    "ChainLink",
                 )
             ):
                 continue

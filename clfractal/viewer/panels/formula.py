@@ -9,8 +9,9 @@ from typing import Any
 from imgui_bundle import imgui
 
 from clfractal.formulas import catalog
-from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS
+from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Link
 from clfractal.formulas.model import BoundFormula, Parameter
+from clfractal.formulas.turns import MAX_START
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
@@ -239,6 +240,7 @@ def _members(ui: Ui, root: str) -> None:
         scale = w.Scale(1, MAX_COUNT, (1, 10), whole=True)
         about = "number of applications before the next formula's turn"
         w.number(ui, f"{path}.count", "Times", float(link.count), scale, default=1.0, tip=about)
+        _range(ui, path, link)
         imgui.push_id(index)
         parameters(ui, path, link.bound)
         _julia(ui, path, link.bound)
@@ -252,6 +254,17 @@ def _members(ui: Ui, root: str) -> None:
     name = _library(ui, "##member", "", single=True)
     if name is not None:
         ui.studio.edit({root: [*members, {"name": name, "count": 1}]})
+
+
+def _range(ui: Ui, path: str, link: Link) -> None:
+    """The applications in which a member takes part."""
+    scale = w.Scale(0, MAX_START, (0, 20), whole=True)
+    about = "first application, counted from 0, in which it takes part"
+    w.number(ui, f"{path}.start", "From", float(link.start), scale, default=0.0, tip=about)
+    scale = w.Scale(1, MAX_START, (1, 20), whole=True)
+    about = f"first application in which it no longer takes part; {MAX_START}: it goes on to the end"
+    stop = float(MAX_START if link.stop is None else link.stop)
+    w.number(ui, f"{path}.stop", "Until", stop, scale, default=float(MAX_START), tip=about, endless=True)
 
 
 def _member_line(ui: Ui, root: str, members: list[Any], index: int, title: str) -> list[Any] | None:

@@ -195,17 +195,33 @@ def field(
 
 
 def number(
-    ui: Ui, path: str, label: str, current: float, scale: Scale, *, default: float | None, tip: str
+    ui: Ui,
+    path: str,
+    label: str,
+    current: float,
+    scale: Scale,
+    *,
+    default: float | None,
+    tip: str,
+    endless: bool = False,
 ) -> None:
-    """A number that the schema does not know of by itself (a formula's parameter): as `field`."""
+    """A number that the schema does not know of by itself (a formula's parameter): as `field`.
+
+    With `endless` its highest value stands for none, which is written as null.
+    """
+
+    def written(value: float) -> float | None:
+        if endless and scale.high is not None and value >= scale.high:
+            return None
+        return int(value) if scale.whole else value
+
     different = default is not None and current != default
-    usual = int(default) if default is not None and scale.whole else default
-    reset = (lambda: _set(ui, path, usual)) if default is not None else None
+    reset = (lambda: _set(ui, path, written(default))) if default is not None else None
     width = row(ui, label, path=path, tip=tip, differs=different, reset=reset)
     if width is None:
         return
     change = number_box(boxes(ui), path, current, width, scale)
-    apply(ui, path, change, (lambda each: int(each)) if scale.whole else (lambda each: each))
+    apply(ui, path, change, written)
     problem(ui, path)
 
 
