@@ -1,9 +1,10 @@
-// Turns canvases into the numbers that a screen wants: two eyes into one picture, exposure, sRGB, dither.
+// Turns canvases into the numbers that a screen wants: exposure, tone, two eyes into one picture, sRGB, dither.
 //
-// The arithmetic is the one of picture files, operation by operation (clfractal/pictures/compose.py, anaglyph.py and
-// clfractal/files/srgb.py), so that a window and a file show the same.
+// The arithmetic is the one of picture files, operation by operation (clfractal/pictures/develop.py, compose.py, anaglyph.py
+// and clfractal/files/srgb.py), so that a window and a file show the same.
 #include "show_structs.h"
 #pragma OPENCL FP_CONTRACT OFF
+#include "tone.h"
 
 #if TO_IMAGE
 #define SHOWN __write_only image2d_t
@@ -45,9 +46,9 @@ float4 view_at(__global const float4 *colors, __constant const struct ShownView 
                    down - upper);
 }
 
-// The pixel (x, y) of an eye's picture.
-float4 eye_at(__global const float4 *colors, __constant const struct ShownView *views, __constant const struct Show *show,
-              int eye, int x, int y) {
+// The pixel (x, y) of an eye's picture, as light.
+float4 light_at(__global const float4 *colors, __constant const struct ShownView *views, __constant const struct Show *show,
+                int eye, int x, int y) {
     // Views that come later lie over those before.
     for (int number = show->views - 1; number >= 0; --number) {
         __constant const struct ShownView *view = views + number;
@@ -56,6 +57,21 @@ float4 eye_at(__global const float4 *colors, __constant const struct ShownView *
         }
     }
     return (float4)(show->background[0], show->background[1], show->background[2], 1.0f);
+}
+
+// The same developed, as `Development.colors` does: light that a screen shows.
+float4 eye_at(__global const float4 *colors, __constant const struct ShownView *views, __constant const struct Show *show,
+              __global const float *tones, int eye, int x, int y) {
+    float4 found = light_at(colors, views, show, eye, x, y);
+    const float cover = found.w;
+    found *= show->gain;
+    if (show->tone != TONE_LINEAR) {
+        // Colours of a transparent picture are premultiplied; where nothing covers, as where all is covered, they are as they are.
+        const float divisor = show->transparent && cover > 0.0f && cover < 1.0f ? cover : 1.0f;
+        found = toned(found / divisor, tones, show->tone) * divisor;
+    }
+    found.w = cover;
+    return found;
 }
 
 float mixed(__constant const float *by, float4 left, float4 right) {
@@ -71,25 +87,25 @@ float mixed(__constant const float *by, float4 left, float4 right) {
 }
 
 float4 composed_at(__global const float4 *colors, __constant const struct ShownView *views,
-                   __constant const struct Show *show, int x, int y) {
+                   __constant const struct Show *show, __global const float *tones, int x, int y) {
     const int mode = show->mode;
-    if (mode == MODE_ONE) return eye_at(colors, views, show, show->first, x, y);
+    if (mode == MODE_ONE) return eye_at(colors, views, show, tones, show->first, x, y);
     if (mode == MODE_BESIDE) {
         const int second = x >= show->eye_width;
-        return eye_at(colors, views, show, second ? 1 - show->first : show->first, x - second * show->eye_width, y);
+        return eye_at(colors, views, show, tones, second ? 1 - show->first : show->first, x - second * show->eye_width, y);
     }
     if (mode == MODE_BELOW) {
         const int second = y >= show->eye_height;
-        return eye_at(colors, views, show, second ? 1 - show->first : show->first, x, y - second * show->eye_height);
+        return eye_at(colors, views, show, tones, second ? 1 - show->first : show->first, x, y - second * show->eye_height);
     }
     if (mode == MODE_ANAGLYPH) {
-        const float4 left = eye_at(colors, views, show, show->first, x, y);
-        const float4 right = eye_at(colors, views, show, 1 - show->first, x, y);
+        const float4 left = eye_at(colors, views, show, tones, show->first, x, y);
+        const float4 right = eye_at(colors, views, show, tones, 1 - show->first, x, y);
         return (float4)(mixed(show->matrix, left, right), mixed(show->matrix + 6, left, right),
                         mixed(show->matrix + 12, left, right), left.w < right.w ? right.w : left.w);
     }
     const int odd = (mode == MODE_ROWS ? y : mode == MODE_COLUMNS ? x : x + y) & 1;
-    float4 found = eye_at(colors, views, show, odd ? 1 - show->first : show->first, x, y);
+    float4 found = eye_at(colors, views, show, tones, odd ? 1 - show->first : show->first, x, y);
     if (mode == MODE_CHESSBOARD) {
         __constant const float *passed = show->matrix + 3 * odd;
         found.x = passed[0] == 0.0f ? 0.0f : found.x * passed[0];
@@ -116,21 +132,22 @@ uchar coded(float linear, __global const ushort *table, int threshold) {
 }
 
 __kernel void show(__global const float4 *colors, __constant const struct ShownView *views,
-                   __constant const struct Show *show, __global const ushort *table, SHOWN shown) {
+                   __constant const struct Show *show, __global const ushort *table, __global const float *tones,
+                   SHOWN shown) {
     const int x = (int)get_global_id(0), y = (int)get_global_id(1);
     if (x >= show->width || y >= show->height) return;
-    float4 found = composed_at(colors, views, show, x, y);
+    float4 found = composed_at(colors, views, show, tones, x, y);
     if (show->transparent && found.w < 1.0f) {
         // Colours are premultiplied; what lies behind them is a board of two greys.
         const float behind = ((x >> 3 ^ y >> 3) & 1) ? 0.13f : 0.10f;
-        const float seen = (found.w > 0.0f ? 1.0f - found.w : 1.0f) * behind / show->gain;
+        const float seen = (found.w > 0.0f ? 1.0f - found.w : 1.0f) * behind;
         found.x += seen;
         found.y += seen;
         found.z += seen;
     }
     const int threshold = threshold_at(x & 15, y & 15);
-    const uchar4 pixel = (uchar4)(coded(found.x * show->gain, table, threshold), coded(found.y * show->gain, table, threshold),
-                                  coded(found.z * show->gain, table, threshold), 255);
+    const uchar4 pixel = (uchar4)(coded(found.x, table, threshold), coded(found.y, table, threshold),
+                                  coded(found.z, table, threshold), 255);
 #if TO_IMAGE
     write_imagef(shown, (int2)(x, y), convert_float4(pixel) / 255.0f);
 #else

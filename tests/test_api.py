@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import clfractal
 from clfractal.files.exr import read_exr
@@ -78,6 +80,29 @@ def test_progress_can_end_a_render() -> None:
     with pytest.raises(TimeoutError):
         clfractal.render(SCENE, progress=stop)
     assert len(seen) == 1
+
+
+def test_a_tone_reaches_what_is_shown_and_not_the_film(tmp_path: Path) -> None:
+    plain = clfractal.render(SCENE)
+    bent = clfractal.render(SCENE + "output: {tone: agx}\n")
+    np.testing.assert_array_equal(plain["R"], bent["R"])
+    assert bent.header["tone"] == "agx"
+    np.testing.assert_array_equal(plain.to_rgb8(tone="agx"), bent.to_rgb8())
+    np.testing.assert_array_equal(plain.to_rgb8(), bent.to_rgb8(tone="linear"))
+    assert (plain.to_rgb8() != bent.to_rgb8()).mean() > 0.5
+    plain.save(tmp_path / "given.png", tone="agx")
+    bent.save(tmp_path / "own.png")
+    bent.save(tmp_path / "own.exr")
+    with Image.open(tmp_path / "given.png") as given, Image.open(tmp_path / "own.png") as own:
+        np.testing.assert_array_equal(np.asarray(given), bent.to_rgb8())
+        np.testing.assert_array_equal(np.asarray(own), bent.to_rgb8())
+    with Image.open(io.BytesIO(bent._repr_png_() or b"")) as shown:
+        np.testing.assert_array_equal(np.asarray(shown), bent.to_rgb8())
+    with pytest.raises(clfractal.SceneError, match="unknown tone 'agz'; did you mean 'agx'"):
+        plain.save(tmp_path / "none.png", tone="agz")
+    planes, header = read_exr(tmp_path / "own.exr")
+    np.testing.assert_array_equal(planes["R"], plain["R"].astype(np.float16))
+    assert header["clfractalTone"] == "agx"
 
 
 def test_exposure_and_transparency_reach_the_picture(tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ def test_other_views_are_not_resumed(here: Path, shell: InProcess, change: str) 
 
 def test_how_files_are_written_is_free_to_change(here: Path, shell: InProcess) -> None:
     interrupted(shell, 8)
-    assert render(shell, "--resume", "--set", "output.exposure=1").status == 0
+    assert render(shell, "--resume", "--set", "output.exposure=1", "--set", "output.tone=agx").status == 0
     assert partials() == []
 
 

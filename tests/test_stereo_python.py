@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import clfractal
+from clfractal.files.srgb import encode8
+from clfractal.files.tone import toned
 from clfractal.pictures.compose import compose
 from clfractal.scene import given
 from clfractal.scene.stereo import Stereo
@@ -41,6 +44,28 @@ def test_a_composed_film(mode: str) -> None:
     np.testing.assert_array_equal(part["G"], film["G"][5:26, 9:34])
     assert part.header["seconds"] > 0
     assert (film._repr_png_() or b"")[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+@pytest.mark.parametrize("mode", ["anaglyph", "anaglyph_chessboard", "split"])
+def test_each_eye_goes_through_the_curve_before_they_are_mixed(mode: str, tmp_path: Path) -> None:
+    """As display light, so that a filter lets the same colour pass however the curve bends it."""
+    scene = {**stereo(mode), "output": {"tone": "reinhard", "exposure": 1.5}}
+    film = clfractal.render(scene, channels=COLORS)
+    linear = clfractal.render({**scene, "output": {"exposure": 1.5}}, channels=COLORS)
+    for name in film.channels:
+        np.testing.assert_array_equal(film[name], linear[name])
+    eyes = []
+    for eye in clfractal.render_pair(scene, channels=COLORS):
+        lit = [eye[name] * np.float32(2**1.5) for name in "RGB"]
+        bent = toned(lit[0], lit[1], lit[2], "reinhard")
+        eyes.append({name: eye[name] for name in eye.channels} | dict(zip("RGB", bent, strict=True)))
+    shown = compose(Stereo.model_validate({"mode": mode}), eyes[0], eyes[1])
+    wanted = encode8(np.stack([shown[name] for name in "RGB"], axis=-1))
+    np.testing.assert_array_equal(film.to_rgb8(), wanted)
+    film.save(tmp_path / "a.png")
+    with Image.open(tmp_path / "a.png") as image:
+        np.testing.assert_array_equal(np.asarray(image), wanted)
+    np.testing.assert_array_equal(linear.to_rgb8(tone="reinhard"), wanted)
 
 
 @pytest.mark.parametrize("mode", ["left", "pair", "multi_view", "over_under_half"])

@@ -104,7 +104,7 @@ def vary_scene(order: Order, choice: Choice, shell: Shell) -> None:
             film.save(choice.folder / f"{name}.png")
             path = choice.folder / f"{name}.yaml"
             _write(path, (_heading(order, choice, len(pictures) + 1, variation) + text).encode())
-            pictures.append(film.to_rgb8(float(film.header.get("exposure", 0.0))))
+            pictures.append(film.to_rgb8())
             shell.say(f"{path}: {variation.remark}")
     if not pictures:
         raise SceneError("no variation shows anything", Where(order.scene))

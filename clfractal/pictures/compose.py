@@ -1,17 +1,20 @@
 """Combines the two pictures of a stereo scene: side by side, interlaced, or as an anaglyph.
 
-Everything is in linear light and in coordinates of the finished picture: a region equals the same part of the whole.
-A store of each eye's picture goes in, `Composed` comes out and is written like any other picture, a few rows at a time.
+Everything is in linear light (the film's, or developed for a screen), and in coordinates of the finished picture: a region
+equals the same part of the whole. A store of each eye's picture goes in, `Composed` comes out and is written like any other
+picture, a few rows at a time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from typing import Any, Literal
 
 import numpy as np
 
 from clfractal.pictures.anaglyph import matrices, mix
+from clfractal.pictures.develop import Development, developed
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Bands, Floats, Picture
 from clfractal.pictures.tiles import Region
@@ -178,6 +181,21 @@ class Composed:
             planes = compose(self.stereo, pair[0], pair[1], (self.region.x, row))
             yield row, planes
             row += len(planes[self.channels[0]])
+
+    @property
+    def mixes_colors(self) -> bool:
+        """Whether its colours are not the eyes' own."""
+        return self.stereo.mixes_colors
+
+    def developed_parts(self, development: Development) -> Picture:
+        """The picture of both eyes' pictures, each of them developed."""
+        return self._of(lambda store: developed(store, development))
+
+    def _of(self, change: Callable[[Picture], Picture]) -> Composed:
+        """The same of other stores."""
+        found = copy(self)
+        found.left, found.right = (store and change(store) for store in (self.left, self.right))
+        return found
 
     def _one_below_the_other(self) -> Bands:
         row = self.region.y

@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
+from clfractal.files.tone import Tone
+from clfractal.pictures.develop import Development, developed, rgb8
 from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -47,8 +49,8 @@ class Film:
     """A picture in memory: `film["R"]` is a float32 array of shape (height, width) of the region.
 
     R, G, B are linear Rec. 709; if the background is transparent they are premultiplied by A.
-    `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, `exposure` (stops) and
-    `transparent` (what PNG files and notebooks show), and `worldToCamera` and
+    `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, `exposure` (stops), `tone` (a curve) and
+    `transparent` (what PNG, JPEG and WebP files and notebooks show), and `worldToCamera` and
     `worldToNDC`, 4 x 4 matrices for row vectors (point_camera = [x, y, z, 1] @ matrix: the translation is the
     last row), as in OpenEXR's standard attributes. A function that returns the header is called when it is first needed.
 
@@ -74,6 +76,8 @@ class Film:
         self._stats = _Known({})
         self.inputs: tuple[Path, ...] = ()
         """Files that were read for the picture; `save` replaces none of them."""
+        self.mixed_from: Picture | None = None
+        """The picture that mixes two eyes' pictures in this one, if it does: a tone curve bends each eye's before."""
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
         # Not `zeros`: NumPy asks for large pages only for memory that it does not want cleared, and small ones take the
@@ -213,18 +217,26 @@ class Film:
         refuse_overwriting([path], self.inputs)
         save_outputs(self, [path], **settings)
 
-    def to_rgb8(self, exposure: float = 0.0) -> npt.NDArray[np.uint8]:
-        """The picture as a screen shows it: sRGB, uint8 of shape (height, width, 3); exposure in stops.
+    def developed_parts(self, development: Development) -> Picture | None:
+        """The picture with each of two eyes' pictures developed before they are mixed; None if there is no need.
+
+        Exposure alone gives the same before and after.
+        """
+        if self.mixed_from is None or development.tone == "linear":
+            return None
+        return developed(self.mixed_from, development)
+
+    def to_rgb8(self, exposure: float | None = None, tone: Tone | None = None) -> npt.NDArray[np.uint8]:
+        """The picture as a screen shows it: sRGB, uint8 of shape (height, width, 3).
+
+        Args:
+            exposure: stops; as the scene says if None.
+            tone: the curve: linear, reinhard or agx; as the scene says if None.
 
         Raises:
             KeyError: the film has no R, G, B.
         """
-        from clfractal.files.srgb import encode8
-
-        linear = np.stack([self["R"], self["G"], self["B"]], axis=-1)
-        if exposure:
-            linear *= np.float32(2.0**exposure)
-        return encode8(linear, origin=(self.region.x, self.region.y))
+        return rgb8(self, Development.of(self.header, exposure, tone))
 
     def to_image(self) -> Image:
         """The picture as an image of Pillow: the pixels of an 8-bit PNG; RGBA if the background is transparent.
@@ -264,4 +276,6 @@ def in_memory(picture: Picture) -> Film:
     bands = [band for _, band in picture.bands()]
     film = Film(picture.channels, picture.display, picture.region, picture.header)
     film.fill({name: np.concatenate([band[name] for band in bands]) for name in picture.channels})
+    if getattr(picture, "mixes_colors", False):
+        film.mixed_from = picture
     return film

@@ -13,6 +13,8 @@ from clfractal.errors import FileError, Where
 from clfractal.files import atomic
 from clfractal.files.channels import CHANNELS, VIEWS, in_view
 from clfractal.files.png import Bits, stream_png, write_png
+from clfractal.files.tone import Tone
+from clfractal.pictures.develop import Development, developed
 from clfractal.pictures.tiled import Floats, Picture
 from clfractal.scene.stereo import APART, Stereo
 
@@ -48,6 +50,7 @@ def save_outputs(
     bits: Bits = 8,
     transparent: bool | None = None,
     exposure: float | None = None,
+    tone: Tone | None = None,
 ) -> None:
     """Writes a film to files, in the formats of their extensions; each file appears complete or not at all.
 
@@ -59,6 +62,7 @@ def save_outputs(
         bits: 8 or 16, of a PNG.
         transparent: whether a PNG has an alpha channel (the film's colours are premultiplied); needs A.
         exposure: stops (powers of two) by which a PNG is lighter than the film; an EXR keeps scene values.
+        tone: the curve that a PNG's light goes through: linear, reinhard or agx.
             If they are None, the header's values are used.
 
     Raises:
@@ -69,12 +73,13 @@ def save_outputs(
         check_output(path, store.channels)
     whole = {**store.header, **(header or {})}
     region = store.region
+    development = Development.of(store.header, exposure, tone)
     for path in chosen:
         if path.suffix.lower() == ".png":
             alpha = _transparent(store, transparent)
             write_png(
                 path,
-                _colors(store, alpha=alpha, exposure=_exposure(store, exposure)),
+                _colors(developed(store, development), alpha=alpha),
                 width=region.width,
                 height=region.height,
                 bits=bits,
@@ -187,7 +192,7 @@ def png_bytes(store: Picture) -> bytes:
     alpha = _transparent(store, None)
     stream_png(
         stream,
-        _colors(store, alpha=alpha, exposure=_exposure(store, None)),
+        _colors(developed(store, Development.of(store.header)), alpha=alpha),
         width=region.width,
         height=region.height,
         alpha=alpha,
@@ -202,22 +207,11 @@ def _transparent(store: Picture, wanted: bool | None) -> bool:
     return chosen and "A" in store.channels
 
 
-def _exposure(store: Picture, wanted: float | None) -> float:
-    return float(store.header.get("exposure", 0.0)) if wanted is None else wanted
-
-
-def _colors(store: Picture, *, alpha: bool, exposure: float) -> Iterator[Floats]:
-    """The bands as arrays (rows, width, 3 or 4), colours made lighter by `exposure` stops."""
-    gain = np.float32(2.0**exposure)
-    for _, band in store.bands():
-        rows, width = band["R"].shape
-        pixels = np.empty((rows, width, 4 if alpha else 3), dtype=np.float32)
-        for component, name in enumerate("RGB"):
-            with np.errstate(over="ignore"):  # infinity is limited to 1 later
-                np.multiply(band[name], gain, out=pixels[..., component])
-        if alpha:
-            pixels[..., 3] = band["A"]
-        yield pixels
+def _colors(picture: Picture, *, alpha: bool) -> Iterator[Floats]:
+    """The bands as arrays (rows, width, 3 or 4)."""
+    names = "RGBA" if alpha else "RGB"
+    for _, band in picture.bands():
+        yield np.stack([band[name] for name in names], axis=-1)
 
 
 def _file_key(key: str) -> str:

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, Tag, model_validator
 
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
+from clfractal.files.tone import Tone
 from clfractal.scene.base import (
     Amount,
     Color,
@@ -163,6 +164,9 @@ class Output(Section):
 
     exposure: float = Field(
         0.0, ge=-100, le=100, description="stops: PNG colours are multiplied by 2**exposure"
+    )
+    tone: Tone = Field(
+        "linear", description="the curve from light to what a PNG shows: linear, reinhard or agx"
     )
     channels: Annotated[tuple[ChannelName, ...], Field(strict=False, min_length=1, max_length=64)] = Field(
         DEFAULT_CHANNELS, description="names of the channels of an EXR"

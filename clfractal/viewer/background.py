@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
 from clfractal.errors import ClfractalError
-from clfractal.files.srgb import encode8
+from clfractal.pictures.develop import rgb8
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.viewer.fitting import Cancellable
@@ -103,12 +103,11 @@ class Thumbnail:
         run(self._films.job, self._films.films, executor, token=token)
         film = self._films.picture()
         self._token = None
-        gain = np.float32(2.0**self._films.job.scene.output.exposure)
-        colors = np.stack([film[name] * gain for name in "RGB"], axis=-1)
+        colors = rgb8(film, self._films.development)
         opaque = np.full((*colors.shape[:2], 1), 255, np.uint8)
         self.film = film
         self._films = None
-        self.pixels = np.concatenate([encode8(colors), opaque], axis=-1)
+        self.pixels = np.concatenate([colors, opaque], axis=-1)
 
     def _scene(self) -> Scene:
         scene = self._load()

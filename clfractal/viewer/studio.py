@@ -176,6 +176,7 @@ class Studio:
             self.screens(scene.stereo),
             self.smooth,
             transparent=scene.background == "transparent",
+            tone=scene.output.tone,
         )
 
     @property

@@ -7,6 +7,7 @@ from functools import cached_property, partial
 from typing import Any
 
 from clfractal.pictures.compose import Side
+from clfractal.pictures.develop import Development
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Picture
 from clfractal.work.comfort import comfort_of_films
@@ -37,6 +38,12 @@ class JobFilms:
     def header(self) -> dict[str, Any]:
         """The header of the whole picture's files."""
         return self.job.header()
+
+    @property
+    def development(self) -> Development:
+        """How the scene wants its picture shown; without the work of making a header."""
+        scene = self.job.scene
+        return Development(scene.output.exposure, scene.output.tone, scene.background == "transparent")
 
     def picture(self, took: Took | None = None) -> Film:
         """The picture, as far as it is finished. Not for a pair whose pictures stay apart.

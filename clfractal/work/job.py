@@ -158,6 +158,7 @@ class Job:
             "platform": f"{self.device.platform}, {self.device.version}",
             "precision": self.precision,
             "exposure": scene.output.exposure,
+            "tone": scene.output.tone,
             "transparent": scene.background == "transparent",
             "worldToCamera": camera.world_to_camera(),
             "worldToNDC": camera.world_to_ndc(),

@@ -1,4 +1,4 @@
-"""Canvases to a screen's numbers, on the device: exposure, sRGB, dither, and two eyes in one picture."""
+"""Canvases to a screen's numbers, on the device: exposure, tone, two eyes in one picture, sRGB, dither."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Field, Struct
 from clfractal.device.watched import Watched
-from clfractal.files import srgb
+from clfractal.files import srgb, tone
+from clfractal.files.tone import Tone
 from clfractal.pictures.anaglyph import matrices
 from clfractal.pictures.compose import BELOW, BESIDE, Side, eye_size, picture_size
 from clfractal.scene.layout import Place
@@ -41,6 +42,7 @@ SHOW = Struct(
         Field("views", "int", 0, "number of views"),
         Field("smooth", "int", 0, "1: coarse pictures are interpolated"),
         Field("transparent", "int", 0, "1: a board shows where nothing covers it"),
+        Field("tone", "int", 0, "TONE_..."),
         Field("gain", "float", 0, "two to the power of the exposure"),
         Field("background", "float", 3, "between the views of a layout, linear"),
         Field(
@@ -76,12 +78,14 @@ class Look:
         stereo: the scene's section; None without stereo.
         smooth: whether coarse pictures are interpolated.
         transparent: whether the background is, and a board is shown there.
+        tone: the curve from light to what is shown.
     """
 
     exposure: float = 0.0
     stereo: Stereo | None = None
     smooth: bool = True
     transparent: bool = False
+    tone: Tone = "linear"
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,9 +187,10 @@ class Shower:
             "TABLE_LOWEST": srgb.TABLE_LOWEST,
             "TABLE_ONE": srgb.TABLE_ONE,
         }
+        defines |= _tone_defines()
         structs = SHOW.c_text("float32") + SHOWN_VIEW.c_text("float32")
         text = flatten("show.cl", generated={"show_structs.h": structs}, defines=defines)
-        warm = Warm("show", GROUP, GROUP, (Argument("buffer", 4096),) * 5)
+        warm = Warm("show", GROUP, GROUP, (Argument("buffer", 4096),) * 6)
         built = program.build(
             device,
             text.text,
@@ -196,8 +201,7 @@ class Shower:
         self._kernel = built.kernel("show")
         with device.failures("opening the device"):
             self.queue = cl.CommandQueue(device.context)
-        table = srgb.table8()
-        self._table = self._sent(table)
+        self._table, self._tones = self._sent(srgb.table8()), self._sent(tone.tables())
         # A write is a command, and would wait until PoCL's cores are done with a picture's launch.
         self._views = Watched(device, np.zeros(MOST_VIEWS, SHOWN_VIEW.dtype("float32")))
         self._show = Watched(device, np.zeros(1, SHOW.dtype("float32")))
@@ -219,7 +223,9 @@ class Shower:
         with self.device.failures("showing the picture"):
             self._views.put(self.queue, views)
             self._show.put(self.queue, record)
-            self._kernel.set_args(canvas.colors, self._views.buffer, self._show.buffer, self._table, shown)
+            self._kernel.set_args(
+                canvas.colors, self._views.buffer, self._show.buffer, self._table, self._tones, shown
+            )
             event = cl.enqueue_nd_range_kernel(self.queue, self._kernel, size, GROUP)
             self.queue.flush()
         return event
@@ -244,6 +250,7 @@ class Shower:
             "views": len(canvas.parts),
             "smooth": int(look.smooth),
             "transparent": int(look.transparent),
+            "tone": tone.TONES.index(look.tone),
             "gain": 2.0**look.exposure,
             "background": np.array(arrangement.background, np.float32),
             "matrix": matrix,
@@ -276,6 +283,22 @@ class Shower:
         with self.device.failures("uploading constants"):
             cl.enqueue_copy(self.queue, buffer, data)
         return buffer
+
+
+def _tone_defines() -> dict[str, object]:
+    """The numbers of `files/tone.py` in the kernel's text; hexadecimal, so that each is the same."""
+
+    def exact(value: np.float32) -> str:
+        return f"{float(value).hex()}f"
+
+    kept = np.float32(1) - tone.INSET
+    found: dict[str, object] = {f"TONE_{name.upper()}": number for number, name in enumerate(tone.TONES)}
+    found |= {"TONE_SHIFT": tone.SHIFT, "TONE_LOWEST": tone.LOWEST, "TONE_ENTRIES": tone.ENTRIES}
+    found |= {"TONE_LIGHTEST": exact(tone.LIGHTEST), "TONE_INSET": exact(tone.INSET)}
+    found |= {"TONE_KEPT": exact(kept), "TONE_BACK": exact(np.float32(1) / kept)}
+    for name, weights in (("LUMINANCE", tone.LUMINANCE), ("GREY", tone.GREY)):
+        found |= {f"{name}_{color}": exact(weight) for color, weight in zip("RGB", weights, strict=True)}
+    return found
 
 
 def _way(look: Look) -> tuple[int, int, npt.NDArray[np.float32]]:

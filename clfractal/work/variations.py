@@ -264,7 +264,7 @@ def worthwhile(film: Film) -> bool:
     Args:
         film: with R, G, B, and A if what is covered shall count; `PREVIEW_SIZE` is large enough.
     """
-    code = film.to_rgb8(float(film.header.get("exposure", 0.0))).astype(np.float64)
+    code = film.to_rgb8().astype(np.float64)
     lightness = code @ np.array([0.2126, 0.7152, 0.0722])
     covered = film["A"] > 0.5 if "A" in film else np.ones(lightness.shape, bool)
     if covered.mean() < _LEAST_COVERED:

@@ -75,7 +75,7 @@ def test_a_wrong_edit_changes_nothing_and_is_told(studio: Studio) -> None:
 
 @pytest.mark.parametrize(
     "values",
-    [{"output.exposure": 1.5}, {"bookmarks": {"a": {}}}, {"output.png_bits": 16}],
+    [{"output.exposure": 1.5}, {"output.tone": "agx"}, {"bookmarks": {"a": {}}}, {"output.png_bits": 16}],
 )
 def test_showing_needs_no_rays(values: dict[str, object], studio: Studio) -> None:
     rest(studio)

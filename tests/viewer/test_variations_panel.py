@@ -227,7 +227,7 @@ def test_pictures_of_nothing_give_way_to_spares() -> None:
     class Dark:
         header: ClassVar[dict[str, Any]] = {}
 
-        def to_rgb8(self, exposure: float) -> Any:
+        def to_rgb8(self) -> Any:
             return np.zeros((148, 264, 3), np.uint8)
 
         def __contains__(self, name: str) -> bool:

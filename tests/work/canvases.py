@@ -47,7 +47,8 @@ def job_of(scene: Scene, device: Device) -> Job:
 
 def look_of(scene: Scene, **values: Any) -> Look:
     """How a scene wants to be shown."""
-    settings = {"exposure": scene.output.exposure, "stereo": scene.stereo, **values}
+    output = scene.output
+    settings = {"exposure": output.exposure, "tone": output.tone, "stereo": scene.stereo, **values}
     return Look(**settings)
 
 

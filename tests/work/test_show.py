@@ -12,6 +12,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.files.srgb import encode8
+from clfractal.files.tone import TONES, Tone, toned
 from clfractal.pictures.outputs import png_bytes
 from clfractal.pictures.tiled import Floats
 from clfractal.scene.stereo import APART, Stereo
@@ -43,6 +44,19 @@ CASES: dict[str, tuple[str, ...]] = {
     "odd size": ("image.width=77", "image.height=41"),
     "lighter": ("output.exposure=1.3",),
     "darker": ("output.exposure=-2.7",),
+    **{
+        f"{tone} {name}": (f"output.tone={tone}", *more)
+        for tone in ("reinhard", "agx")
+        for name, more in {
+            "lighter": ("output.exposure=2.3",),
+            "layout": (LAYOUT, "output.exposure=1.5"),
+            "anaglyph": (STEREO, "output.exposure=2.3"),
+            "swapped": (STEREO, "stereo.method=gray", "stereo.swap=true"),
+            "chessboard": (STEREO, "stereo.mode=anaglyph_chessboard", "output.exposure=1"),
+            "over under": (STEREO, "stereo.mode=over_under"),
+            "stereo layout": (LAYOUT, STEREO, "output.exposure=1"),
+        }.items()
+    },
     "layout": (LAYOUT,),
     "stereo layout": (LAYOUT, STEREO),
     "squeezed layout": (LAYOUT, STEREO, "stereo.mode=over_under_half", "output.exposure=0.5"),
@@ -250,8 +264,11 @@ def test_pictures_that_enlarging_would_mix_are_not_reduced(mode: str, device: De
     assert not can_reduce(canvas, Arrangement.of(job), Look())
 
 
+@pytest.mark.parametrize("tone", TONES)
 @pytest.mark.parametrize("exposure", [0.0, 2.0])
-def test_a_transparent_background_shows_a_board(exposure: float, device: Device, shower: Shower) -> None:
+def test_a_transparent_background_shows_a_board(
+    exposure: float, tone: Tone, device: Device, shower: Shower
+) -> None:
     """Behind premultiplied colours, as bright at any exposure; where nothing shines through it changes nothing."""
     job = job_of(scene_of(), device)
     random = np.random.default_rng(5)
@@ -260,14 +277,17 @@ def test_a_transparent_background_shows_a_board(exposure: float, device: Device,
         "A": cover
     }
     canvas, arrangement = painted(job, device, [planes]), Arrangement.of(job)
-    found = shown(canvas, arrangement, Look(exposure, transparent=True), shower)
+    found = shown(canvas, arrangement, Look(exposure, transparent=True, tone=tone), shower)
     rows, columns = np.mgrid[:64, :96]
     behind = np.where((rows // 8 + columns // 8) % 2 == 1, 0.13, 0.10)
     shines = np.where(np.isnan(cover), 0, 1 - cover)
-    wanted = planes["R"] * 2.0**exposure + shines * behind
+    # The curve bends the colour itself, which is multiplied by its coverage afterwards.
+    bright = np.full((64, 96), 0.4 * 2.0**exposure, np.float32)
+    own = toned(bright, bright, bright, tone)[0] * np.where(cover > 0, cover, 0)
+    wanted = own + shines * behind
     encoded = encode8(np.stack([wanted.astype(np.float32)] * 3, axis=-1))
     assert np.abs(found.astype(int) - encoded).max() <= 1
-    opaque = shown(canvas, arrangement, Look(exposure), shower)
+    opaque = shown(canvas, arrangement, Look(exposure, tone=tone), shower)
     np.testing.assert_array_equal(found[~(cover < 1)], opaque[~(cover < 1)])
 
 

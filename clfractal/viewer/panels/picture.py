@@ -1,4 +1,4 @@
-"""The picture itself: exposure, size of files, what they hold."""
+"""The picture itself: exposure and tone, size of files, what they hold."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ def summary(ui: Ui) -> str:
 def draw(ui: Ui) -> None:
     """Draws the panel."""
     w.field(ui, "output.exposure", unit=" stops")
+    w.field(ui, "output.tone", segmented=True, words={"agx": "AgX"})
     w.group(ui, "Files")
     w.fields(ui, "image", ("width", "height"), width={"unit": " px"}, height={"unit": " px"})
     w.field(ui, "output.png_bits", segmented=True)
