@@ -104,7 +104,7 @@ def make_picture(path: Path) -> None:
     film = render(beside(scene), channels=["R", "G", "B", "A"])
     linear = np.stack([film["R"], film["G"], film["B"]], axis=-1)
     # What is brighter than the screen can show is cut before it is averaged, as in the full picture.
-    linear = np.clip(linear * np.float32(2.0**scene.output.exposure), 0, 1)
+    linear = np.clip(linear * np.float32(2.0**scene.output.stops), 0, 1)
     coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
     shown = picture(reduced(linear, WIDTH), reduced(coverage, WIDTH))
     content, quality = small_enough(shown)

@@ -184,7 +184,7 @@ def make_pictures() -> None:
         scene = figure(normal, SIZES[-1])
         film = render(scene, channels=["R", "G", "B"], region=CROP)
         target = DOCS / "pictures" / f"normals_{normal}.png"
-        Image.fromarray(film.to_rgb8(scene.output.exposure)).save(target, optimize=True)
+        Image.fromarray(film.to_rgb8(scene.output.stops)).save(target, optimize=True)
         print(target)
 
 

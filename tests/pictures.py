@@ -72,11 +72,11 @@ def small_picture(path: Path) -> Picture:
     """What a screen would show of `small_films`: sRGB, shape (HEIGHT, WIDTH, 3); twice as wide for two eyes apart."""
     scene, films = small_scene(path), small_films(path)
     if scene.stereo is None:
-        return films[0].to_rgb8(scene.output.exposure)
+        return films[0].to_rgb8(scene.output.stops)
     apart = scene.stereo.mode in APART
     stereo = scene.stereo.model_copy(update={"mode": "split"}) if apart else scene.stereo
     left, right = films
-    return Composed(stereo, (WIDTH, HEIGHT), left, right).to_film().to_rgb8(scene.output.exposure)
+    return Composed(stereo, (WIDTH, HEIGHT), left, right).to_film().to_rgb8(scene.output.stops)
 
 
 def golden_path(path: Path) -> Path:

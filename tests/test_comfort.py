@@ -15,17 +15,16 @@ from clfractal.optics.view import scene_view, seen_by
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName, Stereo
-from clfractal.work import comfort
+from clfractal.work import look as look_module
 from clfractal.work.comfort import (
     Comfort,
-    Look,
     comfort_of,
     comfort_of_depth,
     fitted,
     measured,
-    points_of_depth,
 )
 from clfractal.work.job import Job
+from clfractal.work.look import Look, points_of_depth
 from clfractal.work.run import run
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, scene_of, shoot
 from tests.shell import SCENE
@@ -95,11 +94,11 @@ class TestMeasured:
             looks.append((*view.size, view.plan.samples, view.plan.channels))
             return run(job, *arguments, **named)
 
-        monkeypatch.setattr(comfort, "run", watched)
+        monkeypatch.setattr(look_module, "run", watched)
         large = seen("ball", (16000, 4000))
         large = large.model_copy(update={"renderer": large.renderer.model_copy(update={"samples": 64})})
         found, small = measured(large, look), measured(seen("ball", (320, 80)), look)
-        assert looks == [(320, 80, 1, ("Z",))] * 4  # of either eye
+        assert looks == [(320, 80, 1, ("R", "G", "B", "A", "Z"))] * 4  # of either eye
         assert found == small
 
     def test_all_views_of_a_layout(self, look: Look) -> None:

@@ -133,7 +133,7 @@ def test_it_shows_something_well_lit(path: Path) -> None:
     with_planes = bool(scene.cut_planes) or scene.layout is not None
     filled = with_planes or path.stem in FILLED
     assert 0.03 < hit.mean() < (1.01 if filled else 1 if is_plane else 0.97)
-    picture = film.to_rgb8(scene.output.exposure)
+    picture = film.to_rgb8(scene.output.stops)
     assert (picture == 255).all(axis=-1).mean() < 0.02
     brightness = picture.max(axis=-1)[hit]
     assert np.median(brightness) > 40

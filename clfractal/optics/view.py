@@ -50,6 +50,26 @@ class View:
         """Height of a pixel on the plane, scene units."""
         return self.height / image_height
 
+    def points_at(
+        self, x: npt.ArrayLike, y: npt.ArrayLike, size: tuple[int, int], depth: npt.ArrayLike
+    ) -> Vector:
+        """The points that places of the picture show, scene units, shape (n, 3).
+
+        Args:
+            x, y: the places, shape (n,), pixels from the top left corner; a pixel's middle is half a pixel farther.
+            size: width and height of the whole picture, pixels.
+            depth: of the points along the view axis (channel Z), shape (n,), finite, scene units.
+        """
+        across = (np.asarray(x, float) / size[0] - 0.5) * self.width
+        rise = (0.5 - np.asarray(y, float) / size[1]) * self.height
+        on_plane = self.center + across[:, None] * self.side + rise[:, None] * self.up
+        along = np.asarray(depth, float)
+        if self.eye is None:
+            behind = along - (on_plane - self.origin) @ self.axis
+            return on_plane + behind[:, None] * self.axis
+        rays = on_plane - self.eye
+        return self.eye + rays * (along / (rays @ self.axis))[:, None]
+
     def world_to_camera(self) -> Vector:
         """4 x 4, for row vectors, as OpenEXR's standard attribute is defined: left-handed camera space with the origin
         at the camera, x to the picture's right, y up, z along the view direction (so z is depth)."""

@@ -205,6 +205,8 @@ def _word(details: ErrorDetails) -> Problem:
     allowed = details["ctx"]["expected"].replace("'", "")
     if place.models:
         allowed += f", a colour, or a mapping with {' and '.join(place.keys())}"
+    elif float in place.types:
+        allowed = f"a number or {allowed}"
     guess = _nearest_word(details["input"], allowed)
     return Problem(tuple(place.path), f"must be {allowed}, got {shown_value(details['input'])}{guess}")
 

@@ -82,6 +82,14 @@ class PerspectiveCamera(CameraBase):
     ) = Field(
         None, description="distance that is sharp, along the view axis, scene units; null: the target's"
     )
+    focus: Literal["auto"] | None = Field(
+        None, description="auto: what lies at focus_on is sharp; the distance is measured first"
+    )
+    focus_on: Annotated[tuple[Fraction, Fraction], Field(strict=False)] | None = Field(
+        None,
+        description="place in the picture that is to be sharp, as parts of its width and height from the top left;"
+        " null: the middle, with `focus: auto`",
+    )
     sensor_height: Annotated[float, Field(strict=True, gt=0, le=1e6)] = Field(
         0.024,
         description="height of the sensor behind the lens, scene units; by default 24 mm if they are metres",
@@ -94,6 +102,20 @@ class PerspectiveCamera(CameraBase):
                 f"must be in front of the camera: above 0, got {self.focus_distance:g}", "focus_distance"
             )
         return self
+
+    @model_validator(mode="after")
+    def _focus_once(self) -> Self:
+        if self.measured_focus is not None and self.focus_distance is not None:
+            key = "focus_on" if self.focus_on is not None else "focus"
+            raise problem("measures the distance that is sharp; remove it, or focus_distance", key)
+        return self
+
+    @property
+    def measured_focus(self) -> tuple[float, float] | None:
+        """The place in the picture whose distance is to be measured, as of `focus_on`; None if none is."""
+        if self.focus is None:
+            return self.focus_on
+        return self.focus_on if self.focus_on is not None else (0.5, 0.5)
 
     @property
     def used_focus_distance(self) -> float:
@@ -159,11 +181,19 @@ ChannelName = Annotated[
 ]
 
 
+Stops = Annotated[float, Field(ge=-100, le=100)]
+Exposure = Annotated[
+    Annotated[Stops, Tag("stops")] | Annotated[Literal["auto"], Tag("auto")],
+    Field(discriminator=chosen_by_word("auto", "stops")),
+]
+
+
 class Output(Section):
     """What the picture files contain."""
 
-    exposure: float = Field(
-        0.0, ge=-100, le=100, description="stops: PNG colours are multiplied by 2**exposure"
+    exposure: Exposure = Field(
+        0.0,
+        description="stops: PNG colours are multiplied by 2**exposure; auto: chosen by a quick look at the scene",
     )
     tone: Tone = Field(
         "linear", description="the curve from light to what a PNG shows: linear, reinhard or agx"
@@ -183,6 +213,11 @@ class Output(Section):
             if channel in self.channels[:index]:
                 raise problem(f"channel {channel!r} is given twice", f"channels.{index}")
         return self
+
+    @property
+    def stops(self) -> float:
+        """The exposure as a number; 0 as long as `auto` has not been measured."""
+        return 0.0 if isinstance(self.exposure, str) else self.exposure
 
     @property
     def half_channels(self) -> frozenset[str]:

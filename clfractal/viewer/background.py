@@ -19,9 +19,11 @@ from clfractal.viewer.fitting import Cancellable
 from clfractal.work.films import JobFilms
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
+from clfractal.work.look import Look
 from clfractal.work.prepare import prepare
 from clfractal.work.run import Progress, run
 from clfractal.work.save import save_job
+from clfractal.work.settle import settled
 
 Pixels = npt.NDArray[np.uint8]
 Tell = Callable[[str], None]
@@ -48,11 +50,8 @@ class Task(Protocol):
 
 def prepared(scene: Scene, executor: LocalExecutor, token: CancelToken, tell: Tell, *, colors: bool) -> Job:
     """The job of a scene's picture; `colors`: with the colour channels alone."""
-    from clfractal.work.comfort import Look, fitted
-
     channels = ("R", "G", "B", "A") if colors else None
-    if scene.stereo is not None and scene.stereo.fit is not None:
-        scene = fitted(scene, Look(executor.device, Cancellable(executor, token)))
+    scene = settled(scene, Look(executor.device, Cancellable(executor, token)))
     return prepare(scene, executor.device, channels=channels, on_start=tell)
 
 

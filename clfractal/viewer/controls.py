@@ -7,12 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from clfractal.pictures.compose import eye_at
 from clfractal.scene.checks import used_bounds
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import handles, navigation, plane_moves, zoom_box
 from clfractal.viewer.aim import Aim
 from clfractal.viewer.motion import Motion
-from clfractal.viewer.picking import in_eye
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
 
@@ -268,8 +268,8 @@ class Controls:
         image = self.studio.shown_scene.image
         width, height = image.width, image.height
         stereo = self.studio.screens(self.studio.scene.stereo)
-        _, *first = in_eye(stereo, (width, height), *start)
-        _, *second = in_eye(stereo, (width, height), *place)
+        _, *first = eye_at(stereo, (width, height), *start)
+        _, *second = eye_at(stereo, (width, height), *place)
         left, right = sorted((min(max(first[0], 0), width), min(max(second[0], 0), width)))
         top, bottom = sorted((min(max(first[1], 0), height), min(max(second[1], 0), height)))
         region = (int(left), int(top), int(right) - int(left), int(bottom) - int(top))

@@ -1,4 +1,4 @@
-"""`stereo.fit` in a window: the depth is fitted when the picture rests, and moves along with the viewer until then."""
+"""What is measured before a picture, in a window: when it rests; until then what was measured last goes along."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from clfractal.device.select import Device
 from clfractal.errors import ClfractalError, SceneError
 from clfractal.optics.view import camera_view
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Stereo
-from clfractal.work.comfort import Look, fitted
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
+from clfractal.work.look import Look
 from clfractal.work.run import Executor, Result, WorkItem
+from clfractal.work.settle import is_settled, settled
 
 
 class Cancellable:
@@ -32,38 +34,55 @@ class Cancellable:
 
 
 class Fits:
-    """Fits stereo scenes, and remembers the last fit."""
+    """Settles scenes (see `settle.settled`), and remembers the last one."""
 
     def __init__(self, device: Device, executor: LocalExecutor) -> None:
         self._device, self._executor = device, executor
         self._last: tuple[Scene, Scene] | None = None
 
     def fitted(self, scene: Scene, moving: bool, token: CancelToken) -> Scene:
-        """The scene with `stereo.fit` carried out; as it is if it asks for none, or if there is nothing to fit to.
+        """The scene with all that is to be measured; as it is if that is nothing. Where nothing is in sight, defaults.
 
-        While it moves the last fit is used, at the same distance from the camera.
+        While it moves the last measures are used, at the same distances from the camera.
 
         Raises:
             DeviceError, KernelBuildError: as of a render.
             Stopped: the token was set.
         """
-        stereo = scene.stereo
-        if stereo is None or stereo.fit is None:
+        if is_settled(scene):
             return scene
         if self._last is not None and self._last[0] == scene:
             return self._last[1]
         if moving and self._last is not None:
             return _carried(self._last[1], scene)
+        look = Look(self._device, Cancellable(self._executor, token))
         try:
-            found = fitted(scene, Look(self._device, Cancellable(self._executor, token)))
+            found = settled(scene, look)
         except SceneError:
             # Nothing is in sight, for example: the plane stays where the camera's target is.
-            return scene.model_copy(update={"stereo": stereo.model_copy(update={"fit": None})})
+            assert scene.stereo is not None
+            unfitted = scene.stereo.model_copy(update={"fit": None})
+            return settled(scene.model_copy(update={"stereo": unfitted}), look)
         self._last = (scene, found)
         return found
 
 
 def _carried(before: Scene, scene: Scene) -> Scene:
+    """A scene with the measures of the settled one before: exposure, what is sharp, and how far the screen is."""
+    output = scene.output
+    if isinstance(output.exposure, str):
+        output = output.model_copy(update={"exposure": before.output.stops})
+    camera, old = scene.camera, before.camera
+    if isinstance(camera, PerspectiveCamera) and camera.measured_focus is not None:
+        distance = old.focus_distance if isinstance(old, PerspectiveCamera) else None
+        camera = camera.model_copy(update={"focus": None, "focus_on": None, "focus_distance": distance})
+    scene = scene.model_copy(update={"output": output, "camera": camera})
+    if scene.stereo is None or scene.stereo.fit is None or before.stereo is None:
+        return scene
+    return _carried_screen(before, scene)
+
+
+def _carried_screen(before: Scene, scene: Scene) -> Scene:
     """A scene with the screen as far from its camera as the fitted one before has it."""
     old, stereo = before.stereo, scene.stereo
     assert old is not None

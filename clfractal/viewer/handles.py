@@ -127,7 +127,7 @@ def focus_at(camera: AnyCamera, depth: float) -> AnyCamera:
     """
     if not isinstance(camera, PerspectiveCamera) or not 0 < depth <= LARGEST:
         return camera
-    return camera.model_copy(update={"focus_distance": float(depth)})
+    return camera.model_copy(update={"focus": None, "focus_on": None, "focus_distance": float(depth)})
 
 
 def _source(light: DirectionalLight) -> Floats:

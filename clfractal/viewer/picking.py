@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from clfractal.optics.view import View
-from clfractal.pictures.compose import BELOW, BESIDE
+from clfractal.pictures.compose import eye_at
 from clfractal.renderers.plan import PlannedView
-from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer.display import Shown
 
 
@@ -35,28 +34,6 @@ class Pick:
     point: tuple[float, float, float] | None
 
 
-def in_eye(stereo: Stereo | None, image: tuple[int, int], x: float, y: float) -> tuple[int, float, float]:
-    """Which eye's picture (0 or 1) is shown at a place of the window, and the place in that picture, pixels."""
-    if stereo is None:
-        return 0, x, y
-    width, height = image
-    beside = stereo.mode in BESIDE or stereo.mode in APART
-    second = False
-    if beside:
-        wide = width // 2 if stereo.mode == "split_half" else width
-        second = x >= wide
-        x -= wide * second
-    elif stereo.mode in BELOW:
-        high = height // 2 if stereo.mode == "over_under_half" else height
-        second = y >= high
-        y -= high * second
-    elif stereo.mode == "right":
-        return 1, x, y
-    elif stereo.mode == "left":
-        return 0, x, y
-    return int(second != stereo.swap), x, y
-
-
 def picked(shown: Shown, x: float, y: float) -> Pick | None:
     """What is shown at a place of the window; None outside the picture.
 
@@ -65,7 +42,7 @@ def picked(shown: Shown, x: float, y: float) -> Pick | None:
     """
     arrangement = shown.frame.arrangement
     stereo = arrangement.fitting(shown.look).stereo
-    eye, across, down = in_eye(stereo, arrangement.image, x, y)
+    eye, across, down = eye_at(stereo, arrangement.image, x, y)
     numbers = range(len(arrangement.places))
     for number in reversed(numbers):
         place = arrangement.places[number]
@@ -82,20 +59,9 @@ def picked(shown: Shown, x: float, y: float) -> Pick | None:
             depth = float(depths[at[1], at[0]])
         camera = view.camera
         image = (view.scene.image.width, view.scene.image.height)
-        return Pick(view, camera, column, row, image, depth, _point(camera, column, row, image, depth))
+        point = None
+        if np.isfinite(depth):
+            near = camera.points_at([column], [row], image, [depth])[0]
+            point = (float(near[0]), float(near[1]), float(near[2]))
+        return Pick(view, camera, column, row, image, depth, point)
     return None
-
-
-def _point(
-    view: View, x: float, y: float, size: tuple[int, int], depth: float
-) -> tuple[float, float, float] | None:
-    if not np.isfinite(depth):
-        return None
-    across, rise = (x / size[0] - 0.5) * view.width, (0.5 - y / size[1]) * view.height
-    on_plane = view.center + across * view.side + rise * view.up
-    if view.eye is None:
-        found = on_plane + (depth - float((on_plane - view.origin) @ view.axis)) * view.axis
-    else:
-        ray = on_plane - view.eye
-        found = view.eye + ray * (depth / float(ray @ view.axis))
-    return float(found[0]), float(found[1]), float(found[2])

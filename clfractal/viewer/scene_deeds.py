@@ -342,7 +342,7 @@ class SceneDeeds:
     # Common
 
     def _expose(self, stops: float) -> None:
-        self._edit({"output.exposure": round(self.studio.scene.output.exposure + stops, 3)})
+        self._edit({"output.exposure": round(self.studio.exposure + stops, 3)})
 
     def _reset_exposure(self) -> None:
         self._edit({"output.exposure": self.studio.saved.output.exposure})

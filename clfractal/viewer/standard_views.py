@@ -27,7 +27,7 @@ SIDES: dict[Side, tuple[tuple[float, float, float], tuple[float, float, float]]]
 FILLED = 0.9
 # An orthographic camera stands so many radii before the middle of what it frames.
 _CLEAR = 2.0
-_LENS = ("f_number", "focus_distance", "sensor_height")
+_LENS = ("f_number", "focus_distance", "focus", "focus_on", "sensor_height")
 _LEAST_HEIGHT, _LEAST_FOV, _MOST_FOV = 1e-12, 1e-6, 179.9
 
 

@@ -172,12 +172,20 @@ class Studio:
         """How the picture is shown at the moment."""
         scene = self.scene
         return Look(
-            scene.output.exposure,
+            self.exposure,
             self.screens(scene.stereo),
             self.smooth,
             transparent=scene.background == "transparent",
             tone=scene.output.tone,
         )
+
+    @property
+    def exposure(self) -> float:
+        """The exposure in use, stops: the scene's, or what was measured for the newest picture."""
+        output, frame = self.scene.output, self.frame
+        if isinstance(output.exposure, str) and frame is not None:
+            return frame.job.scene.output.stops
+        return output.stops
 
     @property
     def shown_scene(self) -> Scene:

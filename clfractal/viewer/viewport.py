@@ -44,7 +44,9 @@ def image_of(stereo: Stereo | None, viewport: tuple[int, int]) -> tuple[int, int
 
 def render_key(scene: Scene) -> Scene:
     """The scene without what only concerns showing and saving: pictures of scenes with equal keys have the same rays."""
-    update: dict[str, object] = {"output": Output.model_validate({})}
+    # (An exposure that has to be measured is measured with the picture.)
+    exposure = scene.output.exposure if isinstance(scene.output.exposure, str) else 0.0
+    update: dict[str, object] = {"output": Output.model_validate({"exposure": exposure})}
     if "bookmarks" in Scene.model_fields:
         update["bookmarks"] = {}
     if scene.stereo is not None:

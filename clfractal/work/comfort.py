@@ -8,23 +8,20 @@ review", Journal of Imaging Science and Technology 53, 2009).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.select import Device
 from clfractal.errors import SceneError, Where
 from clfractal.optics.stereo import degrees, eye_distance, eye_views, parallax
 from clfractal.optics.view import View, scene_view, seen_by, shown_views
-from clfractal.pictures.film import Film
 from clfractal.pictures.tiled import Picture
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo, StereoPlane
 from clfractal.work.job import Job
-from clfractal.work.prepare import prepare
-from clfractal.work.run import Executor, run
+from clfractal.work.look import Look, points_of_depth
 
 Floats = npt.NDArray[np.float64]
 Ends = tuple[float, float]
@@ -35,8 +32,6 @@ SIDES: tuple[EyeName, ...] = ("left", "right")
 LIMIT_DEGREES = 1.0
 """Parallax past which the viewer is warned."""
 
-# Largest width of the quick look at the depth, pixels.
-_QUICK_SIDE = 320
 # For pictures larger than this, depth is measured by a quick look instead of reading all pixels again.
 _MOST_PIXELS = 1 << 24
 # The quick look misses the finest spikes, so depth is fitted to this part of the budget.
@@ -123,32 +118,6 @@ def comfort_of_depth(
     return comfort_of(scene, view.origin + np.array([[nearest], [farthest]]) * view.axis, eye)
 
 
-class Look:
-    """Quick looks at the depth of a scene, by an executor on a device."""
-
-    def __init__(self, device: Device, executor: Executor) -> None:
-        self.device, self.executor = device, executor
-
-    def points(self, scene: Scene, eye: Eye = MIDDLE) -> Floats:
-        """What an eye sees of a scene with one view, as points: shape (n, 3), scene units.
-
-        Raises:
-            DeviceError, KernelBuildError: as of a render.
-        """
-        scale = min(1.0, _QUICK_SIDE / max(scene.image.width, scene.image.height))
-        sides = {
-            "width": max(round(scene.image.width * scale), 1),
-            "height": max(round(scene.image.height * scale), 1),
-        }
-        small = scene.model_copy(update={"image": sides})
-        # A job of one view, for any eye.
-        alone = prepare(_with(small, mode="left", fit=None), self.device, samples=1, channels=("Z",))
-        view = replace(alone.views[0], scene=small, eye=eye)
-        film = Film(view.plan.channels, view.size)
-        run(replace(alone, views=(view,)), [film], self.executor)
-        return points_of_depth(view.camera, film["Z"], film.display)
-
-
 def measured(scene: Scene, look: Look) -> Comfort | None:
     """The range of parallax in a stereo scene's picture, by a quick look from each eye; None if the picture is empty.
 
@@ -205,28 +174,6 @@ def _has_depth(job: Job) -> bool:
         and scene.renderer.type != "cut_plane"
         and scene.image.width * scene.image.height <= _MOST_PIXELS
     )
-
-
-def points_of_depth(
-    view: View, depth: npt.NDArray[np.float32], size: tuple[int, int], origin: tuple[int, int] = (0, 0)
-) -> Floats:
-    """The points that a picture's pixels show, shape (n, 3), scene units.
-
-    Args:
-        depth: channel Z of some of its pixels, shape (rows, columns), scene units.
-        size: width and height of the whole picture, pixels.
-        origin: x and y of the first of them.
-    """
-    assert view.eye is not None
-    width, height = size
-    # (An eye inside the solid sees points at its own place.)
-    rows, columns = np.nonzero(np.isfinite(depth) & (depth > 0))
-    across = ((origin[0] + columns + 0.5) / width - 0.5) * view.width
-    rise = (0.5 - (origin[1] + rows + 0.5) / height) * view.height
-    rays = view.center + across[:, None] * view.side + rise[:, None] * view.up - view.eye
-    along = depth[rows, columns].astype(np.float64) / (rays @ view.axis)
-    points: Floats = view.eye + rays * along[:, None]
-    return points
 
 
 def fitted(scene: Scene, look: Look) -> Scene:

@@ -18,13 +18,14 @@ from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.pictures.film import Film
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.comfort import Look, fitted
 from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
+from clfractal.work.look import Look
 from clfractal.work.prepare import prepare
 from clfractal.work.refine import Refinement, refined
 from clfractal.work.run import ProgressCallback, run
+from clfractal.work.settle import is_settled, settled
 
 SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
@@ -80,8 +81,20 @@ class Engine:
 
     @property
     def look(self) -> Look:
-        """Quick looks at a scene's depth, on the engine's device."""
+        """Quick looks at a scene, on the engine's device."""
         return Look(self.device, self._looking)
+
+    def settled(self, scene: SceneLike) -> Scene:
+        """The scene with numbers in the place of `stereo.fit`, `camera.focus`, `focus_on` and `output.exposure: auto`.
+
+        Each picture of a scene measures them anew; frames of a film that are made from a settled scene have the same ones.
+
+        Raises:
+            SceneError, FormulaError: the scene is wrong, or there is nothing to fit to.
+            DeviceError, KernelBuildError: as of a render.
+        """
+        with self._alone():
+            return settled(scene if isinstance(scene, Scene) else load_scene(scene), self.look)
 
     def prepare(
         self,
@@ -92,11 +105,11 @@ class Engine:
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
     ) -> Job:
-        """The job of a scene's picture: see `prepare.prepare`; a stereo scene with `fit` is fitted first.
+        """The job of a scene's picture: see `prepare.prepare`; what it leaves to be measured is measured first.
 
         Raises:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
-            DeviceError, KernelBuildError: the quick look that `stereo.fit` takes failed.
+            DeviceError, KernelBuildError: the quick look that this takes failed.
         """
         loaded = scene if isinstance(scene, Scene) else load_scene(scene)
         decide = partial(
@@ -110,9 +123,7 @@ class Engine:
         )
         # Made first, so that mistakes are reported before anything is rendered.
         job = decide(loaded)
-        if loaded.stereo is None or loaded.stereo.fit is None:
-            return job
-        return decide(fitted(loaded, self.look))
+        return job if is_settled(loaded) else decide(settled(loaded, self.look))
 
     def render(
         self,

@@ -157,7 +157,7 @@ class Job:
             "device": self.device.name,
             "platform": f"{self.device.platform}, {self.device.version}",
             "precision": self.precision,
-            "exposure": scene.output.exposure,
+            "exposure": scene.output.stops,
             "tone": scene.output.tone,
             "transparent": scene.background == "transparent",
             "worldToCamera": camera.world_to_camera(),

@@ -35,7 +35,7 @@ def prepare(
 ) -> Job:
     """The job of a scene's picture; arguments that are None take the value of the scene, or of each of its views.
 
-    This does not apply `stereo.fit`; see `comfort.fitted`.
+    This measures nothing (`stereo.fit` and the like); see `settle.settled`.
 
     Args:
         region: x, y, width, height of the part of the finished picture to make, pixels.

@@ -24,7 +24,7 @@ def test_a_frame_arrives_as_files_have_it(overrides: tuple[str, ...], device: De
     scene = scene_of(BULB, *overrides)
     with session_on(device) as watch:
         frame = watch.finished(scene)
-        shown, pixels = shown_frame(device, watch, frame, Look(scene.output.exposure, scene.stereo))
+        shown, pixels = shown_frame(device, watch, frame, Look(scene.output.stops, scene.stereo))
         wanted = np.asarray(Image.open(io.BytesIO(png_bytes(films_of(frame).picture()))).convert("RGB"))
         depths = [frame.canvas.read(device.transfers, n)["Z"] for n in range(len(frame.views))]
     np.testing.assert_array_equal(pixels[..., :3], wanted)

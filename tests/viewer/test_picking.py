@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.pictures.compose import eye_at
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.aim import aimed
 from clfractal.viewer.display import Shown
 from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.picking import in_eye, picked
+from clfractal.viewer.picking import picked
 from clfractal.viewer.pointer import project
 from clfractal.viewer.viewport import image_of, render_key
 from clfractal.work.show import Look
@@ -96,11 +97,11 @@ def shown_pick(shown: Shown, x: float, y: float) -> Any:
 @pytest.mark.parametrize("swap", [False, True])
 def test_halves_belong_to_the_eyes_that_are_shown_there(swap: bool) -> None:
     stereo = Stereo.model_validate({"mode": "split", "swap": swap})
-    assert in_eye(stereo, (50, 40), 10, 20) == (int(swap), 10, 20)
-    assert in_eye(stereo, (50, 40), 60, 20) == (int(not swap), 10, 20)
+    assert eye_at(stereo, (50, 40), 10, 20) == (int(swap), 10, 20)
+    assert eye_at(stereo, (50, 40), 60, 20) == (int(not swap), 10, 20)
     below = Stereo.model_validate({"mode": "over_under_half", "swap": swap})
-    assert in_eye(below, (50, 40), 10, 19) == (int(swap), 10, 19)
-    assert in_eye(below, (50, 40), 10, 20) == (int(not swap), 10, 0)
+    assert eye_at(below, (50, 40), 10, 19) == (int(swap), 10, 19)
+    assert eye_at(below, (50, 40), 10, 20) == (int(not swap), 10, 0)
 
 
 def test_nothing_is_hit_beside_the_ball_and_nothing_outside(device: Device) -> None:

@@ -200,11 +200,11 @@ def test_undo_of_the_scene_leaves_the_camera(window: Window) -> None:
     window.keys("equal", "equal")  # lighter, twice
     window.still()
     lighter = window.scene()
-    assert lighter.output.exposure == moved.output.exposure + 0.5
+    assert lighter.output.stops == moved.output.stops + 0.5
     assert lighter.camera == moved.camera
     window.keys("ctrl+z")
     window.still()
-    assert window.scene().output.exposure == moved.output.exposure + 0.25
+    assert window.scene().output.stops == moved.output.stops + 0.25
     window.keys("ctrl+z")
     window.still()
     assert window.scene() == moved

@@ -48,7 +48,7 @@ def job_of(scene: Scene, device: Device) -> Job:
 def look_of(scene: Scene, **values: Any) -> Look:
     """How a scene wants to be shown."""
     output = scene.output
-    settings = {"exposure": output.exposure, "tone": output.tone, "stereo": scene.stereo, **values}
+    settings = {"exposure": output.stops, "tone": output.tone, "stereo": scene.stereo, **values}
     return Look(**settings)
 
 

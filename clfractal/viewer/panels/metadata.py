@@ -34,6 +34,7 @@ class Meta:
         description: the schema's.
         usual: (low, high) in which it usually lies, for a slider; None: no usual range.
         log: whether a slider is divided by magnitudes.
+        alternative: a word that a number's place may have, such as `auto`; empty if there is none.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Meta:
     description: str
     usual: tuple[float, float] | None
     log: bool
+    alternative: str = ""
 
 
 # Where values usually lie, for those whose bounds are too wide for a slider.
@@ -182,6 +184,9 @@ def _child(holder: Any, name: str) -> Any:
 def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
     optional, options = _options(field.annotation)
     bounds = _bounds(field.metadata)
+    alternative = _alternative(options)
+    if alternative:
+        options = [option for option in options if not _words(option)]
     if len(options) == 1:
         kind, size, choices, inner = _kind(options[0])
         bounds = {**inner, **bounds}
@@ -209,7 +214,21 @@ def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
         field.description or "",
         usual,
         log,
+        alternative,
     )
+
+
+def _alternative(options: list[Any]) -> str:
+    """The word that a type allows in the place of a number, or empty."""
+    words = [word for option in options for word in _words(option)]
+    others = [option for option in options if not _words(option)]
+    simple = len(others) == len(words) == 1 and _kind(others[0])[0] in ("number", "whole")
+    return str(words[0]) if simple else ""
+
+
+def _words(option: Any) -> tuple[Any, ...]:
+    bare = get_args(option)[0] if get_origin(option) is Annotated else option
+    return get_args(bare) if get_origin(bare) is Literal else ()
 
 
 def _usual(

@@ -14,7 +14,8 @@ def summary(ui: Ui) -> str:
 
 def draw(ui: Ui) -> None:
     """Draws the panel."""
-    w.field(ui, "output.exposure", unit=" stops")
+    measured = round(ui.studio.exposure, 2)
+    w.field(ui, "output.exposure", unit=" stops", start=measured, auto=f"automatic, {measured:+.2f}")
     w.field(ui, "output.tone", segmented=True, words={"agx": "AgX"})
     w.group(ui, "Files")
     w.fields(ui, "image", ("width", "height"), width={"unit": " px"}, height={"unit": " px"})

@@ -152,8 +152,8 @@ def field(
     Args:
         label: in front of it; else its name.
         unit, factor, step, usual: see `Scale`, in the place of what the schema tells.
-        start: for one that may be null, its first value when it is set.
-        auto: shown where it is null.
+        start: for one that may be null (or a word), its first value when it is set.
+        auto: shown where it is null (or that word).
         segmented: choices side by side instead of in a list.
         words: other words for choices.
         keep: values at other paths that are set along with this one.
@@ -186,9 +186,10 @@ def field(
         "words": words or {},
         "keep": keep or {},
     }
-    if meta.optional:
-        width = _optional(ui, path, target, meta, width, start, auto)
-    if target.value is not None or not meta.optional:
+    given = target.value is not None and target.value != (meta.alternative or None)
+    if meta.optional or meta.alternative:
+        width = _optional(ui, path, meta, width, given, start, auto)
+    if given or not (meta.optional or meta.alternative):
         drawer(ui, path, target, meta, width, options)
     problem(ui, path)
     return ui.studio.scene is not before
@@ -260,11 +261,10 @@ def _set(ui: Ui, path: str, new: Any) -> None:
     ui.studio.edit({path: new})
 
 
-def _optional(ui: Ui, path: str, target: Target, meta: Meta, width: float, start: Any, auto: str) -> float:
-    """The switch of a value that may be null; the width that is left for the value."""
-    given = target.value is not None
+def _optional(ui: Ui, path: str, meta: Meta, width: float, given: bool, start: Any, auto: str) -> float:
+    """The switch of a value that may be null, or a word in its place; the width that is left for the value."""
     if toggle(f"{path}.given", given, "Set it by hand" if not given else f"Back to {auto}"):
-        ui.studio.edit({path: None if given else first_value(meta, start)})
+        ui.studio.edit({path: (meta.alternative or None) if given else first_value(meta, start)})
     imgui.same_line(0, 6)
     used = 28.0 + 6
     if not given:
