@@ -15,6 +15,7 @@ from clfractal.optics.view import scene_view, seen_by
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName, Stereo
+from clfractal.work import comfort
 from clfractal.work import look as look_module
 from clfractal.work.comfort import (
     Comfort,

@@ -83,7 +83,7 @@ def test_every_field_of_every_section_is_understood() -> None:
             if meta.kind == "choice":
                 assert meta.choices
             if meta.kind in ("vector", "color"):
-                assert meta.size in (3, 4)
+                assert meta.size in (2, 3, 4)
             if meta.usual is not None:
                 low, high = meta.usual
                 assert low < high

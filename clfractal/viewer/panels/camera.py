@@ -68,8 +68,13 @@ def _lens(ui: Ui, camera: PerspectiveCamera) -> None:
         ui,
         "camera.focus_distance",
         start=camera.used_focus_distance,
-        auto=f"target, {camera.used_focus_distance:.4g}",
+        auto="measured" if camera.measured_focus else f"target, {camera.used_focus_distance:.4g}",
+        keep={"camera.focus": None, "camera.focus_on": None},
     )
+    if camera.focus_distance is None:
+        w.field(ui, "camera.focus", auto="off")
+        if camera.measured_focus is not None:
+            w.field(ui, "camera.focus_on", start=camera.measured_focus, auto="the middle")
     w.field(ui, "camera.sensor_height")
     if not w.filtering(ui):
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)

@@ -188,7 +188,7 @@ def field(
     }
     given = target.value is not None and target.value != (meta.alternative or None)
     if meta.optional or meta.alternative:
-        width = _optional(ui, path, meta, width, given, start, auto)
+        width = _optional(ui, path, meta, width, given, start, auto, keep or {})
     if given or not (meta.optional or meta.alternative):
         drawer(ui, path, target, meta, width, options)
     problem(ui, path)
@@ -261,10 +261,20 @@ def _set(ui: Ui, path: str, new: Any) -> None:
     ui.studio.edit({path: new})
 
 
-def _optional(ui: Ui, path: str, meta: Meta, width: float, given: bool, start: Any, auto: str) -> float:
+def _optional(
+    ui: Ui,
+    path: str,
+    meta: Meta,
+    width: float,
+    given: bool,
+    start: Any,
+    auto: str,
+    keep: Mapping[str, Any],
+) -> float:
     """The switch of a value that may be null, or a word in its place; the width that is left for the value."""
     if toggle(f"{path}.given", given, "Set it by hand" if not given else f"Back to {auto}"):
-        ui.studio.edit({path: (meta.alternative or None) if given else first_value(meta, start)})
+        empty: dict[str, Any] = {path: meta.alternative or None}
+        ui.studio.edit(empty if given else {**keep, path: first_value(meta, start)})
     imgui.same_line(0, 6)
     used = 28.0 + 6
     if not given:
@@ -282,7 +292,7 @@ def first_value(meta: Meta, start: Any = None) -> Any:
     if meta.kind == "choice":
         return meta.choices[0]
     if meta.kind == "vector":
-        return [0.0, 0.0, 1.0]
+        return [0.0, 0.0, 1.0] if meta.size == 3 else [0.5] * meta.size
     if meta.kind == "color":
         return [1.0, 1.0, 1.0]
     if meta.kind == "text":
