@@ -43,7 +43,7 @@ class JobFilms:
     def development(self) -> Development:
         """How the scene wants its picture shown; without the work of making a header."""
         scene = self.job.scene
-        return Development(scene.output.exposure, scene.output.tone, scene.background == "transparent")
+        return Development(scene.output.stops, scene.output.tone, scene.background == "transparent")
 
     def picture(self, took: Took | None = None) -> Film:
         """The picture, as far as it is finished. Not for a pair whose pictures stay apart.
