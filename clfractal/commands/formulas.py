@@ -1,38 +1,61 @@
-"""`clfractal formulas`: the library, as text."""
+"""`clfractal formulas`: the library and the formulas of one's own, as text."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from clfractal.errors import ClfractalError
 from clfractal.formulas import catalog
 from clfractal.formulas.language import Formula, Parameter
+from clfractal.formulas.own import own_files
 
 _WIDTH = 100
 
 
 def list_formulas() -> str:
-    """A line for each formula: name and title."""
-    names = catalog.names()
-    column = max(map(len, names)) + 2
-    return "\n".join(f"{name:{column}}{_line(catalog.description(name).get('title', ''))}" for name in names)
+    """A line for each formula: name and title; those of one's own after the library's, with their files.
+
+    Raises:
+        FileError: a folder of CLFRACTAL_FORMULAS is not there.
+    """
+    names, own = catalog.names(), own_files(Path())
+    column = max(map(len, (*names, *own))) + 2
+    lines = [f"{name:{column}}{_line(catalog.description(name).get('title', ''))}" for name in names]
+    for path in dict.fromkeys(path.parent for path in own.values()):
+        lines.append(f"\nin {path}:")
+        lines += [f"{name:{column}}{_title(name)}" for name, file in own.items() if file.parent == path]
+    return "\n".join(lines)
+
+
+def _title(name: str) -> str:
+    """The title of a formula of one's own, or what is wrong with it."""
+    try:
+        return _line(catalog.described(name, Path())[1].title)
+    except ClfractalError as error:
+        return _line(error)
 
 
 def tell_formula(name: str) -> str:
     """Title, reference, description and parameters of one formula.
 
     Raises:
-        FormulaError: there is none of that name.
+        FormulaError: there is none of that name, or it is wrong.
+        FileError: it cannot be read.
     """
-    data = catalog.description(name)
-    parts = [f"{name}: {_line(data.get('title', ''))}", f"reference: {_line(data.get('reference', ''))}"]
+    data, chain = catalog.described(name, Path())
+    parts = [
+        f"{name}: {_line(data.get('title', name))}",
+        f"reference: {_line(data.get('reference', 'none'))}",
+    ]
     if data.get("description"):
         parts.append(textwrap.fill(_line(data["description"]), _WIDTH))
-    if catalog.is_chain(name):
+    if "chain" in data:
         parts.append("a chain, in turn:\n" + "\n".join(f"  {_link(link)}" for link in data["chain"]))
     else:
-        parts += _formula(catalog.load(name))
+        parts += _formula(chain.first.formula)
     return "\n\n".join(parts)
 
 
@@ -58,10 +81,11 @@ def _parameter(parameter: Parameter) -> str:
 
 
 def _link(link: Mapping[str, Any]) -> str:
-    name = link.get("name", "inline formula")
+    name = link.get("name") or link.get("file") or "inline formula"
     count = int(link.get("count", 1))
     settings = ", ".join(f"{key} {value:g}" for key, value in (link.get("parameters") or {}).items())
-    return f"{name} x {count}" + (f" ({settings})" if settings else "")
+    when = "".join(f", {key} {link[key]}" for key in ("start", "stop") if link.get(key) is not None)
+    return f"{name} x {count}{when}" + (f" ({settings})" if settings else "")
 
 
 def _line(text: object) -> str:

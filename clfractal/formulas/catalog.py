@@ -14,6 +14,7 @@ from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_fr
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
 from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.model import Formula, inside
+from clfractal.formulas.own import find_own, library_names
 from clfractal.formulas.turns import MAX_START
 from clfractal.resources import folder
 
@@ -30,7 +31,7 @@ _CHAIN_KEYS = (
 @cache
 def names() -> tuple[str, ...]:
     """The library's names, sorted: formulas and chains."""
-    return tuple(sorted(path.stem for path in folder("formulas/library").glob("*.yaml")))
+    return library_names()
 
 
 @cache
@@ -39,6 +40,14 @@ def description(name: str) -> Mapping[str, Any]:
     if name not in names():
         raise FormulaError(unknown_name("formula", name, names()))
     return _read(folder("formulas/library") / f"{name}.yaml", f"{name}.yaml")[0]
+
+
+def described(name: str, beside: Path) -> tuple[Mapping[str, Any], Chain]:
+    """A formula's file as plain data, and its chain, for a name of the library or of one's own; errors as `resolve`'s."""
+    path = find_own(name, beside, Where())
+    if path is None:
+        return description(name), load_chain(name)
+    return _read(path, str(path))[0], resolve({"name": name}, beside)
 
 
 def is_chain(name: str) -> bool:
@@ -72,16 +81,17 @@ def load_file(path: str | Path, *, shown: str | None = None) -> Formula:
 
 
 def load_chain(formula: str | Path | Mapping[str, Any], parameters: Mapping[str, Any] | None = None) -> Chain:
-    """The chain of a library name, of a file (a Path, or a text that ends in .yaml or .yml) or of a mapping.
+    """The chain of a name, of a file (a Path, or a text that ends in .yaml or .yml) or of a mapping.
 
-    The mapping may be a scene's `formula` section (see `resolve`) or a formula itself.
+    The mapping may be a scene's `formula` section (see `resolve`) or a formula itself. A name is one of the library or
+    of one's own (`own.py`), with the current folder in the place of a scene's.
     """
     spec: dict[str, Any] = {"parameters": parameters} if parameters else {}
     if isinstance(formula, Path) or (isinstance(formula, str) and formula.endswith((".yaml", ".yml"))):
         path = Path(formula)
         return resolve({"file": path.name, **spec}, path.parent)
     if isinstance(formula, str):
-        return resolve({"name": formula, **spec})
+        return resolve({"name": formula, **spec}, Path())
     if any(key in formula for key in _SOURCES):
         return resolve({**formula, **spec})
     return resolve({"inline": formula, **spec})
@@ -91,11 +101,12 @@ def resolve(spec: Mapping[str, Any], base_folder: Path | None = None, where: Whe
     """The chain that a scene's `formula` section describes.
 
     Args:
-        spec: one of `name` (of the library), `file`, `inline` (a formula's mapping), `chain` (a list of such
-        mappings,
-            each with a `count`), and `parameters`, `live`, `julia`, `bailout`, `distance_bailout`. For a chain
-            `julia` goes to every link that adds the point, `parameters` and `live` are not allowed.
-        base_folder: the folder that `file` is relative to and must stay in; None: files are not allowed.
+        spec: one of `name` (of the library, or of one's own), `file`, `inline` (a formula's mapping), `chain` (a list of
+            such mappings, each with `count`, `start` and `stop`), and `parameters`, `live`, `julia`, `bailout`,
+            `distance_bailout`. For a chain `julia` goes to every link that adds the point, `parameters` and `live` are
+            not allowed.
+        base_folder: the folder that `file` is relative to and must stay in; None: files are not allowed. The
+            folder `formulas` in it holds formulas of one's own.
         where: where the section stands; errors add the path below it, and the column inside an expression.
 
     Raises:
@@ -113,6 +124,9 @@ class _Resolver:
 
     def chain(self, spec: Mapping[str, Any], where: Where) -> Chain:
         key = _source_key(spec, where, (*_OPTIONS, *_IGNORED))
+        own = self._own(spec, where)
+        if own is not None:
+            return own[0].chain(own[1], where)
         data, place, source = self._data(key, spec, where)
         if "chain" not in data:
             link = self._link(spec, where, data, place, source)
@@ -125,6 +139,16 @@ class _Resolver:
                 message = f"a chain has no parameters of its own; {what} its formulas"
                 raise FormulaError(message, inside(where, option))
         return self._links(spec, where, data, place, key)
+
+    def _own(self, spec: Mapping[str, Any], where: Where) -> tuple[_Resolver, Mapping[str, Any]] | None:
+        """For the name of a formula of one's own: the section with its file, and what reads that folder's files."""
+        name = spec.get("name")
+        path = find_own(name, self.base_folder, inside(where, "name")) if isinstance(name, str) else None
+        if path is None:
+            return None
+        real = path.resolve()
+        section = {key: value for key, value in spec.items() if key != "name"}
+        return _Resolver(real.parent), {"file": real.name, **section}
 
     def _data(
         self, key: str, spec: Mapping[str, Any], where: Where
@@ -141,12 +165,7 @@ class _Resolver:
         if not isinstance(value, str):
             raise FormulaError("must be text", here)
         if key == "name":
-            try:
-                return description(value), Where(f"{value}.yaml"), {"name": value}
-            except FormulaError as error:
-                if error.where == Where():
-                    raise FormulaError(error.message, here) from None
-                raise
+            return description(value), Where(f"{value}.yaml"), {"name": value}
         if self.base_folder is None:
             raise FormulaError("a formula file needs a scene file, in whose folder it is looked for", here)
         data, _ = _read(safe_path(value, self.base_folder, here), value)
@@ -213,11 +232,15 @@ class _Resolver:
             if not isinstance(entry, Mapping):
                 raise FormulaError("must be a mapping with name, file or inline", at)
             entry_key = _source_key(entry, at, (*_OPTIONS, *_TURNS))
-            entry_data, entry_place, entry_source = self._data(entry_key, entry, at)
+            reader: _Resolver = self
+            own = self._own(entry, at)
+            if own is not None:
+                (reader, entry), entry_key = own, "file"
+            entry_data, entry_place, entry_source = reader._data(entry_key, entry, at)
             if "chain" in entry_data:
                 raise FormulaError("a chain cannot hold another chain", inside(at, entry_key))
             merged = self._with_julia(entry, spec, entry_data)
-            links.append(self._link(merged, at, entry_data, entry_place, entry_source))
+            links.append(reader._link(merged, at, entry_data, entry_place, entry_source))
             turns = {option: merged[option] for option in _TURNS if merged.get(option) is not None}
             sources.append({**entry_source, **_options(merged), **turns})
         radii = {

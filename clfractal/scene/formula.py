@@ -16,7 +16,7 @@ Live = Annotated[tuple[Source, ...], Field(strict=False, max_length=MAX_LIVE)]
 
 
 class _Source(Section):
-    name: Source | None = Field(None, description="a formula of the library")
+    name: Source | None = Field(None, description="a formula of the library, or of your own")
     file: Source | None = Field(None, description="a formula file, in the scene's folder or below")
     inline: dict[str, Any] | None = Field(None, description="a formula, written here")
     parameters: dict[str, Number] = Field({}, description="values of the formula's parameters")

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from clfractal.errors import FileError, FormulaError, Where
+from clfractal.errors import ClfractalError, FileError, FormulaError, Where
 from clfractal.files.document import read_document
 from clfractal.files.marks import Document, Node
 from clfractal.files.regular import read_text_file
@@ -18,16 +18,19 @@ _DEEPEST = 3
 def inlined(document: Document, folder: Path) -> Document:
     """The document with `inline` in the place of every `file` of its formula, and of the links of its chain.
 
-    A formula that the schema will refuse is left as it is.
+    So it is for a `name` of a formula of one's own. A formula that the schema will refuse is left as it is.
 
     Raises:
         FileError: a file cannot be read, or lies outside the folder.
-        FormulaError: a file is not YAML.
+        FormulaError: a file is not YAML, or there is no formula of a name.
     """
     formula = document.root.child("formula")
     if formula is None:
         return document
-    changed = _without_files(formula, ("formula",), folder)
+    try:
+        changed = _without_files(formula, ("formula",), folder)
+    except ClfractalError as error:
+        raise document.locate(error) from error
     return document if changed is formula else document.replaced(("formula",), changed)
 
 
@@ -38,10 +41,14 @@ def _without_files(node: Node, path: tuple[str, ...], folder: Path) -> Node:
     source = node.child(sources[0]) if len(sources) == 1 else None
     if source is None:
         return node
-    if sources == ["file"] and isinstance(source.value, str) and source.value:
-        inner = {"inline" if key == "file" else key: child for key, child in node.value.items()}
-        inner["inline"] = _read(source, path, folder)
-        keys = {"inline" if key == "file" else key: place for key, place in node.keys.items()}
+    if isinstance(source.value, str) and source.value and sources[0] in ("file", "name"):
+        given_as = sources[0]
+        text = _read(source, path, folder) if given_as == "file" else _read_own(source, path, folder)
+        if text is None:
+            return node
+        inner = {"inline" if key == given_as else key: child for key, child in node.value.items()}
+        inner["inline"] = text
+        keys = {"inline" if key == given_as else key: place for key, place in node.keys.items()}
         return replace(node, value=inner, keys=keys)
     if sources == ["chain"] and isinstance(source.value, list) and len(source.value) <= MAX_LINKS:
         links = [
@@ -57,9 +64,21 @@ def _read(file: Node, path: tuple[str, ...], folder: Path) -> Node:
     """The text of a formula file as a node, files that it names read too."""
     from clfractal.formulas.catalog import safe_path
 
-    where = Where(file.file, file.line, file.column, ".".join((*path, "file")))
+    where = Where(path=".".join((*path, "file")))
     found = safe_path(file.value, folder, where)
-    shown = str(folder / file.value)
+    return _text(found, str(folder / file.value), where, path, folder)
+
+
+def _read_own(name: Node, path: tuple[str, ...], folder: Path) -> Node | None:
+    """The same for a name of a formula of one's own; None for a name of the library."""
+    from clfractal.formulas.own import find_own
+
+    where = Where(path=".".join((*path, "name")))
+    found = find_own(name.value, folder, where)
+    return None if found is None else _text(found, str(found), where, path, found.resolve().parent)
+
+
+def _text(found: Path, shown: str, where: Where, path: tuple[str, ...], folder: Path) -> Node:
     try:
         text = read_text_file(found, name=shown)
     except FileError as error:

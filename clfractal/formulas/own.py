@@ -1,0 +1,73 @@
+"""Formulas of one's own, found by name: files in the folder `formulas` beside a scene, and in those of CLFRACTAL_FORMULAS.
+
+The library's names win, then the folder beside the scene, then the folders of the variable in their order.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from clfractal.errors import FileError, FormulaError, Where, unknown_name
+from clfractal.resources import folder
+
+FOLDERS_VARIABLE = "CLFRACTAL_FORMULAS"
+FOLDER = "formulas"
+_ENDINGS = (".yaml", ".yml")
+
+
+def library_names() -> tuple[str, ...]:
+    """The library's names, sorted."""
+    return tuple(sorted(path.stem for path in folder("formulas/library").glob("*.yaml")))
+
+
+def own_files(beside: Path | None) -> Mapping[str, Path]:
+    """The files by name, sorted; no name of the library is among them.
+
+    `beside` is the folder of the scene, whose folder `formulas` is looked into; None: that of the variable alone.
+
+    Raises:
+        FileError: a folder of the variable is not there.
+    """
+    found: dict[str, Path] = {}
+    folders = [beside / FOLDER] if beside is not None and (beside / FOLDER).is_dir() else []
+    for text in filter(None, os.environ.get(FOLDERS_VARIABLE, "").split(os.pathsep)):
+        if not Path(text).is_dir():
+            raise FileError(f"there is no folder {text!r}", Where(FOLDERS_VARIABLE))
+        folders.append(Path(text))
+    for each in folders:
+        for path in sorted(each.iterdir()):
+            if path.suffix in _ENDINGS and path.is_file():
+                found.setdefault(path.stem, path)
+    return {name: found[name] for name in sorted(found.keys() - set(library_names()))}
+
+
+def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
+    """The file of a formula that is not in the library; None for one that is.
+
+    A file in the folder beside the scene must lie within the scene's folder, links followed.
+
+    Raises:
+        FormulaError: there is none of that name, with the nearest name over all.
+        FileError: a folder of the variable is not there, or the file leads out of the scene's folder.
+    """
+    library = library_names()
+    if name in library:
+        return None
+    try:
+        files = own_files(beside)
+    except FileError as error:
+        message = f"{FOLDERS_VARIABLE}: {error.message}; {unknown_name('formula', name, library)}"
+        raise FileError(message, where) from error
+    if name not in files:
+        raise FormulaError(unknown_name("formula", name, (*library, *files)), where)
+    path = files[name]
+    if beside is not None and path.parent == beside / FOLDER:
+        try:
+            real, base = path.resolve(), beside.resolve()
+        except (OSError, RuntimeError) as error:
+            raise FileError(f"cannot be read: {path}", where) from error
+        if not real.is_relative_to(base):
+            raise FileError(f"leads out of the scene's folder: {str(path)[:200]!r}", where)
+    return path
