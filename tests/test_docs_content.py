@@ -25,7 +25,7 @@ from clfractal.files import document, regular
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, parser, turns
+from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, own, parser, turns
 from clfractal.renderers import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.scene.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
@@ -329,7 +329,7 @@ def test_exit_statuses() -> None:
 def test_environment_variables() -> None:
     told = {code(row[0]) for row in table("command-line.md", "Environment variables")}
     ours = {select.ENVIRONMENT_VARIABLE, lanes.LANES_VARIABLE, cache.ENVIRONMENT_VARIABLE}
-    ours.add(settings.ENVIRONMENT_VARIABLE)
+    ours |= {settings.ENVIRONMENT_VARIABLE, own.FOLDERS_VARIABLE}
     assert ours == {name for name in told if name.startswith("CLFRACTAL_")}
     sources = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
     assert set(re.findall(r'"(CLFRACTAL_\w+)"', sources)) == ours | {"CLFRACTAL_TEST_ABORT"}
