@@ -75,6 +75,8 @@ SECTIONS = {
     "image": "Image",
     "camera, perspective": "PerspectiveCamera",
     "camera, orthographic": "OrthographicCamera",
+    "camera.orbit": "Orbit",
+    "camera.shift": "Shift",
     "renderer, surface": "SurfaceRenderer",
     "renderer.points": "Points",
     "renderer.ambient_occlusion": "AmbientOcclusion",

@@ -13,7 +13,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.files.channels import check_channels
 from clfractal.optics.view import View, scene_view
 from clfractal.pictures.tiles import Region
-from clfractal.scene.checks import used_bounds, used_boxes
+from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.scene.surface import SurfaceRenderer
@@ -88,7 +88,7 @@ class PlannedView:
 
 def finest_steps(scene: Scene, view: View) -> float:
     """Width of the narrowest pixel footprint that the picture may show, in float32 steps of the coordinates there."""
-    found, radius = used_bounds(scene)
+    found, radius = scene.bounds
     center = np.array(found)
     footprint = view.pixel_size(scene.image.height)
     if view.eye is not None:

@@ -15,7 +15,6 @@ from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient
@@ -181,7 +180,7 @@ def view_record(
 def march_record(scene: Scene, precision: Precision) -> Record:
     """The settings of the march, and of the rays that a shot sends."""
     chain, renderer = scene.chain, scene.surface
-    center, radius = used_bounds(scene)
+    center, radius = scene.bounds
     points = renderer.used_points.count
     point_share = 1 / math.sqrt(points)
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
@@ -286,7 +285,7 @@ def material_record(
 
 def _way_and_trap(scene: Scene) -> dict[str, object]:
     """The fields of a Material for `kernels/coloring.h`."""
-    coloring, radius = scene.coloring, used_bounds(scene)[1]
+    coloring, radius = scene.coloring, scene.bounds[1]
     step = coloring.step if coloring.step is not None else radius / 100
     direction = np.array(coloring.trap.direction, float)
     return {

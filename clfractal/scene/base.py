@@ -17,6 +17,8 @@ Vector: TypeAlias = tuple[float, float, float]
 Coordinate = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Amount = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
+Angle = Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)]
+Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12, allow_inf_nan=False)]
 
 # Strict tuples would refuse the lists of YAML and JSON; their entries stay strict.
@@ -40,6 +42,18 @@ class Section(BaseModel):
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in type(self).model_fields}
         return type(self).model_validate({**values, **update})
+
+    def _settle(self, **values: Any) -> None:
+        """For validators: replaces values of the section that is being made; they count as given.
+
+        A value of None is that of a key that has done its work, and counts as not given.
+        """
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+            if value is None:
+                self.__pydantic_fields_set__.discard(name)
+            else:
+                self.__pydantic_fields_set__.add(name)
 
 
 def problem(message: str, at: str = "") -> PydanticCustomError:
@@ -80,3 +94,17 @@ def cross(a: Vector, b: Vector) -> Vector:
 def length(a: Vector) -> float:
     """The Euclidean length of a."""
     return float((a[0] * a[0] + a[1] * a[1] + a[2] * a[2]) ** 0.5)
+
+
+def dot(a: Vector, b: Vector) -> float:
+    """The scalar product of a and b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def unit(a: Vector) -> Vector:
+    """The vector of length 1 in the direction of a, which is not 0."""
+    # The largest component first: squares of small sides would vanish.
+    largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
+    a = (a[0] / largest, a[1] / largest, a[2] / largest)
+    size = length(a)
+    return (a[0] / size, a[1] / size, a[2] / size)

@@ -22,7 +22,7 @@ _MOST_APPLICATIONS = 2_000
 
 def check_parts(scene: Scene, *, whole: bool = True) -> None:
     """Raises SceneError, with a dotted path, if values contradict each other; `whole` is false for a layout's view."""
-    radius = used_bounds(scene)[1]
+    radius = scene.bounds[1]
     _check_step(scene.coloring.step, radius, "coloring.step")
     if isinstance(scene.renderer, SurfaceRenderer):
         _check_step(scene.renderer.step, radius, "renderer.step")
@@ -39,12 +39,6 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
         # (A grid from a file is not the formula's solid, so its lights may be anywhere.)
         _check_lights(scene)
-
-
-def used_bounds(scene: Scene) -> tuple[Vector, float]:
-    """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
-    bounds = scene.renderer.bounds if isinstance(scene.renderer, SurfaceRenderer) else None
-    return (bounds.center, bounds.radius) if bounds else (scene.chain.center, scene.chain.radius)
 
 
 def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
@@ -74,7 +68,7 @@ def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:
     Raises:
         SceneError: a zoom's box is not within the one before.
     """
-    center, radius = used_bounds(scene)
+    center, radius = scene.bounds
     first = renderer.box if renderer.box is not None else Box(center=center, size=2 * radius)
     last = first
     for index, zoom in enumerate(renderer.zoom):
@@ -178,7 +172,7 @@ def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
 
 
 def _check_lights(scene: Scene) -> None:
-    center, radius = used_bounds(scene)
+    center, radius = scene.bounds
     candidates = [
         (index, light.position)
         for index, light in enumerate(scene.lights)

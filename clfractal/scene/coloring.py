@@ -9,6 +9,7 @@ from clfractal.scene.base import (
     Color,
     Coordinate,
     Fraction,
+    Length,
     Position,
     Section,
     chosen_by_word,
@@ -16,7 +17,6 @@ from clfractal.scene.base import (
     problem,
 )
 from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, linear_color
-from clfractal.scene.surface import Length
 
 
 class Stop(Section):

@@ -8,17 +8,18 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field, PrivateAttr, model_validator
 
+from clfractal.errors import ClfractalError
 from clfractal.files.inputs import noting
-from clfractal.scene.base import Section
+from clfractal.scene.base import Section, Vector
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
-from clfractal.scene.parts import Background, Camera, Image, Material, Output
+from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
@@ -71,6 +72,42 @@ class Scene(Section):
         """Whether both have equal values, wherever they were loaded from."""
         fields = type(self).model_fields
         return type(other) is type(self) and all(getattr(self, key) == getattr(other, key) for key in fields)
+
+    @model_validator(mode="after")
+    def _frame_cameras(self) -> Self:
+        """Cameras with `frame: all` get their places, those of views and bookmarks too."""
+        views = self.layout.views if self.layout is not None else ()
+        own = [view.camera for view in views if view.camera is not None]
+        if all(camera.frame is None for camera in (self.camera, *own, *self.bookmarks.values())):
+            return self
+        try:
+            seen = [view for view, _ in self.views] if self.layout is not None else []
+            self._settle(camera=self._framed(self.camera))
+            self._settle(bookmarks={name: self._framed(each) for name, each in self.bookmarks.items()})
+        except ClfractalError:
+            return self  # told by the checks that follow
+        finally:
+            self._read.pop("views", None)
+        if self.layout is not None:
+            # A view's scene has framed its camera already, for its own size.
+            placed = [
+                view if view.camera is None else view.model_copy(update={"camera": scene.camera})
+                for view, scene in zip(views, seen, strict=True)
+            ]
+            self._settle(layout=self.layout.model_copy(update={"views": placed}))
+        return self
+
+    def _framed(self, camera: AnyCamera) -> AnyCamera:
+        if camera.frame is None:
+            return camera
+        center, radius = self.bounds
+        return camera.framed(center, radius, self.image.width / self.image.height)
+
+    @property
+    def bounds(self) -> tuple[Vector, float]:
+        """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
+        own = self.renderer.bounds if isinstance(self.renderer, SurfaceRenderer) else None
+        return (own.center, own.radius) if own else (self.chain.center, self.chain.radius)
 
     @property
     def folder(self) -> Path:

@@ -5,7 +5,7 @@ kind, write its class and add it to the union.
 """
 
 from math import radians, tan
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, Field, Tag, model_validator
 
@@ -16,16 +16,15 @@ from clfractal.scene.base import (
     Amount,
     Color,
     Fraction,
-    Position,
     Reflectance,
     Section,
     chosen_by,
     chosen_by_word,
-    cross,
     length,
     minus,
     problem,
 )
+from clfractal.scene.camera_base import CameraBase
 from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
 
 MAX_SIDE = 65_536
@@ -42,28 +41,6 @@ class Image(Section):
     def _bounded(self) -> Self:
         if self.width * self.height > MAX_PIXELS:
             raise problem(f"must be at most {MAX_PIXELS:,} pixels, got {self.width} x {self.height}")
-        return self
-
-
-class CameraBase(Section):
-    """Keys that every camera has."""
-
-    position: Position = Field((0.0, -3.0, 0.0), description="where the camera is, scene units")
-    target: Position = Field(
-        (0.0, 0.0, 0.0), description="the point in the middle of the picture, scene units"
-    )
-    up: Position = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
-
-    @model_validator(mode="after")
-    def _looks_somewhere(self) -> Self:
-        view = minus(self.target, self.position)
-        size = max(1e-300, *(abs(x) for x in (*self.target, *self.position)))
-        if length(view) <= 1e-14 * size:
-            raise problem("must differ from camera.position", "target")
-        if length(self.up) < 1e-12:
-            raise problem("must not be zero", "up")
-        if length(cross(view, self.up)) <= 1e-6 * length(view) * length(self.up):
-            raise problem("must not be parallel to the view, from camera.position to camera.target", "up")
         return self
 
 
@@ -141,6 +118,7 @@ class OrthographicCamera(CameraBase):
     height: float = Field(3.0, ge=1e-12, le=1e6, description="height of the picture, scene units")
 
 
+AnyCamera: TypeAlias = PerspectiveCamera | OrthographicCamera
 Camera = Annotated[
     Annotated[PerspectiveCamera, Tag("perspective")] | Annotated[OrthographicCamera, Tag("orthographic")],
     chosen_by("projection", "perspective"),

@@ -7,11 +7,22 @@ from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Coordinate, Position, Section, Vector, cross, length, minus, problem
-from clfractal.scene.surface import Length
+from clfractal.scene.base import (
+    Angle,
+    Coordinate,
+    Length,
+    Position,
+    Section,
+    Vector,
+    cross,
+    dot,
+    length,
+    minus,
+    problem,
+    unit,
+)
 
 Factor = Annotated[float, Field(strict=True, gt=0, le=1e12, allow_inf_nan=False)]
-Angle = Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)]
 MOVES = ("scale", "move_normal", "move_side", "move_up", "rotate_normal", "rotate_side", "rotate_up")
 TURNS = ("rotate_x", "rotate_y", "rotate_z")
 # Of a plane's size and of its middle's coordinates, scene units.
@@ -73,7 +84,7 @@ class Plane(Section):
             width, height = length(side), length(up)
             if min(width, height) <= least or length(cross(side, up)) <= 1e-6 * width * height:
                 raise problem("must not lie on one line", "corners")
-            if abs(_dot(side, up)) > 1e-4 * width * height:
+            if abs(dot(side, up)) > 1e-4 * width * height:
                 raise problem("must have a right angle at the first corner, the lower left one", "corners")
             return self
         if length(self.normal) < 1e-12:
@@ -182,13 +193,13 @@ def _like(plane: SomePlane, placed: Placed) -> SomePlane:
 
 def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
     """A vector, turned about an axis of length 1 (Rodrigues' formula)."""
-    c, s = _cos_sin(degrees)
-    across, along = cross(axis, vector), _dot(axis, vector) * (1 - c)
+    c, s = cos_sin(degrees)
+    across, along = cross(axis, vector), dot(axis, vector) * (1 - c)
     x, y, z = (v * c + a * s + k * along for v, a, k in zip(vector, across, axis, strict=True))
     return (x, y, z)
 
 
-def _cos_sin(degrees: float) -> tuple[float, float]:
+def cos_sin(degrees: float) -> tuple[float, float]:
     """Cosine and sine; exact at quarter turns, so that they cause no rounding."""
     reduced = fmod(degrees, 360.0)
     quarters = round(reduced / 90.0)
@@ -199,18 +210,18 @@ def _cos_sin(degrees: float) -> tuple[float, float]:
 
 def _by_corners(low: Vector, right: Vector, high: Vector) -> Placed:
     across, rise = minus(right, low), minus(high, low)
-    side = _unit(across)
-    normal = _unit(cross(across, rise))
+    side = unit(across)
+    normal = unit(cross(across, rise))
     x, y, z = (a + (b + c) / 2 for a, b, c in zip(low, across, rise, strict=True))
     return Placed((x, y, z), side, cross(normal, side), normal, length(across), length(rise))
 
 
 def _by_normal(plane: Plane) -> Placed:
-    normal = _unit(plane.normal)
+    normal = unit(plane.normal)
     wanted = plane.up
     if wanted is None:
         wanted = AXES["y"] if abs(normal[1]) < 0.99 else AXES["z"]
-    side = _unit(cross(wanted, normal))
+    side = unit(cross(wanted, normal))
     return Placed(plane.center, side, cross(normal, side), normal, plane.width, plane.height)
 
 
@@ -224,15 +235,3 @@ def _transformed(plane: Placed, step: Transform) -> Placed:
     axes: tuple[Axis, ...] = ("normal", "side", "up", "x", "y", "z")
     axis = next(axis for axis in axes if getattr(step, f"rotate_{axis}") is not None)
     return rotated(plane, axis, getattr(step, f"rotate_{axis}"))
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _unit(a: Vector) -> Vector:
-    # The largest component first: squares of small sides would vanish.
-    largest = max(abs(a[0]), abs(a[1]), abs(a[2]))
-    a = (a[0] / largest, a[1] / largest, a[2] / largest)
-    size = length(a)
-    return (a[0] / size, a[1] / size, a[2] / size)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from clfractal.pictures.compose import eye_at
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import handles, navigation, plane_moves, zoom_box
 from clfractal.viewer.aim import Aim
@@ -242,7 +241,7 @@ class Controls:
         aim, (number, light) = drag.aim, drag.before
         behind = handles.is_behind(light, aim.view)
         changed = handles.dragged(
-            light, aim.view, aim.size, aim.x + dx, aim.y + dy, used_bounds(aim.scene), behind=behind
+            light, aim.view, aim.size, aim.x + dx, aim.y + dy, aim.scene.bounds, behind=behind
         )
         self.studio.edit({f"lights.{number}": changed.model_dump(mode="json")}, "light")
 
@@ -250,7 +249,7 @@ class Controls:
         """The light whose handle is under the pointer; else the first one that can be dragged."""
         found: list[tuple[float, int]] = []
         for number, light in enumerate(aim.scene.lights):
-            place = handles.handle_position(light, aim.view, aim.size, used_bounds(aim.scene))
+            place = handles.handle_position(light, aim.view, aim.size, aim.scene.bounds)
             if place is not None:
                 found.append((math.dist(place[:2], (aim.x, aim.y)), number))
         near = [each for each in found if each[0] <= _REACH]

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from clfractal.optics.view import View
 from clfractal.scene.lighting import DirectionalLight, PointLight
-from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.parts import AnyCamera, PerspectiveCamera
+from clfractal.scene.stance import LARGEST
 from clfractal.viewer.pointer import Floats, Size, point_at, project
-from clfractal.viewer.pose import LARGEST, AnyCamera
 
 Light = DirectionalLight | PointLight
 Bounds = tuple[npt.ArrayLike, float]

@@ -9,7 +9,6 @@ from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError
 from clfractal.optics.view import View
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.model import Scene
 from clfractal.viewer import handles, overlays, zoom_box
 from clfractal.viewer.controls import Controls
@@ -69,7 +68,7 @@ def _lines(
 
 
 def _lights(canvas: Any, scene: Scene, view: View, size: tuple[int, int], scale: float) -> None:
-    bounds = used_bounds(scene)
+    bounds = scene.bounds
     circle = handles.light_circle(view, size, bounds)
     canvas.add_circle(
         imgui.ImVec2(circle.x / scale, circle.y / scale), circle.radius / scale, _color(_LIGHT, 0.35), 96, 1.0

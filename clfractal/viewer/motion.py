@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.scene.parts import AnyCamera
 from clfractal.viewer.flying import Fly, Key
 from clfractal.viewer.navigation import dolly, interpolated, orbit, pan
-from clfractal.viewer.pose import AnyCamera, pose_of
+from clfractal.viewer.pose import pose_of
 from clfractal.viewer.studio import Studio
 from clfractal.viewer.transition import eased
 

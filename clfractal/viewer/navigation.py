@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import View, camera_view
-from clfractal.scene.parts import OrthographicCamera
+from clfractal.scene.parts import AnyCamera, OrthographicCamera
 from clfractal.viewer.pointer import Floats, Size, point_at, project, ray_at
-from clfractal.viewer.pose import AnyCamera, C, Style, pose_of, rotation, stood, turned_about, turning
+from clfractal.viewer.pose import C, Style, pose_of, rotation, stood, turned_about, turning
 from clfractal.viewer.standard_views import axis_view, frame_all, to_orthographic, to_perspective
 from clfractal.viewer.transition import interpolated
 

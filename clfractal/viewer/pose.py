@@ -10,17 +10,13 @@ import numpy.typing as npt
 from pydantic import ValidationError
 
 from clfractal.optics.view import camera_view
-from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
+from clfractal.scene.stance import LARGEST, NEAREST
 from clfractal.viewer.pointer import Floats
 
-AnyCamera: TypeAlias = PerspectiveCamera | OrthographicCamera
 C = TypeVar("C", bound=PerspectiveCamera | OrthographicCamera)
 Style: TypeAlias = Literal["turntable", "free"]
 
-# The largest coordinate of a camera, scene units.
-LARGEST = 1e6
-# A target nearer than this part of the coordinates would leave the direction of view too few digits.
-NEAREST = 1e-11
 # A turntable stops before the poles, where its horizon would vanish.
 POLE_LIMIT = np.radians(89.9)
 _LEVEL = 1e-9

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from clfractal.files.roundtrip import updated, written
 from clfractal.scene.inline import inlined
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
+from clfractal.viewer.camera_words import with_words, written_words
 from clfractal.viewer.named import formula_files
 from clfractal.viewer.sources import SceneSource
 from clfractal.viewer.sparse import without_defaults
@@ -55,11 +57,16 @@ def _candidates(
     after, sparse = present.resolved(), without_defaults(present)
     if loaded is not None:
         before = loaded.resolved()
-        kept = _with_files(source.formula, before, after, sparse, names)
-        yield False, lambda: updated(source.text, *kept)
+        words = written_words(read_document(source.text).root.plain())
+        # (What `frame` does follows from more than the camera.)
+        fixed = {path: own for path, own in words.items() if "frame" not in own}
         nothing = dict.fromkeys(formula_files(source.formula, source.folder))
-        own = _with_files(source.formula, before, after, sparse, nothing)
-        yield True, lambda: updated(source.text, *own)
+        for inline, files in ((False, names), (True, nothing)):
+            whole = _with_files(source.formula, before, after, sparse, files)
+            # First with the words that cameras are written in, as far as these cameras are where they were.
+            for kept in (words, fixed, {}) if words else ({},):
+                data = with_words(words, *whole, kept=kept)
+                yield inline, partial(updated, source.text, *data)
     yield True, lambda: written(sparse, source.text)
     yield True, lambda: dump_scene(present)
 

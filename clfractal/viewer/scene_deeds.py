@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from clfractal.errors import ClfractalError
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane
@@ -172,7 +171,7 @@ class SceneDeeds:
         self._camera(navigation.dolly(self.motion.target, factor))
 
     def _view(self, side: standard_views.Side) -> None:
-        center, radius = used_bounds(self.studio.scene)
+        center, radius = self.studio.scene.bounds
         self._camera(standard_views.axis_view(self.motion.target, side, self.studio.viewport, center, radius))
 
     def frame_all(self) -> None:
@@ -182,7 +181,7 @@ class SceneDeeds:
             section = dict(self.studio.value(aim.plane_path))
             self._edit({aim.plane_path: {"normal": section.get("normal", [0.0, 0.0, 1.0])}})
             return
-        center, radius = used_bounds(self.studio.scene)
+        center, radius = self.studio.scene.bounds
         self._camera(standard_views.frame_all(self.motion.target, center, radius, self.studio.viewport))
 
     def switch_projection(self) -> None:
@@ -194,7 +193,7 @@ class SceneDeeds:
             self.studio.tell("stereo needs a perspective camera", wrong=True)
         else:
             self._perspective = camera
-            self.studio.set_camera(standard_views.to_orthographic(camera, used_bounds(self.studio.scene)))
+            self.studio.set_camera(standard_views.to_orthographic(camera, self.studio.scene.bounds))
 
     def _center(self) -> None:
         aim = self.aim()

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import ValidationError
 
-from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
+from clfractal.scene.stance import LARGEST, framing, least_distance, room
 from clfractal.viewer.pointer import Floats, Size
-from clfractal.viewer.pose import LARGEST, NEAREST, AnyCamera, C, pose_of, stood
+from clfractal.viewer.pose import C, pose_of, stood
 
 Side: TypeAlias = Literal["front", "back", "left", "right", "top", "bottom"]
 
@@ -23,10 +24,6 @@ SIDES: dict[Side, tuple[tuple[float, float, float], tuple[float, float, float]]]
     "top": ((0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
     "bottom": ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
 }
-# Part of the picture's smaller side that a framed object fills.
-FILLED = 0.9
-# An orthographic camera stands so many radii before the middle of what it frames.
-_CLEAR = 2.0
 _LENS = ("f_number", "focus_distance", "focus", "focus_on", "sensor_height")
 _LEAST_HEIGHT, _LEAST_FOV, _MOST_FOV = 1e-12, 1e-6, 179.9
 
@@ -37,18 +34,11 @@ def frame_all(camera: C, center: npt.ArrayLike, radius: float, size: Size) -> C:
 
     Where the ball is too large for the range of coordinates, the camera is as far away as it can be.
     """
-    pose, middle = pose_of(camera), np.asarray(center, float)
-    width, height = size
-    narrow = FILLED * min(1.0, width / height)
-    if isinstance(camera, OrthographicCamera):
-        shown = float(np.clip(2 * radius / narrow, _LEAST_HEIGHT, LARGEST))
-        distance = min(max(_CLEAR * radius, _least(middle)), _room(middle, -pose.axis))
-        return stood(camera, middle - distance * pose.axis, middle, height=shown)
-    # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
-    tangent = narrow * float(np.tan(np.radians(camera.fov) / 2))
-    distance = radius * float(np.hypot(1.0, 1.0 / tangent))
-    distance = min(max(distance, _least(middle)), _room(middle, -pose.axis))
-    return stood(camera, middle - distance * pose.axis, middle)
+    middle = _plain(np.asarray(center, float))
+    fov = camera.fov if isinstance(camera, PerspectiveCamera) else None
+    axis = _plain(pose_of(camera).axis)
+    position, height = framing(axis, middle, radius, size[0] / size[1], fov)
+    return stood(camera, position, middle, **({} if height is None else {"height": height}))
 
 
 @np.errstate(all="ignore")
@@ -85,7 +75,7 @@ def to_orthographic(
     position = pose.position
     if bounds is not None:
         nearest = float((np.asarray(bounds[0], float) - position) @ pose.axis) - bounds[1]
-        back = min(max(-nearest, 0.0), _room(position, -pose.axis))
+        back = min(max(-nearest, 0.0), room(position, -pose.axis))
         position = position - back * pose.axis if np.isfinite(back) else position
     height = float(np.clip(height, _LEAST_HEIGHT, LARGEST))
     try:
@@ -116,10 +106,10 @@ def to_perspective(
     wanted = like.fov if like is not None else fov
     half = camera.height / 2
     # The eye may be where the camera is, so there always is room for it.
-    room = max(_room(pose.target, -pose.axis), pose.distance)
-    distance = min(max(half / float(np.tan(np.radians(wanted) / 2)), _least(pose.target)), room)
+    farthest = max(room(pose.target, -pose.axis), pose.distance)
+    distance = min(max(half / float(np.tan(np.radians(wanted) / 2)), least_distance(pose.target)), farthest)
     position = pose.target - distance * pose.axis
-    if distance == room:
+    if distance == farthest:
         position = np.clip(position, -LARGEST, LARGEST)
     used = float(np.degrees(2 * np.arctan(half / distance)))
     if abs(used - wanted) <= 1e-9 * wanted:
@@ -135,16 +125,3 @@ def to_perspective(
 def _plain(vector: Floats) -> tuple[float, float, float]:
     x, y, z = vector.tolist()
     return x, y, z
-
-
-def _least(target: Floats) -> float:
-    """The least distance from a target that leaves the direction of view its digits."""
-    return 2 * max(NEAREST * float(np.abs(target).max()), 1e-15)
-
-
-def _room(start: Floats, direction: Floats) -> float:
-    """How far one can go from a point within the range of coordinates, a little less than to its end."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ends = (np.where(direction > 0, LARGEST, -LARGEST) - start) / direction
-    room = float(np.min(np.where(direction != 0, ends, np.inf)))
-    return room * (1 - 1e-9)

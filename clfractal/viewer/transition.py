@@ -6,9 +6,9 @@ from math import exp, log, radians, tan
 
 import numpy as np
 
-from clfractal.scene.parts import OrthographicCamera
+from clfractal.scene.parts import AnyCamera, OrthographicCamera
 from clfractal.viewer.pointer import Floats
-from clfractal.viewer.pose import AnyCamera, C, pose_of, rotation, stood
+from clfractal.viewer.pose import C, pose_of, rotation, stood
 
 
 def eased(t: float) -> float:

@@ -7,8 +7,7 @@ from collections.abc import Collection
 from random import Random
 from typing import Any
 
-from clfractal.scene.base import Vector, cross, length, minus
-from clfractal.scene.checks import used_bounds
+from clfractal.scene.base import Vector, cross, dot, length, minus, unit
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Camera, OrthographicCamera, PerspectiveCamera
@@ -27,7 +26,7 @@ _WIDEST, _NARROWEST = 100.0, 12.0
 
 def closeness(scene: Scene) -> float:
     """1 where the picture shows all of the set, less where it shows a part: the root of their ratio."""
-    radius = used_bounds(scene)[1]
+    radius = scene.bounds[1]
     if isinstance(scene.renderer, CutPlaneRenderer):
         plane = scene.renderer.plane.placed
         shown = max(plane.width, plane.height) / 2
@@ -51,7 +50,7 @@ def camera_step(scene: Scene, rng: Random, amount: float, *, locked: Collection[
 
 def following_step(before: Scene, after: Scene, locked: Collection[str]) -> Step | None:
     """Lets the view follow the set where a new formula's bounds are larger or smaller; None if they differ too much."""
-    (old, old_radius), (new, new_radius) = used_bounds(before), used_bounds(after)
+    (old, old_radius), (new, new_radius) = before.bounds, after.bounds
     ratio = new_radius / old_radius
     if not 0.5 <= ratio <= 2.0:
         return None
@@ -120,10 +119,10 @@ def _nearer(size: float) -> float:
 
 def _orbited(away: Vector, up: Vector, around: float, rise: float) -> Vector:
     """A vector from the target to the camera, turned about `up` and then raised towards it; degrees."""
-    axis = _unit(up)
+    axis = unit(up)
     turned = turn(away, axis, around)
-    side = _unit(cross(axis, turned))
-    here = math.degrees(math.acos(max(-1.0, min(1.0, _dot(_unit(turned), axis)))))
+    side = unit(cross(axis, turned))
+    here = math.degrees(math.acos(max(-1.0, min(1.0, dot(unit(turned), axis)))))
     # From `up` 0 to 180 degrees; a camera that is nearer to a pole than allowed may stay there.
     least, most = min(_POLE, here), max(180 - _POLE, here)
     return turn(turned, side, min(max(here - rise, least), most) - here)
@@ -167,12 +166,3 @@ def _half_height(camera: Camera) -> float:
     if isinstance(camera, OrthographicCamera):
         return camera.height / 2
     return length(minus(camera.target, camera.position)) * math.tan(math.radians(camera.fov) / 2)
-
-
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _unit(a: Vector) -> Vector:
-    size = length(a)
-    return (a[0] / size, a[1] / size, a[2] / size)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.scene.base import Vector, cross, length
+from clfractal.scene.base import Vector, cross, length, unit
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, EscapeColors
 from clfractal.scene.layout import LayoutView
@@ -72,7 +72,7 @@ def colors_step(scene: Scene, rng: Random, amount: float, *, locked: Collection[
         lightness=_LIGHTNESS * signed(rng, amount),
         least=_LEAST_CHROMA * amount,
     )
-    look = _Look(grade, rng, amount, _unit(scene.camera.up))
+    look = _Look(grade, rng, amount, unit(scene.camera.up))
     step = Step(sizes={"hue": grade.hue / _HUE, "lightness": grade.lightness / _LIGHTNESS})
     step.remarks.append(f"hue {grade.hue:+.0f}°")
     for prefix, part in _parts(scene):
@@ -191,10 +191,5 @@ class _Look:
         turned = turn(direction, self.up, _LIGHT_ROUND * self.turn)
         side = cross(self.up, turned)
         if length(side) > 1e-6 * length(turned):
-            turned = turn(turned, _unit(side), _LIGHT_RISE * self.rise)
+            turned = turn(turned, unit(side), _LIGHT_RISE * self.rise)
         return [round(x, 3) + 0.0 for x in turned]
-
-
-def _unit(a: Vector) -> Vector:
-    size = length(a)
-    return (a[0] / size, a[1] / size, a[2] / size)

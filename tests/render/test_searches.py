@@ -21,7 +21,6 @@ from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.language import Chain
 from clfractal.formulas.reference import apply, constant_of, space_to_state
 from clfractal.pictures.film import Film
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
 from tests.render.shots import (
@@ -71,7 +70,7 @@ EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 def scene_for(name: str, search: str, step: float | None = None) -> Scene:
     """A formula of the library from the side, in the middle of the picture."""
     formula = {"name": name, "iterations": ITERATIONS.get(name, USUAL_ITERATIONS)}
-    bounds = used_bounds(scene_of(formula, ORTHOGRAPHIC))
+    bounds = scene_of(formula, ORTHOGRAPHIC).bounds
     center, radius = np.array(bounds[0]), bounds[1]
     camera = {
         "position": (center + radius * np.array([1.1, -2.1, 1.3])).tolist(),
@@ -103,7 +102,7 @@ class Found:
     @property
     def step(self) -> float:
         """Of the search by steps, scene units."""
-        radius = used_bounds(self.scene)[1]
+        radius = self.scene.bounds[1]
         return self.scene.surface.step or radius / 100
 
     def along(self, t: Floats, chosen: Bools) -> Floats:
@@ -187,9 +186,9 @@ def test_other_steps(device: Device, name: str, step: float) -> None:
     shared = other.hit & near.hit
     assert (other.t[shared] > near.t[shared] - near.footprint[shared] - other.step).all()
     # Every ray that crosses the bounds takes its chord's steps, until it hits.
-    _, radius = used_bounds(other.scene)
+    _, radius = other.scene.bounds
     missed = ~other.hit & (other.film["steps"] > 0)
-    first, nearest = to_sphere(other.origin, other.direction, used_bounds(other.scene)[0], radius)
+    first, nearest = to_sphere(other.origin, other.direction, other.scene.bounds[0], radius)
     chord = 2 * np.sqrt(np.maximum(radius**2 - nearest**2, 0))
     np.testing.assert_allclose(
         other.film["steps"][missed], np.floor(chord / other.step)[missed] + 1, rtol=1e-3, atol=1.01
@@ -222,7 +221,7 @@ def check_boundary(found: Found, precision: Precision) -> None:
     t = found.t[hit]
     # The boundary is a surface: an error across it is longer along a ray that grazes it.
     cosine = np.abs((found.normals * found.direction).sum(-1))[hit].clip(0.02)
-    size = float(np.linalg.norm(found.scene.camera.position)) + used_bounds(found.scene)[1]
+    size = float(np.linalg.norm(found.scene.camera.position)) + found.scene.bounds[1]
     # Channels are float32, whatever the rays are.
     rounding = (24 if precision == "float32" else 1) * EPSILON["float32"] * size / cosine
     low, high = t - rounding, t + rounding

@@ -55,7 +55,8 @@ MANY = "".join(f"\n  view {number}: {{}}" for number in range(MAX_BOOKMARKS + 1)
         ),
         (
             "\n  a: {projection: orthographic, fov: 3}",
-            "5:33: bookmarks.a: unknown key 'fov'; known: height, position, projection, target, up",
+            "5:33: bookmarks.a: unknown key 'fov'; known: frame, height, orbit, position, projection, roll, shift,"
+            " target, up",
         ),
         (
             "\n  a: {position: [1, 2]}",

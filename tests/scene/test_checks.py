@@ -14,7 +14,6 @@ import yaml
 from clfractal.errors import SceneError
 from clfractal.formulas import catalog
 from clfractal.formulas.reference import mp_escape
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 
@@ -92,7 +91,7 @@ def test_a_camera_may_stand_in_the_object() -> None:
 @pytest.mark.parametrize("name", catalog.names())
 def test_steps_at_their_limits(name: str) -> None:
     """A step through the whole bounds, and a millionth of it, with every formula; beyond both is refused."""
-    radius = used_bounds(scene({"name": name}))[1]
+    radius = scene({"name": name}).bounds[1]
     for key in ("renderer", "coloring"):
         for step in (2 * radius, 2.001e-6 * radius):
             assert scene({"name": name}, **{key: {"step": step}})

@@ -49,7 +49,7 @@ CASES = [
     ("camera: {projection: §3}", "camera.projection: must be perspective or orthographic, got 3"),
     (
         "camera: {projection: orthographic, §fov: 45}",
-        "camera: unknown key 'fov'; known: height, position, projection, target, up",
+        "camera: unknown key 'fov'; known: frame, height, orbit, position, projection, roll, shift, target, up",
     ),
     ("camera: §3", "camera: must be a mapping, got 3"),
     ("camera:§", "camera: must be a mapping, got nothing"),
@@ -221,7 +221,7 @@ CASES = [
     ("camera: {sensor_height: §0}", "camera.sensor_height: must be above 0, got 0"),
     (
         "camera: {projection: orthographic, §f_number: 2}",
-        "camera: unknown key 'f_number'; known: height, position, projection, target, up",
+        "camera: unknown key 'f_number'; known: frame, height, orbit, position, projection, roll, shift, target, up",
     ),
     ("output: {channels: [R, §Zed]}", "output.channels.1: unknown channel 'Zed'; did you mean 'Z'?"),
     ("output: {channels: [R, §R]}", "output.channels.1: channel 'R' is given twice"),

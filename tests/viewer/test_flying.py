@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal.scene.parts import OrthographicCamera
+from clfractal.scene.parts import AnyCamera, OrthographicCamera
 from clfractal.viewer import flying
 from clfractal.viewer.flying import Fly, Key
-from clfractal.viewer.pose import AnyCamera, pose_of
+from clfractal.viewer.pose import pose_of
 from tests.viewer.cameras import (
     SIZE,
     assert_valid,

@@ -12,10 +12,10 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from clfractal.optics.view import View, camera_view, eye_view, middle_view
-from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stereo import Eye, Stereo
 from clfractal.viewer import navigation
-from clfractal.viewer.pose import AnyCamera, Style, pose_of
+from clfractal.viewer.pose import Style, pose_of
 from clfractal.viewer.standard_views import SIDES, Side
 from tests.viewer.cameras import (
     SIZE,

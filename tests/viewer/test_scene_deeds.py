@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.aim import Aim, aimed
@@ -172,7 +171,7 @@ def test_zooms(desk: Desk) -> None:
 )
 def test_the_six_views(side: str, direction: tuple[int, int, int], desk: Desk) -> None:
     desk.do(f"view_{side}")
-    center = np.array(used_bounds(desk.studio.scene)[0])
+    center = np.array(desk.studio.scene.bounds[0])
     offset = np.array(desk.camera.position) - center
     assert offset / np.linalg.norm(offset) == pytest.approx(direction, abs=1e-6)
 
@@ -202,7 +201,7 @@ def test_levelling(desk: Desk) -> None:
 def test_framing_shows_the_whole_object(desk: Desk) -> None:
     desk.studio.edit({"camera.position": [0, -30, 0], "camera.target": [3, 0, 0]})
     desk.do("frame_all")
-    center, radius = used_bounds(desk.studio.scene)
+    center, radius = desk.studio.scene.bounds
     assert desk.camera.target == pytest.approx(center, abs=1e-6)
     distance = np.linalg.norm(np.subtract(desk.camera.position, center))
     assert radius < distance < 6 * radius

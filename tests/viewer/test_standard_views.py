@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.optics.view import camera_view
-from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.viewer import navigation
-from clfractal.viewer.pose import AnyCamera, pose_of, rotation, turned_about
+from clfractal.viewer.pose import pose_of, rotation, turned_about
 from clfractal.viewer.standard_views import SIDES, Side
 from clfractal.viewer.transition import eased
 from tests.viewer.cameras import (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.panels import palette_editor
 from clfractal.viewer.panels import widgets as w
@@ -41,7 +40,7 @@ def draw(ui: Ui) -> None:
         return
     palette_editor.draw(ui, "coloring.palette")
     w.fields(ui, "coloring", ("scale", "offset", "repeat"))
-    radius = used_bounds(ui.studio.scene)[1]
+    radius = ui.studio.scene.bounds[1]
     if coloring.by in ("thickness", "layer_distance"):
         w.field(ui, "coloring.along", segmented=True)
         w.field(ui, "coloring.step", start=float(f"{radius / 100:.3g}"), auto=f"{radius / 100:.3g}")

@@ -7,7 +7,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.checks import MAX_PLANES, used_bounds
+from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.plane import Plane, scaled
 from clfractal.viewer import plane_moves
@@ -93,7 +93,7 @@ def _buttons(ui: Ui, chosen: int) -> None:
 def _first_plane(ui: Ui) -> dict[str, Any]:
     """Through the bounds' middle, towards the side from which the camera sees it, as large as the object."""
     scene = ui.studio.scene
-    center, radius = used_bounds(scene)
+    center, radius = scene.bounds
     away = [p - c for p, c in zip(scene.camera.position, center, strict=True)]
     axis = max(range(3), key=lambda each: abs(away[each]))
     normal = [0.0, 0.0, 0.0]

@@ -6,7 +6,6 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
@@ -92,7 +91,7 @@ def _set(ui: Ui, lights: list[Any], chosen: int) -> None:
 def _free_place(ui: Ui) -> list[float]:
     """Outside the bounds, on the camera's side and above."""
     scene = ui.studio.scene
-    center, radius = used_bounds(scene)
+    center, radius = scene.bounds
     away = [p - c for p, c in zip(scene.camera.position, center, strict=True)]
     size = max(sum(x * x for x in away) ** 0.5, 1e-9)
     return [
@@ -116,7 +115,7 @@ def _light(ui: Ui, index: int) -> None:
     if isinstance(light, DirectionalLight):
         w.field(ui, f"{path}.direction", step=0.01)
     else:
-        radius = used_bounds(ui.studio.scene)[1]
+        radius = ui.studio.scene.bounds[1]
         w.field(ui, f"{path}.position", step=0.01 * radius)
         w.field(ui, f"{path}.falloff")
     w.field(ui, f"{path}.shadow")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.environment import names
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas
@@ -32,7 +31,7 @@ def draw_surroundings(ui: Ui) -> None:
     w.group(ui, "Background")
     _background(ui)
     w.group(ui, "Fog")
-    radius = used_bounds(ui.studio.scene)[1]
+    radius = ui.studio.scene.bounds[1]
     if _switch(ui, "fog", "Fog", {"density": float(f"{0.25 / radius:.2g}")}):
         w.fields(ui, "fog", ("color", "density", "background"), background={"label": "On background"})
     w.group(ui, "Environment")

@@ -147,8 +147,9 @@ def plain(value: Any) -> Any:
 
 @cache
 def metas(section: type[Section]) -> dict[str, Meta]:
-    """What the schema says of all fields of a section, in its order."""
-    return {name: _meta(section, name, field) for name, field in section.model_fields.items()}
+    """What the schema says of all fields of a section, in its order; without those that are null once a scene is read."""
+    fields = section.model_fields.items()
+    return {name: _meta(section, name, field) for name, field in fields if not field.exclude}
 
 
 def meta_of(section: type[Section], name: str) -> Meta | None:

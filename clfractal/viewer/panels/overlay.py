@@ -7,7 +7,6 @@ import time
 
 from imgui_bundle import imgui
 
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -82,7 +81,7 @@ def _step(scene: Scene, renderer: SurfaceRenderer) -> str:
     """The fixed step of a search by steps, scene units; else the distance that counts as a hit, pixels."""
     if renderer.search == "distance":
         return f"{renderer.detail:g} px"
-    return f"{used_bounds(scene)[1] / 100 if renderer.step is None else renderer.step:.4g}"
+    return f"{scene.bounds[1] / 100 if renderer.step is None else renderer.step:.4g}"
 
 
 def _marked(ui: Ui) -> zoom_box.ZoomBox | None:

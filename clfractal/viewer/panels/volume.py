@@ -6,7 +6,6 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.checks import used_bounds
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import zoom_box
 from clfractal.viewer.controls import Controls
@@ -124,7 +123,7 @@ def _resolution(ui: Ui, renderer: VolumeRenderer) -> None:
 
 
 def _box(ui: Ui, renderer: VolumeRenderer) -> None:
-    center, radius = used_bounds(ui.studio.scene)
+    center, radius = ui.studio.scene.bounds
     given = renderer.box is not None
     about = "the box that is filled; null: a cube around the formula's bounds"
     reset = lambda: _put(ui, "renderer.box", None)  # noqa: E731

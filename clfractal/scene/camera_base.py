@@ -1,0 +1,154 @@
+"""Where a camera is: its position, target and up, and shorter ways to say them, which are resolved when a scene is read."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.scene.base import (
+    Angle,
+    Coordinate,
+    Length,
+    Position,
+    Section,
+    Vector,
+    cross,
+    length,
+    minus,
+    problem,
+)
+from clfractal.scene.stance import LARGEST, angles, axes, framing, orbited, rolled, shifted
+
+
+class Orbit(Section):
+    """A camera's place on a sphere round its target; what is left out stays as `position` has it."""
+
+    azimuth: Angle | None = Field(
+        None, description="angle round `up`, degrees: 0 in front (-y), 90 on the right (x); null: position's"
+    )
+    elevation: Annotated[float, Field(strict=True, ge=-90, le=90, allow_inf_nan=False)] | None = Field(
+        None, description="angle towards `up`, degrees: 90 straight above the target; null: position's"
+    )
+    distance: Length | None = Field(
+        None, description="from the target to the camera, scene units; null: position's"
+    )
+
+    @property
+    def complete(self) -> bool:
+        """Whether it needs no position."""
+        return None not in (self.azimuth, self.elevation, self.distance)
+
+
+class Shift(Section):
+    """A shift of camera and target along the camera's own axes."""
+
+    right: Coordinate = Field(0.0, description="to the picture's right, scene units")
+    up: Coordinate = Field(0.0, description="to the picture's top, scene units")
+    forward: Coordinate = Field(0.0, description="in the direction of view, scene units")
+
+
+class CameraBase(Section):
+    """Keys that every camera has.
+
+    `orbit`, `roll`, `frame` and `shift` are other words for position, target and up. They are applied in this order and
+    are then null: a camera that was read has a position, a target and an up, and nothing else has to know about them.
+    """
+
+    position: Position = Field((0.0, -3.0, 0.0), description="where the camera is, scene units")
+    target: Position = Field(
+        (0.0, 0.0, 0.0), description="the point in the middle of the picture, scene units"
+    )
+    up: Position = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
+    orbit: Orbit | None = Field(
+        default=None, exclude=True, description="angles and distance round the target, instead of position"
+    )
+    frame: Literal["all"] | None = Field(
+        default=None,
+        exclude=True,
+        description="all: target and distance are chosen so that the bounds fill 90 % of the picture",
+    )
+    roll: Angle | None = Field(
+        default=None,
+        exclude=True,
+        description="turns the camera about its line of sight, degrees, clockwise as seen from behind it",
+    )
+    shift: Shift | None = Field(
+        default=None, exclude=True, description="shifts camera and target along the camera's own axes"
+    )
+
+    @model_validator(mode="after")
+    def _stands_somewhere(self) -> Self:
+        if length(self.up) < 1e-12:
+            raise problem("must not be zero", "up")
+        if self.orbit is None or not self.orbit.complete:
+            self._check_target()
+        if self.orbit is not None:
+            self._take_orbit(self.orbit)
+        self._check_view()
+        if self.roll is not None:
+            self._settle(up=rolled(self.position, self.target, self.up, self.roll), roll=None)
+        if self.frame is None:
+            # (Otherwise the scene does it, which knows the bounds.)
+            self._take_shift()
+        return self
+
+    def framed(self, center: Vector, radius: float, aspect: float) -> Self:
+        """The camera with its `frame` and `shift` done, for a ball that is to be seen.
+
+        Args:
+            center, radius: of the ball, scene units.
+            aspect: width of the picture divided by its height.
+
+        Raises:
+            pydantic.ValidationError: `shift` leads out of the range of coordinates.
+        """
+        fov = getattr(self, "fov", None)
+        axis = axes(self.position, self.target, self.up)[0]
+        position, height = framing(axis, center, radius, aspect, fov)
+        update = {"position": position, "target": center, "frame": None}
+        return self.model_copy(update=update if height is None else {**update, "height": height})
+
+    @property
+    def angles(self) -> tuple[float, float, float]:
+        """Azimuth and elevation, degrees, and distance: `orbit` with these values leads to this position."""
+        return angles(self.position, self.target, self.up)
+
+    def _take_orbit(self, orbit: Orbit) -> None:
+        if self.frame is not None and orbit.distance is not None:
+            raise problem("is chosen by camera.frame; remove one of them", "orbit.distance")
+        given = (orbit.azimuth, orbit.elevation, orbit.distance)
+        azimuth, elevation, distance = (
+            present if wanted is None else wanted
+            for present, wanted in zip(angles(self.position, self.target, self.up), given, strict=True)
+        )
+        position, up = orbited(self.target, self.up, azimuth, elevation, distance)
+        self._check_near(position, "orbit.distance")
+        self._settle(position=position, orbit=None)
+        if up != self.up:
+            self._settle(up=up)
+
+    def _take_shift(self) -> None:
+        if self.shift is None:
+            return
+        along = axes(self.position, self.target, self.up)
+        by = (self.shift.forward, self.shift.right, self.shift.up)
+        position, target = (shifted(point, along, *by) for point in (self.position, self.target))
+        self._check_near(position, "shift")
+        self._check_near(target, "shift")
+        self._settle(position=position, target=target, shift=None)
+        self._check_target()
+
+    def _check_target(self) -> None:
+        view = minus(self.target, self.position)
+        size = max(1e-300, *(abs(x) for x in (*self.target, *self.position)))
+        if length(view) <= 1e-14 * size:
+            raise problem("must differ from camera.position", "target")
+
+    def _check_view(self) -> None:
+        self._check_target()
+        view = minus(self.target, self.position)
+        if length(cross(view, self.up)) <= 1e-6 * length(view) * length(self.up):
+            raise problem("must not be parallel to the view, from camera.position to camera.target", "up")
+
+    def _check_near(self, point: Vector, key: str) -> None:
+        if max(abs(x) for x in point) > LARGEST:
+            raise problem(f"must leave the camera's coordinates below {LARGEST:,.0f}", key)

@@ -1,0 +1,124 @@
+"""Where a camera stands, by other words than its position: angles round its target, roll, moves, a ball that is to be seen.
+
+Scene units and degrees. Plain arithmetic without NumPy, so that reading a scene is quick.
+"""
+
+from collections.abc import Iterable
+from math import atan2, degrees, hypot, inf, radians, tan
+
+from clfractal.scene.base import Vector, cross, dot, length, minus, unit
+from clfractal.scene.plane import cos_sin, turn
+
+LARGEST = 1e6
+"""Largest coordinate of a camera, scene units."""
+NEAREST = 1e-11
+"""A target nearer than this part of the coordinates would leave the direction of view too few digits."""
+FILLED = 0.9
+"""Part of the picture's smaller side that a framed object fills."""
+# An orthographic camera stands so many radii before the middle of what it frames.
+_CLEAR = 2.0
+# Below this cosine of the elevation the camera is at a pole, where `up` gives no direction in the picture.
+_AT_POLE = 1e-5
+
+
+def angles(position: Vector, target: Vector, up: Vector) -> tuple[float, float, float]:
+    """Azimuth (above -180 to 180), elevation (-90 to 90) and distance of a camera, as seen from its target.
+
+    The elevation is the angle towards `up`. The azimuth is 0 in front, which is -y where z is up, and 90 on the right,
+    which is x. Where another direction is up, front and right are turned with it, on the shortest way.
+    """
+    away = minus(position, target)
+    pole, front, right = _compass(up)
+    rise, ahead, aside = dot(away, pole), dot(away, front), dot(away, right)
+    level = hypot(ahead, aside)
+    azimuth = degrees(atan2(aside, ahead)) if level > 0 else 0.0
+    return azimuth, degrees(atan2(rise, level)), length(away)
+
+
+def orbited(
+    target: Vector, up: Vector, azimuth: float, elevation: float, distance: float
+) -> tuple[Vector, Vector]:
+    """Position and `up` of a camera by its angles and distance, as of `angles`.
+
+    At the poles `up` would lie along the view. There it becomes the direction that is up in pictures nearby.
+    """
+    pole, front, right = _compass(up)
+    (ca, sa), (ce, se) = cos_sin(azimuth), cos_sin(elevation)
+    level = _sum((ca, front), (sa, right))
+    position = _sum((1.0, target), (distance * ce, level), (distance * se, pole))
+    return position, _sum((-se, level)) if abs(ce) < _AT_POLE else up
+
+
+def rolled(position: Vector, target: Vector, up: Vector, roll: float) -> Vector:
+    """The `up` of a camera that is turned about its line of sight: clockwise as seen from behind it."""
+    axis, _, above = axes(position, target, up)
+    return turn(above, axis, roll)
+
+
+def axes(position: Vector, target: Vector, up: Vector) -> tuple[Vector, Vector, Vector]:
+    """Unit vectors of a camera: in the direction of view, to the picture's right, to its top."""
+    axis = unit(minus(target, position))
+    side = unit(cross(axis, up))
+    return axis, side, cross(side, axis)
+
+
+def shifted(
+    point: Vector, along: tuple[Vector, Vector, Vector], forward: float, right: float, up: float
+) -> Vector:
+    """A point, moved along a camera's `axes`."""
+    return _sum((1.0, point), (forward, along[0]), (right, along[1]), (up, along[2]))
+
+
+def framing(
+    axis: Vector, center: Vector, radius: float, aspect: float, fov: float | None
+) -> tuple[Vector, float | None]:
+    """Where a camera stands that shows a ball in 90 % of the picture's smaller side, with the ball's middle as its target.
+
+    Args:
+        axis: the direction of view, a unit vector.
+        aspect: width of the picture divided by its height.
+        fov: vertical angle of view, degrees; None: an orthographic camera.
+
+    Returns:
+        Its position, and the height of an orthographic camera's picture, or None. Where the ball is too large for the
+        range of coordinates, the camera is as far away as it can be.
+    """
+    narrow = FILLED * min(1.0, aspect)
+    back = _sum((-1.0, axis))
+    if fov is None:
+        distance, height = _CLEAR * radius, min(max(2 * radius / narrow, 1e-12), LARGEST)
+    else:
+        # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
+        distance, height = radius * hypot(1.0, 1.0 / (narrow * tan(radians(fov) / 2))), None
+    distance = min(max(distance, least_distance(center)), room(center, back))
+    return _sum((1.0, center), (distance, back)), height
+
+
+def least_distance(target: Iterable[float]) -> float:
+    """The least distance from a target that leaves the direction of view its digits."""
+    return 2 * max(NEAREST * max(abs(x) for x in target), 1e-15)
+
+
+def room(start: Iterable[float], direction: Iterable[float]) -> float:
+    """How far one can go from a point within the range of coordinates, a little less than to its end."""
+    ends = [
+        ((LARGEST if d > 0 else -LARGEST) - s) / d for s, d in zip(start, direction, strict=True) if d != 0
+    ]
+    return float(min(ends, default=inf)) * (1 - 1e-9)
+
+
+def _compass(up: Vector) -> tuple[Vector, Vector, Vector]:
+    """The pole, what is in front of it, and what is on its right."""
+    pole = unit(up)
+    front = (0.0, -1.0, 0.0)
+    if pole[2] > -1 + 1e-12:
+        # Turned as z is turned into the pole, by Rodrigues' formula with the axis's length as the sine of the angle.
+        about = cross((0.0, 0.0, 1.0), pole)
+        across = cross(about, front)
+        front = _sum((1.0, front), (1.0, across), (1 / (1 + pole[2]), cross(about, across)))
+    return pole, front, cross(pole, front)
+
+
+def _sum(*terms: tuple[float, Vector]) -> Vector:
+    x, y, z = (sum(factor * vector[i] for factor, vector in terms) for i in range(3))
+    return x + 0.0, y + 0.0, z + 0.0
