@@ -18,6 +18,7 @@ from typing import Any, Literal
 import pyopencl as cl
 
 from clfractal.device import cache
+from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, unknown_name
 
@@ -153,6 +154,7 @@ class Device:
     @contextmanager
     def failures(self, doing: str, *, need: int | None = None) -> Iterator[None]:
         """Turn pyopencl's exceptions into DeviceError: status 2 if memory is missing, else 3."""
+        use_opencl()
         try:
             yield
         except cl.Error as error:
@@ -172,7 +174,7 @@ class Device:
 
 def devices() -> list[DeviceInfo]:
     """Every OpenCL device, in the loader's order; an empty list if there is none."""
-    return [device.info for device in _find()]
+    return [device.info for device in _found()]
 
 
 def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
@@ -187,7 +189,7 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     Raises:
         DeviceError: status 2 if nothing fits `spec`; status 3 if there is no device at all.
     """
-    found = _find()
+    found = _found()
     if not found:
         raise DeviceError(_INSTALL_HINT)
     spec = (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
@@ -207,7 +209,7 @@ def by_key(index: str, key: str) -> Device:
     Raises:
         DeviceError: status 3, it is no longer there.
     """
-    alike = [device for device in _find() if device.info.key == key]
+    alike = [device for device in _found() if device.info.key == key]
     if not alike:
         raise DeviceError(f"the device {index} was removed or has changed")
     return next((device for device in alike if device.info.index == index), alike[0])
@@ -288,6 +290,11 @@ def status_name(number: int) -> str:
     """The name of an OpenCL status code, such as `OUT_OF_RESOURCES`."""
     to_string: Any = cl.status_code.to_string
     return str(to_string(number, "status %d"))
+
+
+def _found() -> list[Device]:
+    use_opencl()
+    return _find()
 
 
 @cache_of_calls

@@ -12,6 +12,7 @@ from types import TracebackType
 from typing import Any, Self, TypeAlias
 
 from clfractal.device.cancel import CancelToken
+from clfractal.device.forked import is_lost, use_opencl
 from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, SceneError, Where
@@ -74,6 +75,9 @@ class Engine:
 
     def close(self) -> None:
         """Frees the device's memory; the engine cannot be used afterwards."""
+        if is_lost():  # a forked process leaves what belongs to its parent
+            self._closed = True
+            return
         with self._alone():
             self.executor.close()
             self._looking.close()
@@ -210,6 +214,7 @@ class Engine:
 
     @contextmanager
     def _alone(self) -> Iterator[None]:
+        use_opencl()
         if self._closed:
             raise ClfractalError("this engine is closed")
         if not self._busy.acquire(blocking=False):
