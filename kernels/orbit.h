@@ -13,6 +13,12 @@ typedef struct {
     mask inside;  // it has not
 } orbit_end;
 
+// How an orbit of whole counts ended. Masks are whole numbers: a real could not count beyond 2^24 in float32.
+typedef struct {
+    mask count;   // applications until |z| left the bailout, or all
+    mask inside;  // it has not
+} orbit_counted;
+
 // How far a point is from the solid.
 typedef struct {
     real step;  // distance that is safe to go, in scene units; 0 inside
@@ -85,12 +91,12 @@ INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, 
 }
 
 // Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
-INLINE orbit_end orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE orbit_counted orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
-    real count = R(0.0) + (real)((scalar)min(FIRST_COUNT, orbit->iterations));
     mask alive = active & less_equal(square, (real)(orbit->bailout_square));
+    mask count = (active & ~active) + min(FIRST_COUNT, orbit->iterations);
     for (int n = FIRST_COUNT, look = ORBIT_LOOK; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;
         if (n == look) {
@@ -100,10 +106,10 @@ INLINE orbit_end orbit_count(vec point, mask active, __constant const struct Orb
         const state next = apply(n, z, c, k);
         z = state_pick(alive, next, z);
         square = pick(alive, state_square(next), square);
-        count = pick(alive, (real)((scalar)(n + 1)), count);
+        count -= alive;  // true is -1
         alive &= less_equal(square, (real)(orbit->bailout_square));
     }
-    const orbit_end result = {count, alive};
+    const orbit_counted result = {count, alive};
     return result;
 }
 

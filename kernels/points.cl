@@ -24,20 +24,32 @@ INLINE void store_plane(__global scalar *result, int first, real value) {
     for (int lane = 0; lane < LANES; ++lane) result[first + lane] = each[lane];
 }
 
+INLINE void store_whole(__global int *result, int first, mask value) {
+    int each[LANES];
+#if REAL_IS_DOUBLE && LANES > 1
+    lanes_store(JOIN(convert_int, LANES)(value), each);
+#else
+    lanes_store(value, each);
+#endif
+    for (int lane = 0; lane < LANES; ++lane) result[first + lane] = each[lane];
+}
+
 // result: escape counts, then 1 for points that never escaped.
-__kernel void escape_counts(__global const scalar *points, __global scalar *result, int stride,
+__kernel void escape_counts(__global const scalar *points, __global int *result, int stride,
                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (orbit_cancelled(orbit)) return;
     const int first = (int)get_global_id(0) * LANES;
     const vec point = load_point(points, stride, first);
-    const orbit_end end = orbit_count(point, equal(R(0.0), R(0.0)), orbit, k);
-    store_plane(result, first, end.count);
-    store_plane(result, stride + first, pick(end.inside, R(1.0), R(0.0)));
+    const orbit_counted end = orbit_count(point, equal(R(0.0), R(0.0)), orbit, k);
+    store_whole(result, first, end.count);
+    store_whole(result, stride + first, -end.inside);
 }
 
 // result: the marching distance, the Jacobian's distance, the Jacobian's gradient x, y, z (length 1; inside it is that of |z|
 // after the last application), smooth count, inside.
 __kernel void distances(__global const scalar *points, __global scalar *result, int stride,
                         __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (orbit_cancelled(orbit)) return;
     const int first = (int)get_global_id(0) * LANES;
     const vec point = load_point(points, stride, first);
     const mask all_lanes = equal(R(0.0), R(0.0));

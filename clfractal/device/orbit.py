@@ -28,6 +28,9 @@ ORBIT = Struct(
     ],
 )
 
+MOST_APPLICATIONS = 2_000_000_000
+"""The largest iteration limit of escape counts, which are 32-bit numbers. Distances take no limit that large."""
+
 # Applications past the iteration limit that get a lane from the bailout to the distance bailout. Degree 2 needs four
 # from 4 to 1000, degree 1.1 in a chain some twenty.
 EXTRA_APPLICATIONS = 24

@@ -43,7 +43,7 @@ def to_xarray(picture: Picture, planes: Mapping[str, Floats]) -> Dataset:
         "y": ("y", np.arange(region.y, region.bottom) + 0.5, {"units": "pixels"}),
         "x": ("x", np.arange(region.x, region.right) + 0.5, {"units": "pixels"}),
     }
-    planes = {
+    variables: dict[str, Any] = {
         name: (("y", "x"), plane, {"description": CHANNELS[name].description})
         for name, plane in planes.items()
     }
@@ -52,4 +52,4 @@ def to_xarray(picture: Picture, planes: Mapping[str, Floats]) -> Dataset:
         for key, value in picture.header.items()
         if isinstance(value, (str, int, float))
     }
-    return Dataset(planes, coordinates, facts)
+    return Dataset(variables, coordinates, facts)

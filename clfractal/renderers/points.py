@@ -63,14 +63,16 @@ def escape(
     """Escape counts of points, shape (n, 3) in scene units: (iterations, inside), both of shape (n,).
 
     `iterations` counts applications until |z| exceeds the bailout; a point that never gets there has the limit and is
-    inside.
+    inside. Counts are exact up to MOST_APPLICATIONS, the largest limit, in both number types.
 
     Raises:
         ValueError: points of another shape, or not finite.
         DeviceError, KernelBuildError: the device failed.
         Stopped: the token was set.
     """
-    result = _run(chain, points, iterations, "escape_counts", 2, device, lanes, precision, bailout, token)
+    array = _checked(points)
+    result = np.empty((2, len(array)), np.int32)
+    _run(chain, array, iterations, "escape_counts", result, device, lanes, precision, bailout, token)
     return result[0].astype(np.int64), result[1] > 0
 
 
@@ -85,31 +87,38 @@ def distances(
     token: CancelToken | None = None,
 ) -> Distances:
     """Distances to the solid at points of shape (n, 3), with normals; see `escape` for the errors."""
-    result = _run(chain, points, iterations, "distances", 7, device, lanes, precision, None, token)
+    array = _checked(points)
+    result = np.empty((7, len(array)), precision)
+    _run(chain, array, iterations, "distances", result, device, lanes, precision, None, token)
     inside = result[6] > 0
     # Inside the kernel's gradient is that of |z| after the last application; the distance is 0 all around.
     normal = np.where(inside[:, None], 0.0, result[2:5].T)
-    return Distances(result[0], result[1], normal, result[5], inside)
+    step, full, smooth = (result[plane].astype(np.float64) for plane in (0, 1, 5))
+    return Distances(step, full, normal.astype(np.float64), smooth, inside)
 
 
-def _run(
-    chain: Chain,
-    points: npt.ArrayLike,
-    iterations: int,
-    kernel_name: str,
-    planes: int,
-    device: Device,
-    lanes: int,
-    precision: Precision,
-    bailout: float | None,
-    token: CancelToken | None,
-) -> Floats:
-    """Runs one of the kernels of `points.cl`; gives its planes, shape (planes, n)."""
+def _checked(points: npt.ArrayLike) -> Floats:
     array = np.asarray(points, np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"points must have shape (n, 3), got {array.shape}")
     if not np.isfinite(array).all():
         raise ValueError("points must be finite")
+    return array
+
+
+def _run(
+    chain: Chain,
+    array: Floats,
+    iterations: int,
+    kernel_name: str,
+    result: npt.NDArray[Any],
+    device: Device,
+    lanes: int,
+    precision: Precision,
+    bailout: float | None,
+    token: CancelToken | None,
+) -> None:
+    """Runs one of the kernels of `points.cl`; its planes go into `result`, shape (planes, n)."""
     formula = write_formula(chain)
     generated = {"formula.h": formula.text, "structs.h": records.struct_text()}
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
@@ -118,8 +127,7 @@ def _run(
     kernel = built.kernel(kernel_name)
     orbit = Watched(device, records.orbit_record(chain, iterations, precision, bailout).reshape(1))
     constants = _upload(device, np.array(formula.constants, precision))
-    result = np.empty((planes, len(array)))
-    place = 0
+    planes, place = len(result), 0
 
     def enqueue(size: float) -> Part[_Launch] | None:
         nonlocal place
@@ -130,7 +138,7 @@ def _run(
         padded = np.zeros((3, count), precision)
         padded[:, : len(part)] = part.T
         with device.failures("evaluating points"):
-            buffer = device.buffer(planes * count * padded.itemsize, "results")
+            buffer = device.buffer(planes * count * result.itemsize, "results")
             # A kernel keeps no reference to its arguments: they must outlive the launch.
             arguments: list[Any] = [_upload(device, padded), buffer, np.int32(count), orbit.buffer, constants]
             kernel.set_args(*arguments)
@@ -146,11 +154,10 @@ def _run(
     launches = in_launches(device, enqueue, pace, doing="evaluating points", token=token, watched=[orbit])
     with closing(launches):
         for launch, _ in launches:
-            out = np.empty((planes, launch.padded), precision)
+            out = np.empty((planes, launch.padded), result.dtype)
             with device.failures("evaluating points"):
                 cl.enqueue_copy(device.transfers, out, launch.arguments[1])
             result[:, launch.first : launch.first + launch.count] = out[:, : launch.count]
-    return result
 
 
 @dataclass(frozen=True, slots=True)

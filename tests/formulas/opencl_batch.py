@@ -77,10 +77,15 @@ def launch(
     precision: Precision,
     lanes: int,
     *constants: npt.NDArray[Any],
-) -> Floats:
-    """Runs a kernel (points, result, stride, constants...) and gives its planes, shape (planes, n)."""
+    kind: str | None = None,
+) -> npt.NDArray[Any]:
+    """Runs a kernel (points, result, stride, constants...) and gives its planes, shape (planes, n).
+
+    Args:
+        kind: type of the result's numbers; None: the one of the points.
+    """
     padded = planes_of(points, precision, lanes)
-    result = np.full((planes, padded.shape[1]), np.nan, precision)
+    result = np.full((planes, padded.shape[1]), np.nan if kind is None else -1, kind or precision)
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     arrays = [padded, result, *constants]
     buffers = [cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array)) for array in arrays]
