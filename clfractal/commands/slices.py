@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import ValidationError
-
 from clfractal.commands.order import PARTIAL
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
@@ -97,7 +95,7 @@ def slice_scene(scene: Scene, stack: Stack, number: int) -> Scene:
     offset = (number - (stack.count + 1) / 2) * spacing
     try:
         plane = moved(scene.renderer.plane, normal=offset)
-    except ValidationError as error:
+    except SceneError as error:
         raise SceneError(
             f"puts slice {number} outside the range of coordinates", Where("--spacing")
         ) from error

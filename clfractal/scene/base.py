@@ -7,9 +7,10 @@ keep the import of the schema short.
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Self, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from clfractal.arguments import plain
 from clfractal.scene.hex_color import AS_TEXT
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -37,11 +38,37 @@ class Section(BaseModel):
     tag: ClassVar[str] = ""
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy; values in `update` are checked, and nothing that was derived from the old values is kept."""
+        """A copy; values in `update` are checked, and nothing that was derived from the old values is kept.
+
+        Raises:
+            SceneError: a value of `update` is wrong; the path says which.
+        """
         if not update:
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self).model_validate({**values, **update})
+        return self.checked({**values, **update})
+
+    @classmethod
+    def checked(cls, values: Mapping[str, Any]) -> Self:
+        """A section with these values.
+
+        Raises:
+            SceneError: a value is wrong; the path says which.
+        """
+        try:
+            return cls.model_validate(values)
+        except ValidationError as error:
+            # Loaded for mistakes only.
+            from clfractal.files.marks import Document, node_from_plain
+            from clfractal.scene.messages import first_error
+
+            raise first_error(error, Document(node_from_plain({}, None)), cls) from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_plain_numbers(cls, values: Any) -> Any:
+        """NumPy's numbers are taken wherever numbers are."""
+        return plain(values) if isinstance(values, dict) else values
 
     def _settle(self, **values: Any) -> None:
         """For validators: replaces values of the section that is being made; they count as given.

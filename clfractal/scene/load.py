@@ -145,7 +145,7 @@ def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple
     try:
         return document, Scene.model_validate(plain).placed(folder)
     except ValidationError as error:
-        raise first_error(error, document) from error
+        raise first_error(error, document, Scene) from error
 
 
 @contextmanager

@@ -4,13 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args, get_origin
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from clfractal.arguments import shown
 from clfractal.errors import SceneError, Where, nearest, unknown_name
 from clfractal.files.marks import Document, dotted
-from clfractal.scene.base import Section
-from clfractal.scene.model import Scene
 
 # Words for the checks that compare with one number or a few words, filled with the check's own context.
 _ALLOWED: Mapping[str, str] = {
@@ -67,9 +66,15 @@ class Problem:
         return (0, place.line, place.column)
 
 
-def first_error(error: ValidationError, document: Document) -> SceneError:
-    """The first problem in the text, as an error of ours."""
-    problems = [p for details in error.errors(include_url=False) if (p := _problem(details)) is not None]
+Root = type[BaseModel]
+"""The model that refused plain data: its errors' locations begin there."""
+
+
+def first_error(error: ValidationError, document: Document, root: Root) -> SceneError:
+    """The first problem in the text, as an error of ours. `root` is the model that was to be made of the document."""
+    problems = [
+        p for details in error.errors(include_url=False) if (p := _problem(details, root)) is not None
+    ]
     if not problems:
         return SceneError("is not a scene", document.where(()))
     return min(problems, key=lambda p: p.order(document)).error(document)
@@ -83,11 +88,16 @@ class _Place:
     types: list[Any]
 
     @property
-    def models(self) -> list[type[Section]]:
-        return [t for t in self.types if isinstance(t, type) and issubclass(t, Section)]
+    def models(self) -> list[Root]:
+        return [t for t in self.types if isinstance(t, type) and issubclass(t, BaseModel)]
 
     def keys(self) -> list[str]:
         return [name for model in self.models for name in model.model_fields]
+
+
+def _tag(model: Root) -> str:
+    """The word that chooses the model, see `Section`."""
+    return str(getattr(model, "tag", ""))
 
 
 def _options(annotation: Any) -> list[Any]:
@@ -99,9 +109,9 @@ def _options(annotation: Any) -> list[Any]:
     return [option for argument in get_args(annotation) for option in _options(argument)]
 
 
-def _place(location: Sequence[str | int]) -> _Place:
+def _place(root: Root, location: Sequence[str | int]) -> _Place:
     """Follows a location through the schema; words in it that choose a class are not keys."""
-    place = _Place([], [Scene])
+    place = _Place([], [root])
     for part in location:
         model = next((m for m in place.models if part in m.model_fields), None)
         if isinstance(part, int):
@@ -116,19 +126,19 @@ def _place(location: Sequence[str | int]) -> _Place:
             place.types = [option for value in values for option in _options(value)]
             place.path.append(part)
         else:
-            place.types = [m for m in place.models if m.tag == part] or place.types
+            place.types = [m for m in place.models if _tag(m) == part] or place.types
     return place
 
 
-def _problem(details: ErrorDetails) -> Problem | None:
-    special: Callable[[ErrorDetails], Problem | None] | None = _SPECIAL.get(details["type"])
+def _problem(details: ErrorDetails, root: Root) -> Problem | None:
+    special: Callable[[ErrorDetails, Root], Problem | None] | None = _SPECIAL.get(details["type"])
     if special is not None:
-        return special(details)
-    place = _place(details["loc"])
+        return special(details, root)
+    place = _place(root, details["loc"])
     if details["type"] not in _ALLOWED:
         return Problem(tuple(place.path), details["msg"][:1].lower() + details["msg"][1:])
     allowed = _allowed(details)
-    return Problem(tuple(place.path), f"{allowed}, got {shown_value(details['input'])}")
+    return Problem(tuple(place.path), f"{allowed}, got {shown(details['input'])}")
 
 
 def _allowed(details: ErrorDetails) -> str:
@@ -139,46 +149,46 @@ def _allowed(details: ErrorDetails) -> str:
     return _ALLOWED[details["type"]].format(**context)
 
 
-def _own(details: ErrorDetails) -> Problem:
+def _own(details: ErrorDetails, root: Root) -> Problem:
     location = details["loc"]
     key = None
     if location and location[-1] == "[key]":
         key, location = str(location[-2]), location[:-2]
-    path = tuple(_place(location).path)
+    path = tuple(_place(root, location).path)
     context = details["ctx"]
     at = tuple(part for part in context["at"].split(".") if part)
     return Problem(path + at, context["message"], key)
 
 
-def _unknown_key(details: ErrorDetails) -> Problem:
-    place = _place(details["loc"][:-1])
+def _unknown_key(details: ErrorDetails, root: Root) -> Problem:
+    place = _place(root, details["loc"][:-1])
     key = str(details["loc"][-1])
     return Problem(tuple(place.path), unknown_name("key", key, place.keys()), key)
 
 
-def _missing(details: ErrorDetails) -> Problem:
-    place = _place(details["loc"][:-1])
+def _missing(details: ErrorDetails, root: Root) -> Problem:
+    place = _place(root, details["loc"][:-1])
     part = details["loc"][-1]
     if isinstance(part, int):
-        return _tuple(details, place)
+        return _tuple(details, root, place)
     return Problem(tuple(place.path), "is missing", late=True, shown=(*place.path, part))
 
 
-def _tuple(details: ErrorDetails, place: _Place | None = None) -> Problem:
-    place = place or _place(details["loc"])
+def _tuple(details: ErrorDetails, root: Root, place: _Place | None = None) -> Problem:
+    place = place or _place(root, details["loc"])
     fixed = next((t for t in place.types if get_origin(t) is tuple and ... not in get_args(t)), None)
     entries = [option for item in get_args(fixed) for option in _options(item)]
     of = "lists" if any(get_origin(entry) is tuple for entry in entries) else "numbers"
     what = f"a list of {len(get_args(fixed))} {of}" if fixed else "a list"
     if str in place.types:
         what = f"text or {what}"
-    return Problem(tuple(place.path), f"must be {what}, got {shown_value(details['input'])}")
+    return Problem(tuple(place.path), f"must be {what}, got {shown(details['input'])}")
 
 
-def _length(details: ErrorDetails) -> Problem | None:
-    place = _place(details["loc"])
+def _length(details: ErrorDetails, root: Root) -> Problem | None:
+    place = _place(root, details["loc"])
     if any(get_origin(t) is tuple and ... not in get_args(t) for t in place.types):
-        return _tuple(details, place)
+        return _tuple(details, root, place)
     # The check does not count an entry that is itself wrong; that entry has its own error.
     if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
         return None
@@ -188,27 +198,27 @@ def _length(details: ErrorDetails) -> Problem | None:
     return Problem(tuple(place.path), f"{allowed}, got {len(details['input'])}")
 
 
-def _kind(details: ErrorDetails) -> Problem:
+def _kind(details: ErrorDetails, root: Root) -> Problem:
     """The message for a word that should choose a class but is unknown."""
-    place = _place(details["loc"])
+    place = _place(root, details["loc"])
     key = "projection" if any("projection" in m.model_fields for m in place.models) else "type"
     given = details["input"].get(key)
-    tags = [model.tag for model in place.models]
+    tags = [_tag(model) for model in place.models]
     path = (*place.path, key)
     if not isinstance(given, str):
-        return Problem(path, f"must be {' or '.join(tags)}, got {shown_value(given)}")
+        return Problem(path, f"must be {' or '.join(tags)}, got {shown(given)}")
     return Problem(path, unknown_name(key, given, tags))
 
 
-def _word(details: ErrorDetails) -> Problem:
-    place = _place(details["loc"])
+def _word(details: ErrorDetails, root: Root) -> Problem:
+    place = _place(root, details["loc"])
     allowed = details["ctx"]["expected"].replace("'", "")
     if place.models:
         allowed += f", a colour, or a mapping with {' and '.join(place.keys())}"
     elif float in place.types:
         allowed = f"a number or {allowed}"
     guess = _nearest_word(details["input"], allowed)
-    return Problem(tuple(place.path), f"must be {allowed}, got {shown_value(details['input'])}{guess}")
+    return Problem(tuple(place.path), f"must be {allowed}, got {shown(details['input'])}{guess}")
 
 
 def _nearest_word(given: Any, allowed: str) -> str:
@@ -218,17 +228,17 @@ def _nearest_word(given: Any, allowed: str) -> str:
     return f"; did you mean {guess!r}?" if guess else ""
 
 
-def _color(details: ErrorDetails) -> Problem:
+def _color(details: ErrorDetails, root: Root) -> Problem:
     """The message for what is no colour. Without quotes a `#` begins a comment, and the value is nothing."""
     given = details["input"]
     quoted = "; a # needs quotes" if given is None else ""
     return Problem(
-        tuple(_place(details["loc"]).path),
-        f"must be a list of 3 numbers, or a colour as '#ff8800' or '#f80', got {shown_value(given)}{quoted}",
+        tuple(_place(root, details["loc"]).path),
+        f"must be a list of 3 numbers, or a colour as '#ff8800' or '#f80', got {shown(given)}{quoted}",
     )
 
 
-_SPECIAL: Mapping[str, Callable[[ErrorDetails], Problem | None]] = {
+_SPECIAL: Mapping[str, Callable[[ErrorDetails, Root], Problem | None]] = {
     "clfractal": _own,
     "color": _color,
     "extra_forbidden": _unknown_key,
@@ -239,17 +249,3 @@ _SPECIAL: Mapping[str, Callable[[ErrorDetails], Problem | None]] = {
     "union_tag_invalid": _kind,
     "literal_error": _word,
 }
-
-
-def shown_value(value: Any) -> str:
-    """A value as errors show it: short, on one line."""
-    if value is None:
-        return "nothing"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (list, tuple)):
-        return f"a list of {len(value)}"
-    if isinstance(value, Mapping):
-        return "a mapping"
-    text = repr(value) if isinstance(value, (int, float, str)) else type(value).__name__
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -188,7 +188,7 @@ def _like(plane: SomePlane, placed: Placed) -> SomePlane:
     if isinstance(plane, Placed):
         return placed
     names = ("center", "normal", "up", "width", "height")
-    return Plane.model_validate({name: getattr(placed, name) for name in names})
+    return Plane.checked({name: getattr(placed, name) for name in names})
 
 
 def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:

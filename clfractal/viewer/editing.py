@@ -90,7 +90,7 @@ def replaced(scene: Scene, sections: Mapping[str, Any]) -> Scene:
             for name, value in sections.items()
         }
         document = Document(node_from_plain({**scene.resolved(), **plain}, None))
-        raise first_error(error, document) from error
+        raise first_error(error, document, Scene) from error
     result = scene.model_copy(update={name: getattr(checked, name) for name in sections})
     check_scene(result)
     return result

@@ -12,6 +12,7 @@ from math import atan2, degrees, isfinite
 import numpy as np
 from pydantic import ValidationError
 
+from clfractal.errors import SceneError
 from clfractal.optics.view import View, plane_view
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlane
@@ -141,7 +142,7 @@ def _changed(plane: Plane, placed: Placed, steps: dict[str, float]) -> Plane:
             added = _added(plane.transform, steps)
             if len(added) <= MOST_STEPS:
                 return plane.model_copy(update={"transform": added})
-        except ValidationError:
+        except SceneError:
             pass  # joined steps may leave a step's range though the plane stays in its own
     try:
         if not plane.transform and plane.corners is not None and _has_corners(placed):

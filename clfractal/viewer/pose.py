@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ValidationError
 
+from clfractal.errors import SceneError
 from clfractal.optics.view import camera_view
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST, NEAREST
@@ -72,7 +72,7 @@ def stood(
         update["up"] = tuple(np.asarray(up, float).tolist())
     try:
         return cast(C, camera.model_copy(update=update))
-    except ValidationError:
+    except SceneError:
         return camera
 
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
+from clfractal.arguments import shown
 from clfractal.errors import ClfractalError, Where, unknown_name
 from clfractal.files.atomic import atomic_writer, file_error
 from clfractal.files.document import read_document, read_text_file, write_document
 from clfractal.files.marks import Document
-from clfractal.scene.messages import shown_value
 from clfractal.viewer.keys import KeyMap
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_SETTINGS"
@@ -168,17 +168,17 @@ def _value(name: str, value: Any, default: Any, rules: Mapping[str, Any]) -> Any
     where = Where(path=name)
     if isinstance(default, bool):
         if not isinstance(value, bool):
-            raise ClfractalError(f"must be true or false, got {shown_value(value)}", where)
+            raise ClfractalError(f"must be true or false, got {shown(value)}", where)
         return value
     if isinstance(default, str):
         if value not in rules["words"]:
             words = " or ".join(rules["words"])
-            raise ClfractalError(f"must be {words}, got {shown_value(value)}", where)
+            raise ClfractalError(f"must be {words}, got {shown(value)}", where)
         return value
     whole = isinstance(default, int)
     if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
         kind = "whole number" if whole else "number"
-        raise ClfractalError(f"must be a {kind}, got {shown_value(value)}", where)
+        raise ClfractalError(f"must be a {kind}, got {shown(value)}", where)
     least, most = rules["least"], rules["most"]
     if not least <= value <= most:
         raise ClfractalError(f"must be from {least:g} to {most:g}, got {value:g}", where)
@@ -187,9 +187,7 @@ def _value(name: str, value: Any, default: Any, rules: Mapping[str, Any]) -> Any
 
 def _keys(value: Any) -> dict[str, tuple[str, ...]]:
     if not isinstance(value, Mapping):
-        raise ClfractalError(
-            f"must be a mapping of actions to keys, got {shown_value(value)}", Where(path="keys")
-        )
+        raise ClfractalError(f"must be a mapping of actions to keys, got {shown(value)}", Where(path="keys"))
     found: dict[str, tuple[str, ...]] = {}
     for name, given in value.items():
         chords = [given] if not isinstance(given, list) else given
@@ -199,7 +197,7 @@ def _keys(value: Any) -> dict[str, tuple[str, ...]]:
         )
         if not all(isinstance(text, str) for text in texts):
             raise ClfractalError(
-                f"must be a key such as Ctrl+S, or a list of keys, got {shown_value(given)}",
+                f"must be a key such as Ctrl+S, or a list of keys, got {shown(given)}",
                 Where(path=f"keys.{name}"),
             )
         found[str(name)] = texts

@@ -12,7 +12,6 @@ from random import Random
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from pydantic import ValidationError
 
 from clfractal.errors import ClfractalError, SceneError, Where, unknown_name
 from clfractal.formulas import reference
@@ -168,7 +167,7 @@ def _step(
         try:
             moved = changed(scene, step.changes) if step.changes else scene
             following = following_step(scene, moved, locked)
-        except (ClfractalError, ValidationError):
+        except ClfractalError:
             return None  # values that give the formula no meaning
         if following is None:
             return None
@@ -186,7 +185,7 @@ def _applied(scene: Scene, step: Step) -> Scene | None:
     try:
         varied = changed(scene, step.changes)
         check_scene(varied)
-    except (ClfractalError, ValidationError):
+    except ClfractalError:
         return None
     return None if varied == scene or _is_buried(varied) else varied
 
@@ -221,7 +220,7 @@ def preview_scene(scene: Scene, width: int, height: int) -> Scene:
         lively = changed(expanded(small), live)
         check_scene(lively)
         return lively
-    except (ClfractalError, ValidationError):
+    except ClfractalError:
         return small  # a value that only a text of its own can show
 
 

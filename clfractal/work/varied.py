@@ -60,7 +60,7 @@ def changed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
     """The scene with new values at dotted paths; only the keys that were given before, and these, count as given.
 
     Raises:
-        pydantic.ValidationError: the schema refuses a value.
+        SceneError: the schema refuses a value.
     """
     sections: dict[str, Any] = {}
     for path, value in changes.items():
