@@ -14,10 +14,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from clfractal.api import distances as distances
     from clfractal.api import escape as escape
     from clfractal.api import load_scene as load_scene
+    from clfractal.api import mesh as mesh
     from clfractal.api import render as render
     from clfractal.api import render_pair as render_pair
+    from clfractal.api import voxelize as voxelize
     from clfractal.device.cancel import CancelToken as CancelToken
     from clfractal.device.select import devices as devices
     from clfractal.errors import ClfractalError as ClfractalError
@@ -27,7 +30,10 @@ if TYPE_CHECKING:
     from clfractal.errors import KernelBuildError as KernelBuildError
     from clfractal.errors import SceneError as SceneError
     from clfractal.errors import Stopped as Stopped
+    from clfractal.files.mesh import Mesh as Mesh
+    from clfractal.files.volume import Volume as Volume
     from clfractal.pictures.film import Film as Film
+    from clfractal.renderers.points import Distances as Distances
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
     from clfractal.work.engine import Engine as Engine
@@ -37,10 +43,13 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "distances": "clfractal.api",
     "escape": "clfractal.api",
     "load_scene": "clfractal.api",
+    "mesh": "clfractal.api",
     "render": "clfractal.api",
     "render_pair": "clfractal.api",
+    "voxelize": "clfractal.api",
     "CancelToken": "clfractal.device.cancel",
     "devices": "clfractal.device.select",
     "ClfractalError": "clfractal.errors",
@@ -50,7 +59,10 @@ _HOMES = {
     "KernelBuildError": "clfractal.errors",
     "SceneError": "clfractal.errors",
     "Stopped": "clfractal.errors",
+    "Mesh": "clfractal.files.mesh",
+    "Volume": "clfractal.files.volume",
     "Film": "clfractal.pictures.film",
+    "Distances": "clfractal.renderers.points",
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
     "Engine": "clfractal.work.engine",
@@ -58,12 +70,16 @@ _HOMES = {
     "variations": "clfractal.work.variations",
 }
 
+__all__ = ["__version__", *_HOMES]
+
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+        found = getattr(import_module(_HOMES[name]), name)
+        globals()[name] = found  # the next time it is an attribute as any other
+        return found
     raise AttributeError(f"module 'clfractal' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted(["__version__", *_HOMES])
+    return sorted(__all__)

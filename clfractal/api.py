@@ -2,23 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FormulaError
+from clfractal import arguments
+from clfractal.errors import FormulaError, Where
+from clfractal.scene.load import as_scene
 from clfractal.scene.load import load_scene as load_scene
 from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
+    from clfractal.device.select import Device
     from clfractal.device.structs import Precision
+    from clfractal.files.mesh import Mesh
+    from clfractal.files.volume import Volume
+    from clfractal.formulas.language import Chain
     from clfractal.pictures.film import Film
+    from clfractal.renderers.points import Distances
+    from clfractal.scene.coloring import Coloring
+    from clfractal.work.grids import Talk
     from clfractal.work.run import ProgressCallback
 
-__all__ = ["escape", "load_scene", "render", "render_pair"]
+__all__ = ["distances", "escape", "load_scene", "mesh", "render", "render_pair", "voxelize"]
+
+SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
+"""A scene, or what `load_scene` takes."""
+
+PRECISIONS = ("auto", "float32", "float64")
 
 
 def render(
@@ -98,8 +113,8 @@ def escape(
         formula: a name of the library, the path of a formula file, or a mapping: a formula, or a scene's
             `formula` section (which may have `julia` and `chain`).
         points: shape (n, 3), scene units.
-        iterations: the maximum number of applications.
-        bailout: |z| beyond which a point has escaped; None: the formula's.
+        iterations: the maximum number of applications, up to 2,000,000,000.
+        bailout: |z| beyond which a point has escaped, above 0; None: the formula's.
         parameters: values of the formula's parameters that differ from the defaults.
         precision: `float32` or `float64`.
         device: as for `render`.
@@ -113,21 +128,228 @@ def escape(
         FileError: the formula's file cannot be read.
         DeviceError, KernelBuildError: as for `render`.
     """
-    from clfractal.device.select import choose
-    from clfractal.formulas.catalog import load_chain
+    from clfractal.device.orbit import MOST_APPLICATIONS
     from clfractal.renderers import points as launch
-    from clfractal.renderers.lanes import best_lanes, rule_of
 
-    chain = load_chain(formula, parameters)
-    if precision not in ("float32", "float64"):
-        raise FormulaError(f"precision must be float32 or float64, got {precision!r}")
-    if isinstance(iterations, bool) or not isinstance(iterations, (int, np.integer)) or iterations < 0:
-        raise FormulaError(f"iterations must be a whole number, at least 0, got {iterations!r}")
-    places = np.asarray(points, np.float64)
-    if places.ndim != 2 or places.shape[1] != 3:
-        raise FormulaError(f"points must have shape (n, 3), got {places.shape}")
-    number, chosen = cast("Precision", precision), choose(device)
-    lanes = best_lanes(chosen, number, rule_of(chain))
+    asked = _asked(formula, parameters, points, iterations, MOST_APPLICATIONS, precision)
+    if bailout is not None:
+        bailout = arguments.number("bailout", bailout, most=1e9, above=0, error=FormulaError)
+    chosen, lanes = asked.on(device)
     return launch.escape(
-        chain, places, int(iterations), device=chosen, lanes=lanes, precision=number, bailout=bailout
+        asked.chain,
+        asked.points,
+        asked.iterations,
+        device=chosen,
+        lanes=lanes,
+        precision=asked.precision,
+        bailout=bailout,
     )
+
+
+def distances(
+    formula: str | Path | Mapping[str, Any],
+    points: npt.ArrayLike,
+    *,
+    iterations: int = 30,
+    parameters: Mapping[str, float] | None = None,
+    precision: str = "float32",
+    device: str | None = None,
+) -> Distances:
+    """Distances from points to a formula's set, with the normals there.
+
+    Args:
+        formula: as for `escape`.
+        points: shape (n, 3), scene units.
+        iterations: applications that the set is made of, up to 1,000,000: the set of points that do not escape in so many.
+        parameters, precision, device: as for `escape`.
+
+    Returns:
+        Arrays of shape (n,) and (n, 3): `step`, the distance that rays march by; `full`, the distance by the whole
+        Jacobian; `normal`, the direction in which the distance grows, of length 1; `smooth`, the smooth escape count;
+        and `inside`. Distances are estimates in scene units, 0 inside.
+
+    Raises:
+        FormulaError: the formula, a parameter or another argument is wrong.
+        FileError: the formula's file cannot be read.
+        DeviceError, KernelBuildError: as for `render`.
+    """
+    from clfractal.renderers import points as launch
+    from clfractal.scene.formula import MOST_ITERATIONS
+
+    asked = _asked(formula, parameters, points, iterations, MOST_ITERATIONS, precision, least=1)
+    chosen, lanes = asked.on(device)
+    return launch.distances(
+        asked.chain, asked.points, asked.iterations, device=chosen, lanes=lanes, precision=asked.precision
+    )
+
+
+def voxelize(
+    scene: Scene | str | Path | Mapping[str, Any],
+    device: str | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    *,
+    resolution: int | Sequence[int] | None = None,
+    precision: str | None = None,
+) -> Volume:
+    """Fills the grid of a scene's formula, as `clfractal voxelize` does.
+
+    A scene without the volume renderer gets one with default settings. If its volume renderer shows a file, the result is
+    that file's grid.
+
+    Args:
+        scene, device: as for `render`.
+        progress: called with the stage of the work and its finished part, 0 to 1; an exception in it ends the work.
+        resolution: voxels along the longest side, or along x, y and z; None: the scene's.
+        precision: `auto`, `float32` or `float64`; None: the scene's.
+
+    Returns:
+        A volume: `values` of shape (nz, ny, nx), and where its voxels are: `origin`, `directions`, scene units.
+
+    Raises:
+        SceneError, FormulaError: the scene or an argument is wrong, or the grid does not fit into memory.
+        DeviceError, KernelBuildError: as for `render`.
+    """
+    from clfractal.work import grids
+
+    arguments.function("progress", progress)
+    wanted, coloring = _volume_scene(scene, resolution, precision)
+    volume = grids.given(wanted)
+    if volume is not None:
+        grids.refuse_resolution(resolution)
+        return volume
+    return grids.filled(wanted, coloring, device, _talk(progress))[0]
+
+
+def mesh(
+    source: Scene | Volume | str | Path | Mapping[str, Any],
+    device: str | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    *,
+    level: float | None = None,
+    close: bool = True,
+    resolution: int | Sequence[int] | None = None,
+    precision: str | None = None,
+) -> Mesh:
+    """The surface in the grid of a scene's formula, or in a volume, as triangles: as `clfractal mesh` does.
+
+    It has the formula's own normals and the scene's colours, if the scene is known. It needs scikit-image.
+
+    Args:
+        source: a scene as for `voxelize`, or a `Volume`.
+        device, progress, resolution, precision: as for `voxelize`. A volume has no resolution to choose.
+        level: the value at the surface; None: the scene's, or half way between a volume's least and largest values.
+        close: whether the surface is closed where it leaves the grid.
+
+    Returns:
+        A mesh: `vertices` (n, 3) in scene units, `triangles` (m, 3), `normals` and `colors` of vertices.
+
+    Raises:
+        SceneError, FormulaError: the source or an argument is wrong, there is no surface, or no memory for the grid.
+        FileError: scikit-image is not installed.
+        DeviceError, KernelBuildError: as for `render`.
+    """
+    from clfractal.files.volume import Volume
+    from clfractal.work import grids, meshes
+
+    meshes.check_library()
+    arguments.function("progress", progress)
+    if level is not None:
+        level = arguments.number("level", level)
+    close = arguments.flag("close", close)
+    talk = _talk(progress)
+    if isinstance(source, Volume):
+        if resolution is not None:
+            arguments.refuse("resolution", "applies to scenes only; the source is a volume", resolution)
+        if precision is not None:
+            precision = arguments.word("precision", precision, PRECISIONS)
+        return meshes.of_volume(
+            source, device=device, level=level, close=close, precision=precision, talk=talk
+        )
+    wanted, coloring = _volume_scene(source, resolution, precision)
+    if wanted.given is not None:
+        grids.refuse_resolution(resolution)
+    return meshes.of_scene(wanted, coloring, device=device, level=level, close=close, talk=talk)
+
+
+def _volume_scene(
+    source: SceneLike, resolution: int | Sequence[int] | None, precision: str | None
+) -> tuple[Scene, Coloring]:
+    """The scene that a grid is made of, with arguments in it, and the coloring of its mesh."""
+    from clfractal.work import grids
+
+    scene, coloring = grids.as_volume(as_scene(source))
+    changes: dict[str, Any] = {}
+    if resolution is not None:
+        changes["resolution"] = resolution
+    if precision is not None:
+        changes["precision"] = arguments.word("precision", precision, PRECISIONS)
+    if changes:
+        scene = scene.model_copy(update={"renderer": scene.renderer.model_copy(update=changes)})
+    return scene, coloring
+
+
+def _talk(progress: Callable[[str, float], None] | None) -> Talk:
+    from clfractal.work.grids import Talk
+
+    return Talk() if progress is None else Talk(progress=progress)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A question about points, checked."""
+
+    chain: Chain
+    points: npt.NDArray[np.float64]
+    iterations: int
+    precision: Precision
+
+    def on(self, device: str | None) -> tuple[Device, int]:
+        """The device, and its lanes.
+
+        Raises:
+            FormulaError: it has no float64.
+            DeviceError: there is none.
+        """
+        from clfractal.device.select import choose, has_float64
+        from clfractal.renderers.lanes import best_lanes, rule_of
+
+        chosen = choose(device)
+        if self.precision == "float64" and not has_float64(chosen.info):
+            raise FormulaError("the device has no float64; use float32", Where(path="precision"))
+        return chosen, best_lanes(chosen, self.precision, rule_of(self.chain))
+
+
+def _asked(
+    formula: str | Path | Mapping[str, Any],
+    parameters: Mapping[str, float] | None,
+    points: npt.ArrayLike,
+    iterations: int,
+    most: int,
+    precision: str,
+    *,
+    least: int = 0,
+) -> _Asked:
+    from clfractal.formulas.catalog import load_chain
+
+    if not isinstance(formula, (str, Path, Mapping)):
+        allowed = "must be a name of the library, a path or a mapping"
+        arguments.refuse("formula", allowed, arguments.plain(formula), FormulaError)
+    if parameters is not None and not isinstance(parameters, Mapping):
+        arguments.refuse("parameters", "must be a mapping", arguments.plain(parameters), FormulaError)
+    chain = load_chain(arguments.plain(formula), arguments.plain(parameters))
+    number = cast("Precision", arguments.word("precision", precision, PRECISIONS[1:], FormulaError))
+    count = arguments.whole("iterations", iterations, least, most, FormulaError)
+    return _Asked(chain, _points(points), count, number)
+
+
+def _points(points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    try:
+        found = np.asarray(points)
+        array = found.astype(np.float64, casting="unsafe" if found.dtype.kind in "biuf" else "no", copy=False)
+    except (ValueError, TypeError):
+        raise FormulaError("must be numbers of shape (n, 3)", Where(path="points")) from None
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise FormulaError(f"must have shape (n, 3), got {array.shape}", Where(path="points"))
+    if not np.isfinite(array).all():
+        raise FormulaError("must be finite", Where(path="points"))
+    return array

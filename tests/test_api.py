@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import io
+import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,24 +17,77 @@ from PIL import Image
 import clfractal
 from clfractal.files.exr import read_exr
 from clfractal.work.run import Progress
-from tests.shell import SCENE
+from tests.shell import SCENE, environment
 
 
 def test_everything_public_is_there() -> None:
-    for name in dir(clfractal):
-        assert getattr(clfractal, name) is not None
+    """What type checkers see, what is loaded, and what `dir` lists are the same names."""
+    tree = ast.parse(Path(clfractal.__file__).read_text(encoding="utf-8"))
+    typed = {
+        name.asname: (node.module, name.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("clfractal.")
+        for name in node.names
+    }
+    assert sorted([*map(str, typed), "__version__"]) == dir(clfractal)
+    for public, (module, name) in typed.items():
+        assert getattr(clfractal, str(public)) is getattr(importlib.import_module(str(module)), name)
+        assert public == name
     with pytest.raises(AttributeError, match="no attribute 'rendre'"):
         clfractal.rendre  # noqa: B018
 
 
-def test_render_is_a_plain_function_and_stereo_a_public_module() -> None:
-    import inspect
+FUNCTIONS = {
+    "devices": [],
+    "distances": ["formula", "points"],
+    "dump_scene": ["scene"],
+    "escape": ["formula", "points", "iterations", "bailout"],
+    "load_scene": ["source", "overrides", "folder"],
+    "mesh": ["source", "device", "progress", "level"],
+    "render": ["scene", "device", "progress", "samples", "region"],
+    "render_pair": ["scene", "device", "progress", "samples"],
+    "variations": ["scene", "count", "strength", "seed"],
+    "voxelize": ["scene", "device", "progress", "resolution"],
+}
 
+
+def test_a_fresh_session_finds_every_function_with_its_help() -> None:
+    """As a notebook asks: names, signatures and texts, before anything was called."""
+    code = (
+        "import inspect, json, pydoc, clfractal\n"
+        "names = [n for n in dir(clfractal) if inspect.isfunction(getattr(clfractal, n))]\n"
+        "told = {n: [list(inspect.signature(getattr(clfractal, n)).parameters), getattr(clfractal, n).__doc__]"
+        " for n in names}\n"
+        "pages = [pydoc.plain(pydoc.render_doc(each)) for each in (clfractal, clfractal.render)]\n"
+        "print(json.dumps([told, *pages]))"
+    )
+    command = [sys.executable, "-P", "-c", code]
+    ended = subprocess.run(command, capture_output=True, text=True, check=True, env=environment())
+    told, module, render = json.loads(ended.stdout)
+    assert sorted(told) == sorted(FUNCTIONS)
+    for name, (parameters, text) in told.items():
+        assert [each for each in FUNCTIONS[name] if each not in parameters] == [], name
+        assert len(text.splitlines()[0]) > 20, name
+        assert f"    {name}(" in module
+    assert "samples: rays per pixel" in render
+    assert "DeviceError: no device" in render
+
+
+def test_names_that_are_modules_stay_modules() -> None:
     import clfractal.stereo
 
-    assert inspect.isfunction(clfractal.render)
-    assert "device" in inspect.signature(clfractal.render).parameters
     assert all(callable(getattr(clfractal.stereo, name)) for name in ("frustum", "attitude", "parallax"))
+    assert set(dir(clfractal)) == set(clfractal.__all__)
+
+
+def test_a_scene_lists_what_is_meant_for_users() -> None:
+    scene = clfractal.load_scene(SCENE)
+    names = dir(scene)
+    assert [name for name in names if name.startswith("_")] == []
+    assert {"camera", "renderer", "formula", "bookmarks", "resolved", "folder", "model_copy"} <= set(names)
+    assert {"json", "dict", "copy", "parse_obj", "model_fields", "construct", "checked"} & set(names) == set()
+    assert all(hasattr(scene, name) for name in names if name not in ("surface", "views"))
+    assert set(type(scene.camera).model_fields) < set(dir(scene.camera))
 
 
 def test_a_film_of_arrays() -> None:
@@ -117,10 +175,10 @@ def test_exposure_and_transparency_reach_the_picture(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"samples": 0}, "--samples: must be from 1"),
-        ({"precision": "float128"}, "unknown precision 'float128'"),
-        ({"channels": ["R", "Q"]}, "unknown channel 'Q'"),
-        ({"region": (0, 0, 41, 1)}, "must lie inside the picture"),
+        ({"samples": 0}, "^samples: must be from 1"),
+        ({"precision": "float128"}, "^precision: must be auto, float32 or float64, got 'float128'"),
+        ({"channels": ["R", "Q"]}, "^channels: unknown channel 'Q'"),
+        ({"region": (0, 0, 41, 1)}, "^region: must lie inside the picture"),
         ({"device": "nosuch"}, "unknown device 'nosuch'"),
     ],
 )
@@ -176,9 +234,9 @@ def test_escape_of_a_formula_of_ones_own(tmp_path: Path, precision: str) -> None
     [
         ("mandelbul", {}, "did you mean 'mandelbulb'"),
         ("mandelbulb", {"parameters": {"powr": 3}}, "did you mean 'power'"),
-        ("mandelbulb", {"precision": "half"}, "precision must be"),
-        ("mandelbulb", {"iterations": -1}, "iterations must be"),
-        ("mandelbulb", {"iterations": 1.5}, "iterations must be"),
+        ("mandelbulb", {"precision": "half"}, "^precision: must be float32 or float64"),
+        ("mandelbulb", {"iterations": -1}, "^iterations: must be"),
+        ("mandelbulb", {"iterations": 1.5}, "^iterations: must be"),
     ],
 )
 def test_wrong_questions_to_escape(formula: str, settings: dict[str, object], message: str) -> None:
@@ -188,7 +246,7 @@ def test_wrong_questions_to_escape(formula: str, settings: dict[str, object], me
 
 @pytest.mark.parametrize("points", [[0, 0, 0], [[0, 0]], np.zeros((2, 3, 1))])
 def test_points_of_a_wrong_shape(points: object) -> None:
-    with pytest.raises(clfractal.FormulaError, match="points must have shape"):
+    with pytest.raises(clfractal.FormulaError, match=r"^points: must have shape"):
         clfractal.escape("hast", points, iterations=5)  # type: ignore[arg-type]
 
 

@@ -336,7 +336,7 @@ def test_what_is_told_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(voxelize_command, "LINE_EVERY_SECONDS", 0.0)
     stages = voxelize_command.StageProgress(Told())  # type: ignore[arg-type]
-    stages.of("triangles")(0.25)
+    stages.say("triangles", 0.25)
     stages.say("normals", 1.0)
     assert told == ["triangles:  25%"]
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+
+from clfractal.errors import SceneError, Where
 
 PARTIAL = ".partial"
 """Suffix of the file for unfinished work, added to the first output's name."""
@@ -23,3 +27,19 @@ class Order:
     samples: int | None = None
     resume: bool = False
     stats: Path | None = None
+
+
+OF_RENDER = {"region": "--region", "precision": "--precision"}
+"""Arguments of Python functions, and the options that give them."""
+
+
+@contextmanager
+def naming_options(options: Mapping[str, str] = OF_RENDER) -> Iterator[None]:
+    """Errors about arguments of Python functions become errors about the options that gave them."""
+    try:
+        yield
+    except SceneError as error:
+        option = options.get(error.where.path or "")
+        if error.where.file is not None or option is None:
+            raise
+        raise SceneError(error.message, Where(option), details=error.details) from error

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
+from clfractal.commands.order import naming_options
 from clfractal.commands.progress import Reporter
 from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, SceneError, Where, speaking_of
@@ -40,7 +41,7 @@ def render_scene(order: Order, shell: Shell) -> None:
     from clfractal.work.save import save_job
 
     engine = Engine(order.device, tell=shell.say)
-    with speaking_of(order.scene):
+    with speaking_of(order.scene), naming_options():
         job = engine.prepare(scene, region=region, samples=order.samples, precision=order.precision)
     if job.remark:
         shell.say(f"{order.scene}: {job.remark}")

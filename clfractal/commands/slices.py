@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clfractal.commands.order import PARTIAL
+from clfractal.commands.order import PARTIAL, naming_options
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where
@@ -64,14 +64,16 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     from clfractal.work.engine import Engine
 
     engine = Engine(order.device, tell=shell.say)
-    precision = order.precision or _precision(scenes, engine.device)
+    with naming_options():
+        precision = order.precision or _precision(scenes, engine.device)
     told, rays, number = begun, 0, stack.start
     shell.state = lambda: (
         f"{files[number - stack.start][0]}: interrupted with {number - 1} of {stack.count} slices done;"
         f" --start {number} continues"
     )
     for number, each, paths in zip(numbers, scenes, files, strict=True):
-        job = engine.prepare(each, precision=precision, samples=order.samples)
+        with naming_options():
+            job = engine.prepare(each, precision=precision, samples=order.samples)
         rays += _rendered(job, engine, paths, shell)
         now = time.perf_counter()
         if now - told > _LINE_SECONDS and number < stack.count:

@@ -5,37 +5,33 @@ from __future__ import annotations
 import json
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
+from clfractal.commands.order import naming_options
 from clfractal.commands.progress import LINE_EVERY_SECONDS
 from clfractal.commands.shell import Shell
-from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
-from clfractal.files.volume import BESIDE, EXTENSIONS, SCENE_KEY, Volume, write_volume
+from clfractal.files.volume import BESIDE, EXTENSIONS, write_volume
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_coloring, load_scene, read_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 
 if TYPE_CHECKING:
-    from clfractal.device.select import Device
-    from clfractal.voxels.grid import Grid
-    from clfractal.work.job import Job
+    from clfractal.work.grids import Talk
 
 _AS_VOLUME, _AS_SURFACE, _PLAIN = (
     "renderer={type: volume}",
     "renderer={type: surface}",
     "coloring={by: solid}",
 )
-COLORING_KEY = "coloring"
-"""Key of the volume's text with the scene's coloring: the volume renderer supports fewer colorings than a mesh."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +60,6 @@ class StageProgress:
             self._next = now + LINE_EVERY_SECONDS
             self._shell.say(f"{stage}: {part:4.0%}")
 
-    def of(self, stage: str) -> Callable[[float], None]:
-        """The same for one stage, as a function of the finished fraction."""
-        return lambda part: self.say(stage, part)
-
 
 def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
     """Fills the grid of a scene and writes it; a grid that the scene shows from a file is converted.
@@ -89,10 +81,15 @@ def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
     scene, coloring = load_order(order)
     refuse_overwriting(files, scene.files)
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
-    volume = given_volume(order, scene)
-    if volume is None:
-        grid, job, _ = fill(order, scene, shell)
-        volume = grid_volume(grid, job, coloring)
+    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
+    from clfractal.work import grids
+
+    with speaking_of_order(order):
+        volume = grids.given(scene)
+        if volume is not None:
+            grids.refuse_resolution(order.resolution)
+        else:
+            volume, _ = grids.filled(scene, coloring, order.device, talk_of(order, shell))
     write_volume(order.output, volume, compress=compress)
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
@@ -147,83 +144,18 @@ def _resolution(text: str) -> str:
     return f"[{text}]" if "," in text else text
 
 
-def fill(order: GridOrder, scene: Scene, shell: Shell) -> tuple[Grid, Job, Device]:
-    """The scene's grid, its job and the device that it is on; the memory that it needs is printed first.
+def talk_of(order: GridOrder, shell: Shell) -> Talk:
+    """What goes on, as lines of the shell."""
+    from clfractal.work.grids import Talk
 
-    Raises:
-        ClfractalError: it does not fit; the device failed.
-    """
-    assert isinstance(scene.renderer, VolumeRenderer)
-    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
-    from clfractal.device.select import choose
-    from clfractal.scene.checks import used_boxes
-    from clfractal.voxels.fill import FillProgress, fill_grid
-    from clfractal.voxels.lattice import lattice_of
-    from clfractal.work.prepare import prepare
-
-    settings = scene.renderer
-    lattice = lattice_of(used_boxes(scene, settings)[1], settings.resolution)
-    x, y, z = lattice.shape
-    need = x * y * z * (1 if settings.store == "byte" else 4)
-    have = memory.available()
-    needs = f"{x} x {y} x {z} voxels need {memory.shown(need)} of memory"
-    if need > have:
-        where = Where("--resolution") if order.resolution else Where(order.source, path="renderer.resolution")
-        raise SceneError(f"{needs}, {memory.shown(have)} are left", where)
-    shell.say(f"{order.source}: {needs}, {memory.shown(have)} are left")
-    device = choose(order.device)
-    job = prepare(scene, device, on_start=shell.say)
-    plan = job.views[0].plan
-    if job.remark:
-        shell.say(f"{order.source}: {job.remark}")
-    stages = StageProgress(shell)
-
-    def progress(state: FillProgress) -> None:
-        stages.say(f"voxels, {state.stage}", state.done / max(state.total, 1))
-
-    grid = fill_grid(
-        scene,
-        settings,
-        device,
-        lanes=plan.lanes,
-        precision=plan.precision,
-        on_compile=shell.say,
-        progress=progress,
-    )
-    return grid, job, device
+    return Talk(shell.say, lambda line: shell.say(f"{order.source}: {line}"), StageProgress(shell).say)
 
 
-def given_volume(order: GridOrder, scene: Scene) -> Volume | None:
-    """The grid from a file that a scene shows, with the scene's position and size; None if it shows its formula.
-
-    It has no texts: the scene's formula did not make the grid.
-    """
-    given = scene.given
-    if given is None:
-        return None
+@contextmanager
+def speaking_of_order(order: GridOrder) -> Iterator[None]:
+    """Errors name the option that gave a value, else the source."""
+    options = {"level": "--level", "resolution": "--resolution"}
     if order.resolution is not None:
-        raise SceneError(
-            "applies only to grids filled from a formula; the scene shows a file", Where("--resolution")
-        )
-    spacing = np.array(given.spacing)
-    return Volume(given.values, np.array(given.corner) + spacing / 2, np.diag(spacing))
-
-
-def grid_volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
-    """The grid's values as they are stored, with where they are and the scene that made them."""
-    settings = job.scene.renderer
-    assert isinstance(settings, VolumeRenderer)
-    corner, spacing = np.array(grid.corner), np.array(grid.spacing)
-    texts = {
-        # One line, and no colon before a space: VTK's reader would take the text before it for a field's name.
-        SCENE_KEY: _one_line(job.resolved()),
-        COLORING_KEY: _one_line(coloring.model_dump(mode="json")),
-        "value": settings.value,
-        # What the bytes 0 and 255 stand for; floats are the value's own numbers.
-        "range": f"{grid.range[0]:g} {grid.range[1]:g}",
-    }
-    return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts)
-
-
-def _one_line(plain: Any) -> str:
-    return json.dumps(plain, separators=(",", ":")).replace(": ", ":\\u0020")
+        options["renderer.resolution"] = "--resolution"
+    with speaking_of(order.source), naming_options(options):
+        yield

@@ -17,10 +17,11 @@ from typing import Any, Literal
 
 import pyopencl as cl
 
+from clfractal.arguments import plain, shown
 from clfractal.device import cache
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
-from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, unknown_name
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, Where, unknown_name
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
 SPEEDS = "speeds"  # section of the cache: rays per second or the like, by `DeviceInfo.key`
@@ -189,6 +190,9 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     Raises:
         DeviceError: status 2 if nothing fits `spec`; status 3 if there is no device at all.
     """
+    if spec is not None and not isinstance(spec, str):
+        message = f"must be text such as cpu, gpu, 0:0 or part of a name, got {shown(plain(spec))}"
+        raise DeviceError(message, Where(path="device"), status=STATUS_BAD_INPUT)
     found = _found()
     if not found:
         raise DeviceError(_INSTALL_HINT)

@@ -17,7 +17,9 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.files.atomic import atomic_writer, file_error
+from clfractal import arguments
+from clfractal.files.atomic import atomic_writer, check_output, file_error
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.srgb import encode
 
 EXTENSIONS = (".ply", ".stl", ".obj", ".glb")
@@ -40,23 +42,36 @@ class Mesh:
         triangles: (m, 3), indices of vertices, counter-clockwise seen from outside.
         normals: (n, 3), unit length, or None.
         colors: (n, 3), linear Rec. 709, 0 to 1, or None.
+        text: the scene that made it, kept in files; or empty.
+        inputs: files that were read for it, which `save` does not replace.
     """
 
     vertices: npt.NDArray[np.float64]
     triangles: npt.NDArray[np.int32]
     normals: npt.NDArray[Any] | None = None
     colors: npt.NDArray[Any] | None = None
+    text: str = ""
+    inputs: tuple[Path, ...] = ()
+
+    def save(self, path: str | Path) -> None:
+        """Writes the mesh: .ply, .stl, .obj or .glb; see `write_mesh`.
+
+        Raises:
+            FileError: it cannot be written, is one of the files that were read for the mesh, or it has no triangle.
+        """
+        checked = arguments.path_of("path", path)
+        check_output(checked, EXTENSIONS)
+        refuse_overwriting([checked], self.inputs)
+        write_mesh(checked, self)
 
 
-def write_mesh(path: str | Path, mesh: Mesh, *, text: str = "") -> None:
+def write_mesh(path: str | Path, mesh: Mesh) -> None:
     """Writes a mesh in the format of the path's extension; it appears complete or not at all.
 
     PLY and OBJ have 64-bit coordinates where 32 bits are too few. Colours are sRGB in PLY (8 bits) and OBJ
     (after the coordinates, as most programs read them), linear in GLB (16 bits); STL has neither colours nor
-    normals of vertices. GLB is y up: a point (x, y, z) is (x, z, -y) there.
-
-    Args:
-        text: kept in the file: as comments in PLY and OBJ, in `asset.extras.clfractal` of GLB, not in STL.
+    normals of vertices. GLB is y up: a point (x, y, z) is (x, z, -y) there. The mesh's text is kept as comments in PLY
+    and OBJ, in `asset.extras.clfractal` of GLB, not in STL.
 
     Raises:
         FileError: the file cannot be written; an unknown extension; a mesh without triangles, or one that is too
@@ -75,10 +90,10 @@ def write_mesh(path: str | Path, mesh: Mesh, *, text: str = "") -> None:
         raise file_error(path, "cannot be written: the mesh has no triangle", "")
     if suffix in SINGLE_PRECISION and _is_fine(mesh):
         raise file_error(path, f"cannot be written: {TOO_FINE}", "")
-    if suffix == ".glb" and _glb_length(mesh) + 65_536 + 4 * len(text) > _LARGEST_GLB:
+    if suffix == ".glb" and _glb_length(mesh) + 65_536 + 4 * len(mesh.text) > _LARGEST_GLB:
         raise file_error(path, "cannot be written: the mesh is too large for GLB, which ends at 4 GB", "")
     with atomic_writer(path) as beside, open(beside, "wb", buffering=1 << 20) as stream:
-        writers[suffix](stream, mesh, text)
+        writers[suffix](stream, mesh, mesh.text)
 
 
 TOO_FINE = "its 32-bit coordinates cannot hold so small triangles so far from the origin; .ply and .obj can"

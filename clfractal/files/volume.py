@@ -21,9 +21,11 @@ from typing import Any, BinaryIO, Literal, cast
 import numpy as np
 import numpy.typing as npt
 
+from clfractal import arguments
 from clfractal.errors import FileError
 from clfractal.files import memory, nrrd
-from clfractal.files.atomic import atomic_writer, file_error, open_regular
+from clfractal.files.atomic import atomic_writer, check_output, file_error, open_regular
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.regular import read_text_file
 
 Values = npt.NDArray[Any]
@@ -63,12 +65,14 @@ class Volume:
         directions: shape (3, 3), row i the step from a voxel to the next along x, y, z, the last array axis
             being x; scene units.
         texts: what else is told of it, by keys; under `SCENE_KEY` the scene that made it.
+        inputs: files that were read for it, which `save` does not replace.
     """
 
     values: Values
     origin: Doubles = field(default_factory=lambda: np.zeros(3))
     directions: Doubles = field(default_factory=lambda: np.eye(3))
     texts: Mapping[str, str] = field(default_factory=dict)
+    inputs: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         if self.values.ndim != 3 or 0 in self.values.shape or self.values.dtype.kind not in "biuf":
@@ -80,6 +84,23 @@ class Volume:
     def spacing(self) -> Doubles:
         """Distances between voxels along x, y, z, scene units."""
         return np.asarray(np.linalg.norm(self.directions, axis=1), np.float64)
+
+    def save(self, path: str | Path, *, compress: bool = False) -> None:
+        """Writes the volume: .nrrd, or .npy with a .json beside it; see `write_volume`.
+
+        Raises:
+            FileError: it cannot be written, or is one of the files that were read for the volume.
+        """
+        checked = arguments.path_of("path", path)
+        check_output(checked, EXTENSIONS)
+        refuse_overwriting([checked], self.inputs)
+        write_volume(checked, self, compress=arguments.flag("compress", compress))
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> Values:
+        """The values; `np.asarray(volume)` calls this, without copying them."""
+        if copy is None:
+            return np.asarray(self.values, dtype)
+        return np.array(self.values, dtype, copy=copy)
 
 
 def read_volume(path: str | Path, *, limit: int | None = None) -> Volume:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal import arguments
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.srgb import encode8
 from clfractal.files.tone import TONES, Tone, toned
@@ -45,9 +46,15 @@ class Development:
     def of(
         cls, header: Mapping[str, Any], exposure: float | None = None, tone: Tone | None = None
     ) -> Development:
-        """What a picture's header says, with other values where they are given."""
+        """What a picture's header says, with other values where they are given.
+
+        Raises:
+            SceneError: the exposure is no number from -100 to 100, or there is no such curve.
+        """
         return cls(
-            float(header.get("exposure", 0.0)) if exposure is None else exposure,
+            float(header.get("exposure", 0.0))
+            if exposure is None
+            else arguments.number("exposure", exposure, -100, 100),
             header.get("tone", "linear") if tone is None else tone,
             bool(header.get("transparent", False)),
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from clfractal import arguments
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.tone import Tone
@@ -209,11 +210,13 @@ class Film:
         """Writes an `.exr` or `.png` file; settings as in `outputs.save_outputs`.
 
         Raises:
+            SceneError: a setting is wrong.
             FileError: it cannot be written, or is one of the files that were read for the picture.
         """
         from clfractal.files.inputs import refuse_overwriting
         from clfractal.pictures.outputs import save_outputs
 
+        path = arguments.path_of("path", path)
         refuse_overwriting([path], self.inputs)
         save_outputs(self, [path], **settings)
 
@@ -235,6 +238,7 @@ class Film:
 
         Raises:
             KeyError: the film has no R, G, B.
+            SceneError: the exposure is no number from -100 to 100.
         """
         return rgb8(self, Development.of(self.header, exposure, tone))
 

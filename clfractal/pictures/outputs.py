@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from clfractal import arguments
 from clfractal.errors import FileError, Where
 from clfractal.files import atomic
-from clfractal.files.channels import CHANNELS, VIEWS, in_view
+from clfractal.files.channels import CHANNELS, VIEWS, check_channels, in_view
 from clfractal.files.png import Bits, stream_png, write_png
 from clfractal.files.tone import Tone
 from clfractal.pictures.develop import Development, developed
@@ -66,8 +67,13 @@ def save_outputs(
             If they are None, the header's values are used.
 
     Raises:
+        SceneError: a setting is wrong.
         FileError: a file cannot be written; earlier ones of `paths` may already be written.
     """
+    bits = _checked_bits(bits)
+    half = None if half is None else check_channels(arguments.words("half", half), Where(path="half"))
+    transparent = None if transparent is None else arguments.flag("transparent", transparent)
+    exposure = None if exposure is None else arguments.number("exposure", exposure, -100, 100)
     chosen = [Path(path) for path in paths]
     for path in chosen:
         check_output(path, store.channels)
@@ -102,6 +108,13 @@ def save_outputs(
                 half=half,
                 header=_attributes(whole),
             )
+
+
+def _checked_bits(bits: Any) -> Bits:
+    found = arguments.whole("bits", bits, 1, 64)
+    if found != 8 and found != 16:
+        arguments.refuse("bits", "must be 8 or 16", found)
+    return 8 if found == 8 else 16
 
 
 def output_files(stereo: Stereo | None, path: str | Path) -> list[Path]:

@@ -142,7 +142,7 @@ def choose_precision(
         SceneError: float64 is asked for on a device without it.
     """
     if wanted == "float64" and not has_float64:
-        raise SceneError("the device has no float64; use float32", Where("--precision"))
+        raise SceneError("the device has no float64; use float32", Where(path="precision"))
     if wanted != "auto":
         return wanted, ""
     view = scene_view(scene, eye)
@@ -166,7 +166,7 @@ def make_region(size: tuple[int, int], region: tuple[int, int, int, int] | None)
     if w < 1 or h < 1 or x < 0 or y < 0 or x + w > width or y + h > height:
         got = ",".join(str(value) for value in region)
         raise SceneError(
-            f"must lie inside the picture of {width} x {height} pixels, got {got}", Where("--region")
+            f"must lie inside the picture of {width} x {height} pixels, got {got}", Where(path="region")
         )
     return Region(x, y, w, h)
 

@@ -28,6 +28,10 @@ Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False), AS_TEXT]
 Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False), AS_TEXT]
 
 
+# Names of sections that are no part of the Python API.
+_FOR_OURSELVES = frozenset({"checked", "note_files", "placed", "tag"})
+
+
 class Section(BaseModel):
     """A mapping of the scene: unknown keys are errors, values are not converted, and it is immutable.
 
@@ -36,6 +40,12 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
     tag: ClassVar[str] = ""
+
+    def __dir__(self) -> list[str]:
+        """The keys, and what else is meant for users: not what pydantic's models bring along."""
+        own = [name for cls in type(self).__mro__ if issubclass(cls, Section) for name in vars(cls)]
+        public = {name for name in own if not name.startswith(("_", "model_"))} - _FOR_OURSELVES
+        return sorted({*type(self).model_fields, *public, "model_copy"})
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy; values in `update` are checked, and nothing that was derived from the old values is kept.

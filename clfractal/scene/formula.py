@@ -8,6 +8,7 @@ from clfractal.scene.base import Coordinate, Number, Section, problem
 
 MAX_LINKS = 64
 MAX_LIVE = 32
+MOST_ITERATIONS = 1_000_000
 
 Source = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
 Bailout = Annotated[float, Field(strict=True, gt=0, le=1e9, allow_inf_nan=False)]
@@ -55,7 +56,7 @@ class FormulaSpec(_Source):
         Annotated[tuple[ChainLink, ...], Field(strict=False, min_length=1, max_length=MAX_LINKS)] | None
     ) = Field(None, description="formulas applied in turn")
     iterations: int = Field(
-        30, ge=1, le=1_000_000, description="maximum number of applications of the formula"
+        30, ge=1, le=MOST_ITERATIONS, description="maximum number of applications of the formula"
     )
     bailout: Bailout | None = Field(
         None, description="escape radius for counts and inside tests; null: the formula's own"

@@ -12,6 +12,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from clfractal import arguments
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.inputs import noting
@@ -51,7 +52,7 @@ def load_scene(
     source: str | Path | Mapping[str, Any] | SceneText,
     *,
     overrides: Sequence[str] = (),
-    folder: Path | None = None,
+    folder: str | Path | None = None,
 ) -> Scene:
     """Reads and checks a scene and its formula.
 
@@ -66,14 +67,21 @@ def load_scene(
         SceneError, FormulaError: something in the text is wrong.
         FileError: a file cannot be read, is no regular file, too large, or out of the scene's folder.
     """
+    given = arguments.words("overrides", overrides)
+    own = None if folder is None else arguments.path_of("folder", folder)
     text = source if isinstance(source, SceneText) else read_scene(source)
     with noting() as files:
-        document, scene = _validated(text, overrides, folder or text.folder)
+        document, scene = _validated(text, given, text.folder if own is None else own)
         scene.note_files((*text.files, *files))
         with _located(document):
             check_scene(scene)
     scene.note_files(files)
     return scene
+
+
+def as_scene(source: Scene | str | Path | Mapping[str, Any]) -> Scene:
+    """A scene as it is, or loaded: see `load_scene`."""
+    return source if isinstance(source, Scene) else load_scene(source)
 
 
 def load_coloring(text: SceneText, *, overrides: Sequence[str] = ()) -> Coloring:
@@ -87,6 +95,8 @@ def load_coloring(text: SceneText, *, overrides: Sequence[str] = ()) -> Coloring
 
 def dump_scene(scene: Scene) -> str:
     """The resolved scene as YAML text; it loads back to an equal scene."""
+    if not isinstance(scene, Scene):
+        arguments.refuse("scene", "must be a Scene", arguments.plain(scene))
     return write_document(scene.resolved())
 
 
@@ -103,7 +113,9 @@ def schema() -> dict[str, Any]:
 def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
     """Reads a scene without checking more than that it is YAML; the source is as for `load_scene`."""
     if isinstance(source, Mapping):
-        return SceneText(Document(node_from_plain(source, None)), Path())
+        return SceneText(Document(node_from_plain(arguments.plain(source), None)), Path())
+    if not isinstance(source, (str, Path)):
+        arguments.refuse("scene", "must be a path, YAML text or a mapping", arguments.plain(source))
     if isinstance(source, str) and ("\n" in source or source.lstrip().startswith("{")):
         return SceneText(read_document(source, "scene"), Path())
     path = Path(source)

@@ -11,13 +11,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeAlias
 
+from clfractal import arguments
 from clfractal.device.cancel import CancelToken
 from clfractal.device.forked import is_lost, use_opencl
 from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.pictures.film import Film
-from clfractal.scene.load import load_scene
+from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
@@ -46,6 +47,7 @@ class Engine:
         tell: called with a message if something has to be compiled or measured first, or does not fit.
 
     Raises:
+        SceneError: another argument is wrong.
         DeviceError: no device, or an unknown one.
     """
 
@@ -56,6 +58,8 @@ class Engine:
         budget_seconds: float = BUDGET_SECONDS,
         tell: Callable[[str], None] | None = None,
     ) -> None:
+        budget_seconds = arguments.number("budget_seconds", budget_seconds, 1e-4, 60)
+        arguments.function("tell", tell)
         self.device = device if isinstance(device, Device) else choose(device)
         self.tell = tell
         self.executor = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
@@ -98,7 +102,7 @@ class Engine:
             DeviceError, KernelBuildError: as of a render.
         """
         with self._alone():
-            return settled(scene if isinstance(scene, Scene) else load_scene(scene), self.look)
+            return settled(as_scene(scene), self.look)
 
     def prepare(
         self,
@@ -115,7 +119,7 @@ class Engine:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
             DeviceError, KernelBuildError: the quick look that this takes failed.
         """
-        loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+        loaded = as_scene(scene)
         decide = partial(
             prepare,
             device=self.device,
@@ -146,6 +150,8 @@ class Engine:
             token: ends the render when any thread cancels it; `clfractal.Stopped` is then raised.
         """
         start = time.perf_counter()
+        arguments.function("progress", progress)
+        _check_token(token)
         with self._alone():
             job = self.prepare(scene, precision=precision, samples=samples, region=region, channels=channels)
             if job.stays_apart:
@@ -170,8 +176,10 @@ class Engine:
     ) -> tuple[Film, Film]:
         """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
         start = time.perf_counter()
+        arguments.function("progress", progress)
+        _check_token(token)
         with self._alone():
-            loaded = scene if isinstance(scene, Scene) else load_scene(scene)
+            loaded = as_scene(scene)
             if loaded.stereo is None:
                 raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
             if loaded.stereo.mode not in ("pair", "split_half", "over_under_half"):
@@ -203,6 +211,8 @@ class Engine:
         Arguments and errors as for `render`.
         """
 
+        _check_token(token)
+
         def films() -> Generator[Film]:
             with self._alone():
                 job = self.prepare(
@@ -225,3 +235,8 @@ class Engine:
             yield
         finally:
             self._busy.release()
+
+
+def _check_token(token: Any) -> None:
+    if token is not None and not isinstance(token, CancelToken):
+        arguments.refuse("token", "must be a CancelToken", arguments.plain(token))

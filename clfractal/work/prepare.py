@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
+from clfractal import arguments
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
-from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.errors import Where
 from clfractal.files.channels import check_channels
 from clfractal.optics.view import seen_by, shown_views
 from clfractal.pictures.compose import Side, composed_channels, eye_regions, picture_size
@@ -35,6 +36,7 @@ def prepare(
 ) -> Job:
     """The job of a scene's picture; arguments that are None take the value of the scene, or of each of its views.
 
+    Errors name the argument; the shell turns that into its option.
     This measures nothing (`stereo.fit` and the like); see `settle.settled`.
 
     Args:
@@ -46,11 +48,16 @@ def prepare(
             samples, float64 on a device without it.
         DeviceError: no kernel works on the device.
     """
-    if precision is not None and precision not in PRECISIONS:
-        raise SceneError(unknown_name("precision", precision, PRECISIONS), Where("--precision"))
-    if samples is not None and not 1 <= samples <= MAX_SAMPLES:
-        raise SceneError(f"must be from 1 to {MAX_SAMPLES}, got {samples}", Where("--samples"))
-    names = check_channels(channels if channels is not None else scene.output.channels)
+    if precision is not None:
+        precision = arguments.word("precision", precision, PRECISIONS)
+    if samples is not None:
+        samples = arguments.whole("samples", samples, 1, MAX_SAMPLES)
+    if region is not None:
+        x, y, width, height = arguments.numbers("region", region, 4, "x, y, width, height in pixels")
+        region = (x, y, width, height)
+    names = scene.output.channels
+    if channels is not None:
+        names = check_channels(arguments.words("channels", channels), Where(path="channels"))
     chooser = _Chooser(device, precision, on_start)
     # One number type for both eyes, chosen for the view of the eye between them.
     chosen = [chooser.number_type(view, eye) for view, eye, _ in shown_views(scene)]

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
+from clfractal import arguments
 from clfractal.errors import ClfractalError, SceneError, Where, unknown_name
 from clfractal.formulas import reference
 from clfractal.scene.load import check_scene
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 STRENGTHS: tuple[Strength, ...] = get_args(Strength)
+
+MOST = 100_000
+"""Most variations of one call."""
 
 PREVIEW_SIZE = (96, 54)
 """Pixels of a picture that is large enough for `worthwhile`."""
@@ -88,8 +92,7 @@ def variations(
     Raises:
         SceneError: an unknown strength or kind, a count below 1, or nothing that could change.
     """
-    if count < 1:
-        raise SceneError(f"must be at least 1, got {count}", Where("count"))
+    count = arguments.whole("count", count, 1, MOST)
     found = list(islice(candidates(scene, strength=strength, seed=seed, kinds=kinds, locked=locked), count))
     if not found:
         raise nothing_to_vary(kinds)
@@ -116,11 +119,14 @@ def candidates(
     Raises:
         SceneError: an unknown strength or kind.
     """
-    if strength not in STRENGTHS:
-        raise SceneError(unknown_name("strength", str(strength), STRENGTHS))
-    for kind in kinds:
+    if not isinstance(scene, Scene):
+        arguments.refuse("scene", "must be a Scene", arguments.plain(scene))
+    arguments.word("strength", strength, STRENGTHS)
+    seed = arguments.whole("seed", seed, -(2**63), 2**63 - 1)
+    for kind in arguments.words("kinds", kinds):
         if kind not in KINDS:
-            raise SceneError(unknown_name("kind", str(kind), KINDS))
+            raise SceneError(unknown_name("kind", kind, KINDS), Where(path="kinds"))
+    arguments.words("locked", locked)
     wanted = [kind for kind in KINDS if kind in kinds]
     return _drawn(expanded(scene) if "formula" in wanted else scene, AMOUNT[strength], seed, wanted, locked)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +60,7 @@ def test_what_is_written_is_read_by_trimesh(
 ) -> None:
     monkeypatch.setattr(module, "_ROWS", rows)
     mesh, path = ball(), tmp_path / f"ball{suffix}"
-    write_mesh(path, mesh, text=SCENE)
+    write_mesh(path, replace(mesh, text=SCENE))
     found = load(path)
     turn = z_up if suffix == ".glb" else np.asarray
     assert mesh.normals is not None
@@ -109,7 +110,7 @@ def test_meshes_without_normals_or_colors(suffix: str, without: str, tmp_path: P
 def test_the_layout_of_glb(tmp_path: Path) -> None:
     """glTF 2.0: lengths, alignment, the box of the positions, 16-bit linear colours, and the scene."""
     mesh, path = ball(2), tmp_path / "m.glb"
-    write_mesh(path, mesh, text=SCENE)
+    write_mesh(path, replace(mesh, text=SCENE))
     content = path.read_bytes()
     magic, version, length, words, kind = struct.unpack("<4sIII4s", content[:20])
     assert (magic, version, length, kind) == (b"glTF", 2, len(content), b"JSON")
@@ -133,10 +134,10 @@ def test_the_layout_of_glb(tmp_path: Path) -> None:
 
 
 def test_the_scene_is_kept_in_comments(tmp_path: Path) -> None:
-    write_mesh(tmp_path / "m.ply", ball(1), text=SCENE)
+    write_mesh(tmp_path / "m.ply", replace(ball(1), text=SCENE))
     head = (tmp_path / "m.ply").read_bytes().partition(b"end_header")[0].decode("ascii")
     assert "comment version: 1\ncomment formula: {name: hast}  # \\xe4\n" in head
-    write_mesh(tmp_path / "m.obj", ball(1), text=SCENE)
+    write_mesh(tmp_path / "m.obj", replace(ball(1), text=SCENE))
     assert (tmp_path / "m.obj").read_text().startswith("# version: 1\n# formula: {name: hast}  # \\xe4\nv ")
 
 
