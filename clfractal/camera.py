@@ -11,10 +11,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import ValidationError
-
-from clfractal.files.marks import Document, node_from_plain
-from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
 
 
@@ -85,7 +81,4 @@ def frame(scene: Scene) -> Scene:
 
 def _with(scene: Scene, **words: Any) -> Scene:
     camera = {**scene.camera.model_dump(mode="json"), **words}
-    try:
-        return scene.model_copy(update={"camera": camera})
-    except ValidationError as error:
-        raise first_error(error, Document(node_from_plain({"camera": camera}, None))) from error
+    return scene.model_copy(update={"camera": camera})
