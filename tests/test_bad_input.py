@@ -149,7 +149,7 @@ def test_a_scene_that_cannot_work(here: Path, shell: InProcess, lines: str, mess
 @pytest.mark.parametrize(
     ("output", "message"),
     [
-        ("x.jpg", "x.jpg: unknown extension '.jpg'; known: .exr, .png"),
+        ("x.gif", "x.gif: unknown extension '.gif'; known: .exr, .png, .jpg, .jpeg, .webp"),
         ("x", "x: needs an extension"),
         ("no/x.png", "no/x.png: cannot be written: there is no folder 'no'"),
         ("scene.yaml/x.png", "scene.yaml/x.png: cannot be written: 'scene.yaml' is not a folder"),

@@ -28,7 +28,7 @@ from clfractal.pictures.anaglyph import (
     matrices,
     mix,
 )
-from clfractal.pictures.compose import eye_size, picture_size
+from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo

@@ -14,7 +14,8 @@ from PIL import Image
 from clfractal.errors import STATUS_BAD_INPUT
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.pictures.compose import compose, picture_size
+from clfractal.pictures.compose import compose
+from clfractal.pictures.modes import picture_size
 from clfractal.scene.load import load_scene
 from clfractal.scene.stereo import Stereo
 from tests.shell import SCENE, InProcess

@@ -17,7 +17,9 @@ def render(
     output: Annotated[
         list[Path] | None,
         typer.Option(
-            "-o", "--output", help="An .exr or .png file; repeatable.  [default: the scene's name with .png]"
+            "-o",
+            "--output",
+            help="An .exr, .png, .jpg or .webp file; repeatable.  [default: the scene's name with .png]",
         ),
     ] = None,
     device: DeviceOption = None,
@@ -76,7 +78,7 @@ def slices(
         typer.Option(
             "-o",
             "--output",
-            help="A .png or .exr file; slice.png becomes slice_0001.png, ...; repeatable.  [default: slice.png]",
+            help="A picture file, as for render; slice.png becomes slice_0001.png, ...; repeatable.  [default: slice.png]",
         ),
     ] = None,
     count: Annotated[int, typer.Option("--count", help="Number of slices.")] = 10,

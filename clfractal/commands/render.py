@@ -30,7 +30,7 @@ def render_scene(order: Order, shell: Shell) -> None:
     region = _region(order.region)
     shell.mute_drivers()
     scene = ordered_scene(order)
-    outputs = _outputs(order, scene)
+    outputs = _outputs(order, scene, region)
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands.unfinished import Unfinished
     from clfractal.pictures.outputs import output_files
@@ -118,16 +118,18 @@ def numbers_of(option: str, text: str, separator: str, count: int, form: str) ->
     raise SceneError(f"must be {form}; got {text[:60]!r}", Where(option))
 
 
-def _outputs(order: Order, scene: Scene) -> tuple[Path, ...]:
+def _outputs(order: Order, scene: Scene, region: tuple[int, int, int, int] | None) -> tuple[Path, ...]:
     """The files to write, all of them checked before anything is rendered."""
     outputs = order.outputs or (Path(Path(order.scene).with_suffix(".png").name),)
     from clfractal.commands.unfinished import possible_paths
-    from clfractal.pictures.outputs import check_output as check_picture
+    from clfractal.pictures.formats import Content
+    from clfractal.pictures.formats import check_output as check_picture
     from clfractal.pictures.outputs import output_files
 
     files = [file for path in outputs for file in output_files(scene.stereo, path)]
+    content = Content.of(scene, region)
     for file in files:
-        check_picture(file, scene.output.channels)
+        check_picture(file, content)
     if order.stats is not None:
         check_output(order.stats, (order.stats.suffix.lower(),))
         files.append(order.stats)

@@ -121,14 +121,15 @@ def _numbered(outputs: tuple[Path, ...], number: int, count: int) -> tuple[Path,
 
 def _check_files(scene: Scene, files: list[tuple[Path, ...]]) -> None:
     """Checks all files before anything is rendered."""
-    from clfractal.pictures.outputs import check_output, output_files
+    from clfractal.pictures.formats import Content, check_output
+    from clfractal.pictures.outputs import output_files
 
-    written = []
+    written, content = [], Content.of(scene)
     for paths in files:
         for path in paths:
             for file in output_files(scene.stereo, path):
                 if paths is files[0] or file.exists() or file.is_symlink():
-                    check_output(file, scene.output.channels)
+                    check_output(file, content)
                 written.append(file)
         written.append(paths[0].with_name(paths[0].name + PARTIAL))
     refuse_overwriting(written, scene.files)

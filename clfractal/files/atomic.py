@@ -16,7 +16,7 @@ from typing import BinaryIO
 from clfractal.errors import FileError, Where
 from clfractal.files.inputs import note
 
-PICTURES = (".exr", ".png")
+PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".webp")
 """Extensions of the picture formats that can be written, in lower case."""
 
 

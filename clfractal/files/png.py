@@ -9,17 +9,16 @@ import os
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 import png
 
 from clfractal.files.atomic import atomic_writer, file_error, open_regular
-from clfractal.files.srgb import encode8, encode16
+from clfractal.files.srgb import Bits, codes
 
 Floats = npt.NDArray[np.float32]
-Bits = Literal[8, 16]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 SCENE_KEY = "clfractal"
@@ -136,29 +135,10 @@ def _rows(bands: Iterable[Floats], bits: Bits, alpha: bool, origin: tuple[int, i
     """The rows as the file's bytes."""
     left, top = origin
     for band in bands:
-        straight = _straight(band) if alpha else band
-        if bits == 8:
-            code: npt.NDArray[np.unsignedinteger] = encode8(straight, origin=(left, top))
-        else:
-            code = encode16(straight)
-        if alpha:
-            # Coverage is not light: it is stored without the transfer function, and needs no dithering.
-            largest = np.float32((1 << bits) - 1)
-            code[..., 3] = np.rint(np.fmin(np.fmax(band[..., 3], 0), 1) * largest)
-        if bits == 16:
-            code = code.astype(">u2")
-        for row in code:
+        code = codes(band, bits, alpha=alpha, origin=(left, top))
+        for row in code.astype(">u2") if bits == 16 else code:
             yield row.tobytes()
         top += len(band)
-
-
-def _straight(band: Floats) -> Floats:
-    """Colours divided by their coverage, as PNG wants them (section 12.4.1 of the specification)."""
-    result = band.copy()
-    coverage = np.fmin(band[..., 3:], np.float32(1))
-    with np.errstate(over="ignore"):  # a division by almost 0 gives infinity, which is limited to 1 later
-        np.divide(band[..., :3], coverage, out=result[..., :3], where=coverage > 0)
-    return result
 
 
 def read_texts(path: str | Path) -> dict[str, str]:

@@ -8,11 +8,13 @@ only: a crop of a picture equals the crop's own render. A value that 8 bits hold
 from __future__ import annotations
 
 from functools import cache, lru_cache
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float32]
+Bits = Literal[8, 16]
 
 # The table for 8 bits is indexed by the leading bits of the float itself (exponent and 13 bits of the
 # fraction): equally fine, relative to the value, in shadows and lights, and the index costs no arithmetic.
@@ -92,3 +94,32 @@ def encode16(linear: Floats) -> npt.NDArray[np.uint16]:
     code -= np.float32(0.055 * 65535)
     np.multiply(limited, np.float32(12.92 * 65535), out=code, where=small)
     return np.rint(code).astype(np.uint16)
+
+
+def codes(
+    band: Floats, bits: Bits, *, alpha: bool = False, origin: tuple[int, int] = (0, 0)
+) -> npt.NDArray[Any]:
+    """The numbers of a picture file: uint8, dithered, or uint16, of the band's shape.
+
+    Args:
+        band: shape (rows, columns, 3), or 4 with `alpha`: linear Rec. 709, and with `alpha` premultiplied by the fourth.
+        bits: of each number.
+        alpha: whether the colours are to be divided by their coverage, which is not light and stored as it is.
+        origin: see `encode8`.
+    """
+    straight = _straight(band) if alpha else band
+    found: npt.NDArray[Any] = encode8(straight, origin=origin) if bits == 8 else encode16(straight)
+    if alpha:
+        # Coverage needs neither the transfer function nor dithering.
+        largest = np.float32((1 << bits) - 1)
+        found[..., 3] = np.rint(np.fmin(np.fmax(band[..., 3], 0), 1) * largest)
+    return found
+
+
+def _straight(band: Floats) -> Floats:
+    """Colours divided by their coverage (PNG specification, third edition, section 12.4.1; RFC 9649 for WebP)."""
+    result = band.copy()
+    coverage = np.fmin(band[..., 3:], np.float32(1))
+    with np.errstate(over="ignore"):  # a division by almost 0 gives infinity, which is limited to 1 later
+        np.divide(band[..., :3], coverage, out=result[..., :3], where=coverage > 0)
+    return result

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
     from xarray import Dataset
 
+    from clfractal.scene.stereo import Stereo
+
 Facts: TypeAlias = Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 """Values by their names, or a function that finds them."""
 
@@ -79,6 +81,8 @@ class Film:
         """Files that were read for the picture; `save` replaces none of them."""
         self.mixed_from: Picture | None = None
         """The picture that mixes two eyes' pictures in this one, if it does: a tone curve bends each eye's before."""
+        self.stereo: Stereo | None = None
+        """How two eyes' pictures were put into this one; None if it shows one."""
         self.stage = ""
         """How far a picture that is made in passes is, such as `4 of 16 samples`; empty once it is finished."""
         # Not `zeros`: NumPy asks for large pages only for memory that it does not want cleared, and small ones take the
@@ -207,7 +211,7 @@ class Film:
             row = end
 
     def save(self, path: str | Path, **settings: Any) -> None:
-        """Writes an `.exr` or `.png` file; settings as in `outputs.save_outputs`.
+        """Writes an .exr, .png, .jpg or .webp file; settings as in `outputs.save_outputs`.
 
         Raises:
             SceneError: a setting is wrong.
@@ -280,6 +284,7 @@ def in_memory(picture: Picture) -> Film:
     bands = [band for _, band in picture.bands()]
     film = Film(picture.channels, picture.display, picture.region, picture.header)
     film.fill({name: np.concatenate([band[name] for band in bands]) for name in picture.channels})
-    if getattr(picture, "mixes_colors", False):
+    film.stereo = getattr(picture, "stereo", None)
+    if film.stereo is not None and film.stereo.mixes_colors:
         film.mixed_from = picture
     return film

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from clfractal import arguments
-from clfractal.errors import FileError, Where
-from clfractal.files import atomic
+from clfractal.errors import Where
 from clfractal.files.channels import CHANNELS, VIEWS, check_channels, in_view
-from clfractal.files.png import Bits, stream_png, write_png
+from clfractal.files.photo import LOSSLESS, write_photo
+from clfractal.files.png import stream_png, write_png
+from clfractal.files.srgb import Bits
 from clfractal.files.tone import Tone
 from clfractal.pictures.develop import Development, developed
+from clfractal.pictures.formats import KINDS, PHOTOS, Content, check_output, check_views, kind_of
 from clfractal.pictures.tiled import Floats, Picture
 from clfractal.scene.stereo import APART, Stereo
 
@@ -25,23 +28,6 @@ _FILE_KEYS = {"scene": "clfractal"} | {name: name for name in (*_MATRICES, "view
 _FILE_KEYS |= {f"{view}.{name}": f"{view}.{name}" for view in VIEWS for name in _MATRICES}
 
 
-def check_output(path: str | Path, channels: Collection[str] | None = None) -> None:
-    """Makes sure, before anything is rendered, that a picture can be written to `path`.
-
-    Raises:
-        FileError: unknown extension, no such folder, not writable, a folder or device; or a PNG without
-            the colour channels that it needs.
-    """
-    atomic.check_output(path)
-    if channels is not None and Path(path).suffix.lower() == ".png":
-        missing = [name for name in "RGB" if name not in channels]
-        if missing:
-            listed = ", ".join(missing)
-            raise FileError(
-                f"a PNG needs the channels R, G, B; without {listed} write an EXR", Where(str(path))
-            )
-
-
 def save_outputs(
     store: Picture,
     paths: Iterable[str | Path],
@@ -49,21 +35,24 @@ def save_outputs(
     header: Mapping[str, Any] | None = None,
     half: Collection[str] | None = None,
     bits: Bits = 8,
+    quality: int = 90,
     transparent: bool | None = None,
     exposure: float | None = None,
     tone: Tone | None = None,
 ) -> None:
     """Writes a film to files, in the formats of their extensions; each file appears complete or not at all.
 
-    All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`.
+    All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`; for a JPEG or WebP
+    3 or 4 bytes for each pixel, and the file.
 
     Args:
         header: added to `store.header`.
         half: the channels that an EXR stores as half; by default as `CHANNELS` says.
         bits: 8 or 16, of a PNG.
-        transparent: whether a PNG has an alpha channel (the film's colours are premultiplied); needs A.
-        exposure: stops (powers of two) by which a PNG is lighter than the film; an EXR keeps scene values.
-        tone: the curve that a PNG's light goes through: linear, reinhard or agx.
+        quality: 1 to 100, of a JPEG or WebP; at 100 a WebP is lossless.
+        transparent: whether a PNG or WebP has an alpha channel (the film's colours are premultiplied); needs A.
+        exposure: stops (powers of two) by which files but an EXR are lighter than the film; that keeps scene values.
+        tone: the curve that its light goes through: linear, reinhard or agx.
             If they are None, the header's values are used.
 
     Raises:
@@ -73,22 +62,30 @@ def save_outputs(
     bits = _checked_bits(bits)
     half = None if half is None else check_channels(arguments.words("half", half), Where(path="half"))
     transparent = None if transparent is None else arguments.flag("transparent", transparent)
-    exposure = None if exposure is None else arguments.number("exposure", exposure, -100, 100)
+    quality = arguments.whole("quality", quality, 1, LOSSLESS)
+    development = Development.of(store.header, exposure, tone)
     chosen = [Path(path) for path in paths]
-    for path in chosen:
-        check_output(path, store.channels)
     whole = {**store.header, **(header or {})}
     region = store.region
-    development = Development.of(store.header, exposure, tone)
+    alpha = _transparent(store, transparent)
+    content = Content(
+        store.channels, (region.width, region.height), alpha, getattr(store, "stereo", None), quality
+    )
     for path in chosen:
-        if path.suffix.lower() == ".png":
-            alpha = _transparent(store, transparent)
-            write_png(
+        check_output(path, content)
+    for path in chosen:
+        kind = kind_of(path)
+        if kind != "EXR":
+            write = (
+                partial(write_png, bits=bits)
+                if kind == "PNG"
+                else partial(write_photo, format=PHOTOS[kind], quality=quality)
+            )
+            write(
                 path,
                 _colors(developed(store, development), alpha=alpha),
                 width=region.width,
                 height=region.height,
-                bits=bits,
                 alpha=alpha,
                 texts=_texts(whole),
                 origin=(region.x, region.y),
@@ -121,7 +118,7 @@ def output_files(stereo: Stereo | None, path: str | Path) -> list[Path]:
     """The files that are written for an output: two of a pair, and of views in a format that holds but one."""
     if stereo is None or stereo.mode not in APART:
         return [Path(path)]
-    one_file = stereo.mode == "multi_view" and Path(path).suffix.lower() == ".exr"
+    one_file = stereo.mode == "multi_view" and KINDS.get(Path(path).suffix.lower()) == "EXR"
     return [Path(path)] if one_file else list(pair_paths(path))
 
 
@@ -130,17 +127,6 @@ def pair_paths(path: str | Path) -> tuple[Path, Path]:
     whole = Path(path)
     left, right = (whole.with_name(f"{whole.stem}_{letter}{whole.suffix}") for letter in "LR")
     return left, right
-
-
-def check_views(path: str | Path) -> None:
-    """Makes sure, before anything is rendered, that a picture of both views can be written to `path`.
-
-    Raises:
-        FileError: as for `check_output`, and for a PNG, which can hold only one view.
-    """
-    check_output(path)
-    if Path(path).suffix.lower() == ".png":
-        raise FileError("a PNG has room for one view; write both to an EXR", Where(str(path)))
 
 
 def save_views(
@@ -162,7 +148,7 @@ def save_views(
         half: the channels that are stored as half, without views; by default as `CHANNELS` says.
 
     Raises:
-        FileError: the file cannot be written, or is a PNG.
+        FileError: the file cannot be written, or is no EXR.
         ValueError: the pictures do not fit each other.
     """
     if (left.channels, left.display, left.region) != (right.channels, right.display, right.region):

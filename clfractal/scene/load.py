@@ -15,18 +15,16 @@ from pydantic import ValidationError
 from clfractal import arguments
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
+from clfractal.files.embedded import is_picture, read_scene_text
 from clfractal.files.inputs import noting
 from clfractal.files.marks import Document, Node, node_from_plain, option
-from clfractal.files.regular import read_bytes, read_text_file
+from clfractal.files.regular import read_text_file
 from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
 from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
-
-_EXR = b"\x76\x2f\x31\x01"
-_PNG = b"\x89PNG\r\n\x1a\n"
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,18 +126,9 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
 
 def read_text(path: Path) -> str:
     """The text of a scene file, or of the scene that a picture holds; FileError if it cannot be read or holds none."""
-    start = read_bytes(path, prefix=len(_PNG))
-    found: str | None
-    if start.startswith(_EXR):
-        from clfractal.files import exr_header
-
-        found = exr_header.read_scene_text(path)
-    elif start == _PNG:
-        from clfractal.files import png
-
-        found = png.read_scene_text(path)
-    else:
+    if not is_picture(path):
         return read_text_file(path)
+    found = read_scene_text(path)
     if found is None:
         raise FileError("holds no scene: it was not written by clfractal", Where(str(path)))
     return found

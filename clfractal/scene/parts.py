@@ -171,10 +171,10 @@ class Output(Section):
 
     exposure: Exposure = Field(
         0.0,
-        description="stops: PNG colours are multiplied by 2**exposure; auto: chosen by a quick look at the scene",
+        description="stops: colours on a screen are multiplied by 2**exposure; auto: chosen by a quick look at the scene",
     )
     tone: Tone = Field(
-        "linear", description="the curve from light to what a PNG shows: linear, reinhard or agx"
+        "linear", description="the curve from light to what a screen shows: linear, reinhard or agx"
     )
     channels: Annotated[tuple[ChannelName, ...], Field(strict=False, min_length=1, max_length=64)] = Field(
         DEFAULT_CHANNELS, description="names of the channels of an EXR"
@@ -184,6 +184,13 @@ class Output(Section):
         description="half or float for those channels of an EXR that are not stored as by default",
     )
     png_bits: Literal[8, 16] = Field(8, description="bits per channel of a PNG")
+
+    quality: int = Field(
+        90,
+        ge=1,
+        le=100,
+        description="of a JPEG or WebP: the more, the finer and larger; 100: a lossless WebP",
+    )
 
     @model_validator(mode="after")
     def _different(self) -> Self:

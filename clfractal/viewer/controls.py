@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from clfractal.pictures.compose import eye_at
+from clfractal.pictures.modes import eye_at
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import handles, navigation, plane_moves, zoom_box
 from clfractal.viewer.aim import Aim

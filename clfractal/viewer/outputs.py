@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.pictures.compose import BELOW, BESIDE
+from clfractal.pictures.modes import BELOW, BESIDE
 from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer import gl, window
 from clfractal.viewer.chart import mixed_chart

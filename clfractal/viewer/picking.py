@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from clfractal.optics.view import View
-from clfractal.pictures.compose import eye_at
+from clfractal.pictures.modes import eye_at
 from clfractal.renderers.plan import PlannedView
 from clfractal.viewer.display import Shown
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clfractal.pictures.compose import BELOW, BESIDE
+from clfractal.pictures.modes import BELOW, BESIDE
 from clfractal.scene.stereo import APART, Stereo
 
 Place = tuple[int, int, int, int]

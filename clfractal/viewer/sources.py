@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from clfractal import resources
 from clfractal.errors import ClfractalError, FileError, SceneError
+from clfractal.files import embedded
 from clfractal.files.document import read_document
 from clfractal.files.inputs import noting
-from clfractal.files.regular import read_bytes
 from clfractal.scene.load import SceneText, load_scene, read_text
 from clfractal.scene.model import Scene
 from clfractal.viewer.named import formula_files
@@ -20,7 +20,6 @@ from clfractal.viewer.named import formula_files
 Kind = Literal["scene", "picture", "shipped", "none"]
 
 _OWN_FOLDERS = ("scenes", "environments", "formulas/library", "kernels")
-_PICTURES = (b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n")
 
 
 @dataclass(frozen=True)
@@ -134,9 +133,9 @@ def _status(path: Path) -> os.stat_result | None:
 
 
 def is_picture(path: Path) -> bool:
-    """Whether a file is a PNG or EXR picture, by its content."""
+    """Whether a file is a picture of a format that may hold a scene, by its content."""
     try:
-        return read_bytes(path, prefix=8).startswith(_PICTURES)
+        return embedded.is_picture(path)
     except FileError:
         return False
 

@@ -11,7 +11,8 @@ from clfractal.device.structs import Precision
 from clfractal.errors import Where
 from clfractal.files.channels import check_channels
 from clfractal.optics.view import seen_by, shown_views
-from clfractal.pictures.compose import Side, composed_channels, eye_regions, picture_size
+from clfractal.pictures.compose import Side, composed_channels, eye_regions
+from clfractal.pictures.modes import picture_size
 from clfractal.pictures.tiles import Region
 from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region

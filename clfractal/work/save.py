@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +25,15 @@ def save_job(
         FileError: a file cannot be written.
     """
     output = job.scene.output
+    save = partial(save_outputs, half=output.half_channels, bits=output.png_bits, quality=output.quality)
     if not job.stays_apart:
-        save_outputs(job.picture(stores, header), paths, half=output.half_channels, bits=output.png_bits)
+        save(job.picture(stores, header), paths)
         return
     eyes = job.eyes(stores)
     for path in paths:
         files = output_files(job.scene.stereo, path)
         if len(files) == 2:
             for eye, file in zip((eyes["left"], eyes["right"]), files, strict=True):
-                save_outputs(eye, [file], half=output.half_channels, bits=output.png_bits)
+                save(eye, [file])
         else:
             save_views(eyes["left"], eyes["right"], path, half=output.half_channels)

@@ -19,7 +19,8 @@ from clfractal.device.watched import Watched
 from clfractal.files import srgb, tone
 from clfractal.files.tone import Tone
 from clfractal.pictures.anaglyph import matrices
-from clfractal.pictures.compose import BELOW, BESIDE, Side, eye_size, picture_size
+from clfractal.pictures.compose import Side
+from clfractal.pictures.modes import BELOW, BESIDE, eye_size, picture_size
 from clfractal.scene.layout import Place
 from clfractal.scene.stereo import APART, Mode, Stereo
 from clfractal.work.canvas import Canvas, whole_groups

@@ -102,7 +102,7 @@ def test_check_tells_what_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     os.mkfifo(tmp_path / "pipe.png")
     cases = {
-        "a.jpg": "unknown extension '.jpg'; known: .exr, .png",
+        "a.gif": "unknown extension '.gif'; known: .exr, .png, .jpg, .jpeg, .webp",
         "a": "needs an extension: .exr, .png",
         "gone/a.png": f"cannot be written: there is no folder '{tmp_path}/gone'",
         "file/a.png": f"cannot be written: '{tmp_path}/file' is not a folder",

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.pictures.compose import eye_regions, eye_size, picture_size
+from clfractal.pictures.compose import eye_regions
 from clfractal.pictures.film import Film
+from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.tiled import TiledStore
 from clfractal.pictures.tiles import Region
 from clfractal.scene.stereo import Stereo

@@ -15,10 +15,9 @@ from clfractal.pictures.compose import (
     compose,
     composed_channels,
     eye_regions,
-    eye_size,
-    picture_size,
 )
 from clfractal.pictures.film import Film
+from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, films, stereo
 

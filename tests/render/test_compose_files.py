@@ -14,9 +14,11 @@ from PIL import Image
 from clfractal.errors import FileError
 from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
-from clfractal.pictures.compose import Composed, eye_regions, eye_size
+from clfractal.pictures.compose import Composed, eye_regions
 from clfractal.pictures.film import Film
-from clfractal.pictures.outputs import check_views, pair_paths, save_outputs, save_views
+from clfractal.pictures.formats import check_views
+from clfractal.pictures.modes import eye_size
+from clfractal.pictures.outputs import pair_paths, save_outputs, save_views
 from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, eyes, filled, stereo
@@ -122,8 +124,10 @@ def test_views_that_cannot_be_written(tmp_path: Path) -> None:
         save_views(film, film, tmp_path / "a.png")
     with pytest.raises(FileError, match=message):
         check_views(tmp_path / "a.png")
-    with pytest.raises(FileError, match="unknown extension"):
+    with pytest.raises(FileError, match="a JPEG has room for one view"):
         check_views(tmp_path / "a.jpg")
+    with pytest.raises(FileError, match="unknown extension"):
+        check_views(tmp_path / "a.gif")
     with pytest.raises(ValueError, match="same size, region and channels"):
         save_views(film, Film(CHANNELS, (8, 9)), tmp_path / "a.exr")
     assert not list(tmp_path.iterdir())

@@ -18,7 +18,8 @@ from clfractal.files.exr_header import read_scene_text
 from clfractal.files.png import read_texts
 from clfractal.files.srgb import encode8
 from clfractal.pictures.film import Film
-from clfractal.pictures.outputs import check_output, save_outputs
+from clfractal.pictures.formats import Content, check_output
+from clfractal.pictures.outputs import save_outputs
 from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiled import TiledStore
 from clfractal.pictures.tiles import Region
@@ -167,15 +168,15 @@ def test_extreme_pixels_make_no_trouble(tmp_path: Path) -> None:
 
 def test_outputs_are_checked_before_anything_is_written(tmp_path: Path) -> None:
     film = Film(("R", "G", "B"), (4, 4))
-    for bad, message in (("a.jpg", "unknown extension '.jpg'"), ("gone/a.exr", "there is no folder")):
+    for bad, message in (("a.gif", "unknown extension '.gif'"), ("gone/a.exr", "there is no folder")):
         with pytest.raises(FileError, match=message):
             save_outputs(film, [tmp_path / "good.png", tmp_path / bad])
     assert not list(tmp_path.iterdir())
-    check_output(tmp_path / "a.exr", ("Z",))
+    check_output(tmp_path / "a.exr", Content(("Z",), (4, 4), False, None, 90))
     with pytest.raises(
         FileError, match=r"a\.png: a PNG needs the channels R, G, B; without G, B write an EXR"
     ):
-        check_output(tmp_path / "a.png", ("R", "Z"))
+        check_output(tmp_path / "a.png", Content(("R", "Z"), (4, 4), False, None, 90))
 
 
 def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.pictures.compose import eye_at
+from clfractal.pictures.modes import eye_at
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.aim import aimed

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal.pictures.compose import picture_size
+from clfractal.pictures.modes import picture_size
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer.places import places_of

@@ -91,9 +91,7 @@ def test_files_have_the_name_that_was_typed_and_the_endings_of_their_format(name
     paths = paths_of(name, kind, Path("/pictures"))
     stem = name.strip()
     if stem not in ("", ".", ".."):  # those are refused before anything is written
-        assert [path.suffix for path in paths] == {"png": [".png"], "exr": [".exr"]}.get(
-            kind, [".png", ".exr"]
-        )
+        assert [path.suffix for path in paths] == ([".png", ".exr"] if kind == "both" else [f".{kind}"])
         for path in paths:
             assert path.name.startswith(stem.removesuffix(".png").removesuffix(".exr"))
 
@@ -170,6 +168,18 @@ def test_a_file_that_is_there_is_never_overwritten(seen: Seen, tmp_path: Path) -
     seen.click(stage, "Render")  # the field was emptied: a free name
     assert [still.paths[0].name for still in ui.studio.stills] == ["other.png", "scene-still-1.png"]
     assert (tmp_path / "mine.png").read_text() == "precious"
+
+
+def test_what_a_format_cannot_hold_does_not_begin(seen: Seen) -> None:
+    ui, stage = opened()
+    state: Wanted = ui.memory["stills"]
+    state.size, state.kind = (16_384, 16), "webp"
+    seen.click(stage, "Render")
+    assert ui.studio.stills == []
+    assert "a WebP has at most 16,383 pixels a side" in state.problem
+    state.kind = "jpg"
+    seen.click(stage, "Render")
+    assert ui.studio.stills[0].paths[0].suffix == ".jpg"
 
 
 def test_a_picture_beyond_the_schema_cannot_begin(seen: Seen) -> None:

@@ -10,8 +10,10 @@ from typing import Any
 from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError, FileError, Where
-from clfractal.pictures.outputs import check_output, output_files
-from clfractal.scene.parts import MAX_PIXELS, MAX_SIDE
+from clfractal.files.atomic import PICTURES
+from clfractal.pictures.formats import Content, check_output
+from clfractal.pictures.outputs import output_files
+from clfractal.scene.parts import MAX_PIXELS, MAX_SIDE, Image
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still
 from clfractal.viewer.panels import layout, right_dock, theme
@@ -29,8 +31,14 @@ PRESETS: dict[str, tuple[int, int] | None] = {
     "Square 4096": (4096, 4096),
 }
 """Sizes to choose from; None: as large as the window's picture."""
-FORMATS = {"png": "PNG", "exr": "EXR", "both": "Both"}
-_ENDINGS = {"png": (".png",), "exr": (".exr",), "both": (".png", ".exr")}
+FORMATS = {"png": "PNG", "jpg": "JPEG", "webp": "WebP", "exr": "EXR", "both": "Both"}
+_ENDINGS = {
+    "png": (".png",),
+    "jpg": (".jpg",),
+    "webp": (".webp",),
+    "exr": (".exr",),
+    "both": (".png", ".exr"),
+}
 _MOST_SAMPLES = 65_536
 
 
@@ -69,7 +77,7 @@ def draw(ui: Ui) -> None:
 def paths_of(name: str, kind: str, folder: Path | None = None) -> tuple[Path, ...]:
     """The files of a name; an ending that is one of the formats' is left out."""
     place = Path(name.strip()).expanduser()
-    if place.suffix.lower() in (".png", ".exr"):
+    if place.suffix.lower() in PICTURES:
         place = place.with_suffix("")
     whole = (folder or Path.cwd()) / place
     if place.name in ("", ".."):
@@ -85,22 +93,25 @@ def free_name(stem: str, kind: str, taken: Collection[Path], stereo: Stereo | No
     return f"{stem}-still-{number}"
 
 
-def check(paths: Iterable[Path], taken: Collection[Path], stereo: Stereo | None) -> None:
-    """Makes sure that files can be written, and that none of them is there already.
+def check(
+    paths: Iterable[Path], taken: Collection[Path], stereo: Stereo | None, content: Content | None = None
+) -> None:
+    """Makes sure that files can be written, that their formats can hold the picture, and that none is there already.
 
     Args:
         taken: files that are on their way.
         stereo: of the scene: some modes write a file for each eye.
+        content: of the picture; None: it is not known yet.
 
     Raises:
         FileError: what is wrong with one of them.
     """
     paths = list(paths)
     for path in paths:
-        if path.name in (".png", ".exr"):
+        if path.name in PICTURES:
             raise FileError("needs a name, not a folder alone", Where(str(path.parent)))
     for path in _all(paths, stereo):
-        check_output(path)
+        check_output(path, content)
         if _is_taken(path, taken):
             raise FileError("is there already; choose another name", Where(path.name))
 
@@ -230,10 +241,13 @@ def start(ui: Ui, state: Wanted) -> Still | None:
     """Begins a still as the panel is set; None if its files cannot be written."""
     studio = ui.studio
     stereo = studio.scene.stereo
+    size = state.size or _window_size(ui)
     ui.memory.pop("stills.suggestion", None)
     paths = paths_of(state.name.strip() or _suggestion(ui, state), state.kind)
     try:
-        check(paths, on_their_way(studio.stills), stereo)
+        image = Image.model_construct(width=size[0], height=size[1])
+        content = Content.of(studio.scene.model_copy(update={"image": image}))
+        check(paths, on_their_way(studio.stills), stereo, content)
         still = studio.render_still(paths, state.size, state.samples)
     except ClfractalError as error:
         state.problem = str(error)
