@@ -77,6 +77,7 @@ INLINE void render_packet(pass s, world w) {
     pixel p = pixel_start();
     if (s.first > 0) kept_pixel(kept, kept_slots, 0, &p);
     const real shots_before = p.shots;
+    real hits = R(0.0);
     tally cost = {R(0.0), R(0.0), R(0.0)};
     for (int sample = s.first; sample < s.end; ++sample) {
         // A pixel that is done has fewer shots. One that has more got them before this pass was interrupted.
@@ -100,6 +101,7 @@ INLINE void render_packet(pass s, world w) {
         }
         const shot found = sample_shot(&at, across, below, sample, active, w, &cost);
         pixel_add(&p, found, active, across * across + below * below);
+        hits += pick(active & less(R(0.0), found.coverage), R(1.0), R(0.0));
 #if ADAPTIVE
         noise_add(&p, found, active);
 #endif
@@ -112,6 +114,7 @@ INLINE void render_packet(pass s, world w) {
     __global uint *sums = s.statistics + STATISTICS * (tile * (TILE_PIXELS / LANES) + packet);
     const int add = s.mode & PASS_ADD;
     sums[STATISTIC_RAYS] = (add ? sums[STATISTIC_RAYS] : 0u) + (uint)lanes_sum(p.shots - shots_before);
+    sums[STATISTIC_HITS] = (add ? sums[STATISTIC_HITS] : 0u) + (uint)lanes_sum(hits);
     sums[STATISTIC_STEPS] = (add ? sums[STATISTIC_STEPS] : 0u) + (uint)lanes_sum(cost.steps);
     sums[STATISTIC_ITERATIONS] = (add ? sums[STATISTIC_ITERATIONS] : 0u) + (uint)lanes_sum(cost.count);
     sums[STATISTIC_BAD_DISTANCES] = (add ? sums[STATISTIC_BAD_DISTANCES] : 0u) + (uint)lanes_sum(cost.bad);

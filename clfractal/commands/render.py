@@ -37,6 +37,7 @@ def render_scene(order: Order, shell: Shell) -> None:
     from clfractal.work import stats
     from clfractal.work.comfort import comfort_of_job
     from clfractal.work.engine import Engine
+    from clfractal.work.remarks import remarks_of
     from clfractal.work.run import run
     from clfractal.work.save import save_job
 
@@ -57,16 +58,23 @@ def render_scene(order: Order, shell: Shell) -> None:
         save_job(job, unfinished.films, outputs, header)
         written = time.perf_counter()
         comfort = comfort_of_job(job, unfinished.films, engine.look)
+        remarks = remarks_of(job, state, unfinished.films, comfort)
     shell.state = lambda: "clfractal: interrupted"
     values = stats.statistics(
-        job, state, wall_ms=1e3 * (written - start), write_ms=1e3 * (written - rendered), comfort=comfort
+        job,
+        state,
+        wall_ms=1e3 * (written - start),
+        write_ms=1e3 * (written - rendered),
+        comfort=comfort,
+        remarks=remarks,
     )
     if order.stats is not None:
         stats.write_statistics(order.stats, values)
     files = [file for path in outputs for file in output_files(job.scene.stereo, path)]
     shell.say(f"{', '.join(map(str, files))}: {reporter.summary(state, written - start)}")
-    if comfort is not None and comfort.warning():
-        shell.say(f"{order.scene}: {comfort.warning()}")
+    for remark in remarks:
+        if remark != job.remark:
+            shell.say(f"{order.scene}: {remark}")
     if shell.verbose:
         shell.say(stats.sentence(values))
         if comfort is not None:

@@ -106,6 +106,11 @@ class Film:
         """
         return self._stats.facts
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the user should know about the picture, a line each, such as that nothing is seen; mostly none."""
+        return tuple(self.stats.get("remarks", ()))
+
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header, even if the header has not been made yet."""
         self._header.add(key, value)

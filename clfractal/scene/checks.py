@@ -180,7 +180,7 @@ def _check_lights(scene: Scene) -> None:
     ]
     if not candidates:
         return
-    found = _inside(scene, [position for _, position in candidates])
+    found = inside_solid(scene, [position for _, position in candidates])
     for (index, position), inside in zip(candidates, found, strict=True):
         if inside:
             shown = ", ".join(f"{x:g}" for x in position)
@@ -190,14 +190,14 @@ def _check_lights(scene: Scene) -> None:
             )
 
 
-def _inside(scene: Scene, points: Sequence[Vector]) -> Sequence[bool]:
-    """Which points belong to the solid that is drawn."""
+def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS) -> Sequence[bool]:
+    """Which points belong to the solid that is drawn; after `most` applications without escape they count as inside."""
     import numpy as np
 
     from clfractal.formulas import reference
 
     chain = scene.chain
-    iterations = min(scene.formula.iterations, _MOST_APPLICATIONS)
+    iterations = min(scene.formula.iterations, most)
     array = np.array(points, dtype=float)
     inside = reference.escape(chain, array, iterations)[1]
     if chain.shape_index is not None:

@@ -98,7 +98,10 @@ def grid_from_dense(
         store_ms=milliseconds,
         wall_ms=1e3 * (time.perf_counter() - start),
     )
-    background = float(min(threshold, float(np.nanmin(values)))) if threshold is not None else 0.0
+    # (Of NaN alone there is no least value, and `min` takes the threshold.)
+    background = (
+        float(min(threshold, float(np.fmin.reduce(values, axis=None)))) if threshold is not None else 0.0
+    )
     return Grid(
         lattice,
         kind,

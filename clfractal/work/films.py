@@ -12,6 +12,7 @@ from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Picture
 from clfractal.work.comfort import comfort_of_films
 from clfractal.work.job import Job
+from clfractal.work.remarks import remarks_of
 from clfractal.work.run import Progress
 from clfractal.work.stats import statistics
 
@@ -66,9 +67,9 @@ class JobFilms:
         return film
 
     def _statistics(self, took: Took) -> dict[str, Any]:
-        return statistics(
-            self.job, took.state, wall_ms=took.wall_ms, comfort=comfort_of_films(self.job, self.films)
-        )
+        comfort = comfort_of_films(self.job, self.films)
+        remarks = remarks_of(self.job, took.state, self.films, comfort)
+        return statistics(self.job, took.state, wall_ms=took.wall_ms, comfort=comfort, remarks=remarks)
 
     def _header_of(self, number: int) -> dict[str, Any]:
         return self.job.view_header(number, self.header)

@@ -14,7 +14,7 @@ from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
 from clfractal.device.select import Device, shown_size
 from clfractal.pictures.tiles import TILE, TileGrid
-from clfractal.renderers.passes import PASS_ADD, PASS_KEEP
+from clfractal.renderers.passes import PASS_ADD, PASS_KEEP, STATISTICS
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Kept, Resources
 from clfractal.work.drawing import SLOTS, Drawing, Outlet, OutputBuffers, Span
@@ -145,7 +145,8 @@ def _launched(
                 yield Result(item.view, span.tiles, _NO_FILM, tally)
             else:
                 film, sums = drawing.collect(span)
-                tally.rays, tally.steps, tally.iterations, tally.bad_distances = (int(each) for each in sums)
+                for name, count in zip(STATISTICS, sums, strict=True):
+                    setattr(tally, name, int(count))
                 yield Result(item.view, span.tiles, film, tally)
             tally = Tally()
 

@@ -55,6 +55,7 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
         DeviceError, KernelBuildError, Stopped: as of `run`.
     """
     start, total, seconds = time.perf_counter(), Tally(), 0.0
+    of_views = [Tally() for _ in job.views]
 
     def passed(films: JobFilms, samples: tuple[int, int] | None = None) -> Progress:
         """Makes one pass, and gives the counts and times of all passes so far."""
@@ -62,7 +63,9 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
         state = run(films.job, films.films, executor, token=token, samples=samples)
         seconds += state.seconds
         total.add(state)
-        return replace(state, **asdict(total))
+        for so_far, new in zip(of_views, state.views, strict=True):
+            so_far.add(new)
+        return replace(state, **asdict(total), views=[replace(each) for each in of_views])
 
     def shown(films: JobFilms, state: Progress, stage: str) -> Film:
         film = films.picture(Took(state, 1e3 * (time.perf_counter() - start)))

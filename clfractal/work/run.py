@@ -42,9 +42,11 @@ class WorkItem:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """Counts and times: camera rays (all samples), distance evaluations and applications of all rays; times in ms."""
+    """Counts and times: camera rays (all samples), those of them that found anything, distance evaluations and
+    applications of all rays; times in ms."""
 
     rays: int = 0
+    hits: int = 0
     steps: int = 0
     iterations: int = 0
     bad_distances: int = 0
@@ -54,6 +56,7 @@ class Tally:
     def add(self, other: Tally) -> None:
         """Adds what other work took."""
         self.rays += other.rays
+        self.hits += other.hits
         self.steps += other.steps
         self.iterations += other.iterations
         self.bad_distances += other.bad_distances
@@ -96,12 +99,16 @@ class Executor(Protocol):
 
 @dataclass(slots=True)
 class Progress(Tally):
-    """The progress of a job, its counts and times; `remaining` is None until it can be estimated."""
+    """The progress of a job, its counts and times; `remaining` is None until it can be estimated.
+
+    `views` has the counts and times of each of the job's views.
+    """
 
     tiles: int
     tiles_done: int = 0
     started: float = field(default_factory=time.perf_counter)
     tiles_before: int = 0
+    views: list[Tally] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
@@ -156,6 +163,7 @@ def run(
     """
     before = sum(int(np.count_nonzero(store.done)) for store in stores) if samples is None else 0
     state = Progress(sum(store.grid.count for store in stores), before, tiles_before=before)
+    state.views = [Tally() for _ in stores]
     items = []
     for number, (view, store) in enumerate(zip(job.views, stores, strict=True)):
         order = store.grid.order_from_center()
@@ -171,6 +179,7 @@ def run(
                 stores[result.view].put_tiles(result.tiles, result.film)
             state.tiles_done += len(result.tiles)
             state.add(result.tally)
+            state.views[result.view].add(result.tally)
             seconds[result.view] += state.seconds - last
             stores[result.view].tell("seconds", seconds[result.view])
             last = state.seconds

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import resource
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,13 @@ from clfractal.work.run import Progress
 
 
 def statistics(
-    job: Job, state: Progress, *, wall_ms: float, write_ms: float = 0.0, comfort: Comfort | None = None
+    job: Job,
+    state: Progress,
+    *,
+    wall_ms: float,
+    write_ms: float = 0.0,
+    comfort: Comfort | None = None,
+    remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Times and counts as plain data; for a stereo scene also its view, under `stereo`.
 
@@ -28,6 +35,7 @@ def statistics(
 
     Args:
         comfort: the parallax of a stereo scene, where it is known.
+        remarks: see `remarks.remarks_of`.
     """
     info, region = job.device, job.region
     values = {
@@ -47,12 +55,14 @@ def statistics(
         "write_ms": round(write_ms, 3),
         "wall_ms": round(wall_ms, 3),
         "rays": state.rays,
+        "hits": state.hits,
         "rays_per_second": round(state.rays / max(1e-3 * state.kernel_ms, 1e-9), 1),
         "iterations": state.iterations,
         "steps": state.steps,
         "steps_per_ray": round(state.steps_per_ray, 4),
         "bad_distances": state.bad_distances,
         "peak_memory_mb": round(peak_memory_mb(), 1),
+        "remarks": list(remarks),
     }
     if job.scene.stereo is not None:
         values["stereo"] = _of_stereo(job, comfort)
