@@ -16,7 +16,7 @@ from clfractal.optics.view import View
 from clfractal.pictures.tiled import Picture
 from clfractal.pictures.tiles import Region
 from clfractal.renderers.plan import PlannedView
-from clfractal.scene.checks import inside_solid, used_bounds, used_boxes
+from clfractal.scene.checks import inside_solid, used_boxes
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -130,7 +130,7 @@ def _of_view(seen: _Seen) -> list[str]:
 
 def _why_no_surface(seen: _Seen) -> str:
     """Why no ray met the set; empty if that need not be a mistake."""
-    center, radius = used_bounds(seen.scene)
+    center, radius = seen.scene.bounds
     if not any(_sees_ball(view.camera, np.array(center), radius) for view in seen.views):
         return (
             f"no ray meets the set; its bounds, a ball of radius {radius:g} around {_point(center)}, are not in the"
@@ -153,7 +153,7 @@ def _why_no_volume(seen: _Seen, renderer: VolumeRenderer) -> str:
     low, high = _shown_box(scene, renderer)
     if given is None:
         box = used_boxes(scene, renderer)[1]
-        center, radius = used_bounds(scene)
+        center, radius = scene.bounds
         beyond = np.maximum(np.abs(np.array(box.center) - center) - np.array(box.sides) / 2, 0)
         if float(np.linalg.norm(beyond)) >= radius:
             key = "renderer.zoom" if renderer.zoom else "renderer.box"
@@ -225,7 +225,7 @@ def _rim(scene: Scene, volume: VolumeRenderer | None) -> list[tuple[float, float
     across = np.sqrt(1 - height**2)
     ball = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
     if volume is None:
-        center, radius = used_bounds(scene)
+        center, radius = scene.bounds
         points = np.array(center) + 0.999 * radius * ball
     else:
         box = used_boxes(scene, volume)[1]
