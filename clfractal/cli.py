@@ -37,6 +37,7 @@ def main() -> None:
         from clfractal.commands.shell import Shell
 
         shell = Shell(owns_process=True)
+        shell.tell_warnings()
         status = run(sys.argv[1:], shell)
     except KeyboardInterrupt:
         # While this is handled the traceback keeps every object of the driver alive: none is waited for.

@@ -74,6 +74,10 @@ class FileError(ClfractalError):
     """A file cannot be read or written."""
 
 
+class CacheWarning(UserWarning):
+    """The cache cannot be where it should be; the work is done all the same."""
+
+
 class DeviceError(ClfractalError):
     """No device, an unknown one (status 2), or one that failed while running (status 3)."""
 

@@ -8,11 +8,19 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TextIO
+from typing import Any, TextIO
 
-from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, ClfractalError, FileError, Where
+from clfractal.errors import (
+    STATUS_BAD_INPUT,
+    STATUS_DEVICE_FAILED,
+    CacheWarning,
+    ClfractalError,
+    FileError,
+    Where,
+)
 
 _NOISE_SHOWN = 20_000  # bytes
 
@@ -55,6 +63,18 @@ class Shell:
             )
             os.dup2(self._noise, 2)
             self._errors = own
+
+    def tell_warnings(self) -> None:
+        """From now on the package's own warnings are remarks; those of libraries go where drivers' output goes."""
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if issubclass(category, CacheWarning):
+                self.say(str(message))
+            else:
+                shown(message, category, *rest, **more)
+
+        warnings.showwarning = show
 
     def say(self, line: str) -> None:
         """One line for the user, on standard error; nothing if it is closed, or with `--quiet`."""

@@ -16,23 +16,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-ENVIRONMENT_VARIABLE = "CLFRACTAL_CACHE"
+from clfractal.device.cache_folder import ENVIRONMENT_VARIABLE as ENVIRONMENT_VARIABLE
+from clfractal.device.cache_folder import folder as folder
 
 # A binary is some 100 KB; the oldest go first.
 MAXIMUM_BLOBS = 400
 
 _MAGIC = b"clfractal-blob-1\n"
 _DIGEST_BYTES = 32
-
-
-def folder() -> Path:
-    """The cache folder: `CLFRACTAL_CACHE`, else the platform's usual place. It may not exist yet."""
-    override = os.environ.get(ENVIRONMENT_VARIABLE)
-    if override:
-        return Path(override)
-    from platformdirs import user_cache_dir
-
-    return Path(user_cache_dir("clfractal"))
 
 
 def key_of(*parts: object) -> str:

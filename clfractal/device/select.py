@@ -19,9 +19,14 @@ import pyopencl as cl
 
 from clfractal.arguments import plain, shown
 from clfractal.device import cache
+from clfractal.device.cache_folder import drivers_problem, set_drivers_folder
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, Where, unknown_name
+
+# pyopencl's own cache holds only how arguments are passed. It lies in the home folder, where one may not be able to
+# write, and reading it takes longer than making its contents anew (15 ms of a start, instead of 10).
+cl._PYOPENCL_NO_CACHE = True
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
 SPEEDS = "speeds"  # section of the cache: rays per second or the like, by `DeviceInfo.key`
@@ -188,22 +193,27 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     loaded. With them (see `Device`) it is a new one.
 
     Raises:
-        DeviceError: status 2 if nothing fits `spec`; status 3 if there is no device at all.
+        DeviceError: status 2 if nothing fits `spec`, or the variable POCL_CACHE_DIR keeps PoCL from working; status 3 if
+            there is no device at all.
+        FileError: no folder for the cache can be written, not even a temporary one.
     """
     if spec is not None and not isinstance(spec, str):
         message = f"must be text such as cpu, gpu, 0:0 or part of a name, got {shown(plain(spec))}"
         raise DeviceError(message, Where(path="device"), status=STATUS_BAD_INPUT)
     found = _found()
     if not found:
-        raise DeviceError(_INSTALL_HINT)
+        raise drivers_problem() or DeviceError(_INSTALL_HINT)
     spec = (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
     fitting = _fitting(found, spec)
     if not fitting:
-        raise _nothing_fits(found, spec)
+        raise drivers_problem() or _nothing_fits(found, spec)
     speeds = cache.recall(SPEEDS)
     if any(device.info.key not in speeds for device in fitting):
         speeds = {}  # speeds count only if all these devices were measured
     best = max(fitting, key=lambda device: _score(device.info, speeds))
+    wrong = drivers_problem() if is_pocl(best.info) else None
+    if wrong is not None:
+        raise wrong
     return best.reopened(properties) if properties else best
 
 
@@ -306,6 +316,7 @@ def _find() -> list[Device]:
     """Once for a process: the devices whose contexts are shared by all who ask for no context of their own."""
     found: list[Device] = []
     seen: set[int] = set()
+    set_drivers_folder()
     try:
         platforms = cl.get_platforms()
     except cl.Error:  # PLATFORM_NOT_FOUND_KHR: the loader found no driver

@@ -71,10 +71,13 @@ def test_damaged_facts_are_no_facts(empty_cache: Path) -> None:
     assert cache.recall("facts") == {}
 
 
-def test_a_folder_that_cannot_be_written_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = tmp_path / "file"
-    file.touch()
-    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(file / "cache"))
+def test_a_folder_that_can_no_longer_be_written_is_no_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
+    assert cache.folder() == tmp_path / "cache"
+    cache.folder().rmdir()
+    cache.folder().touch()
     cache.store_blob("a", b"binary")
     cache.remember("facts", "a", 1)
     cache.drop_blob("a")

@@ -196,10 +196,15 @@ def test_the_oldest_pictures_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
     assert sorted(path.stem for path in module._place("0").parent.glob("*.png")) == ["2", "3"]
 
 
-def test_without_a_cache_folder_pictures_are_only_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_cache_folder_pictures_are_only_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from clfractal.viewer import shelf as module
 
-    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, "/dev/null/nothing")
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "gone"))
+    assert not list(cache.folder().iterdir())
+    cache.folder().rmdir()
+    cache.folder().touch()
     module._store("key", pixels())
     assert module._load("key") is None
 
