@@ -75,7 +75,7 @@ def test_what_a_picture_tells_of_itself(here: Path, shell: InProcess) -> None:
 
 
 def test_a_picture_is_a_scene(here: Path, shell: InProcess) -> None:
-    shell("render", "scene.yaml", "-o", "a.exr", "--samples", "2", "--size", "30x20")
+    shell("render", "scene.yaml", "-o", "a.exr", "--samples", "2", "--size", "30X20")
     assert shell("render", "a.exr", "-o", "b.exr").status == 0
     first, second = (read_exr(here / name)[0] for name in ("a.exr", "b.exr"))
     assert first["R"].shape == (20, 30)

@@ -261,7 +261,9 @@ def _differences(found: bytes, wanted: bytes) -> str:
     before, now = json.loads(found), json.loads(wanted)
     changes = []
     for key in sorted(set(before) | set(now)):
-        old, new = (json.dumps(side.get(key), ensure_ascii=False) for side in (before, now))
+        old, new = (
+            json.dumps(side[key], ensure_ascii=False) if key in side else "unknown" for side in (before, now)
+        )
         if old != new:
             short = max(len(old), len(new)) <= 60
             changes.append(f"the {key} was {old} and is {new}" if short else f"the {key} has changed")

@@ -132,6 +132,26 @@ def test_a_child_ends_by_itself_after_many_jobs(device: Device) -> None:
     assert len(set(processes)) == 2
 
 
+def test_a_child_without_work_ends_by_itself(
+    device: Device, pool: Children, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It holds much memory; nobody tells it to go."""
+    assert 5 <= child.IDLE_S <= 30
+    begin = subprocess.Popen
+
+    def impatient(command: list[str], **settings: Any) -> subprocess.Popen[bytes]:
+        module = command.index("-m")
+        assert command[module + 1] == child.__name__
+        text = f"import {child.__name__} as child\nchild.IDLE_S = 0.5\nchild.main()"
+        return begin([*command[:module], "-c", text, *command[module + 2 :]], **settings)
+
+    monkeypatch.setattr(subprocess, "Popen", impatient)
+    process = _run(device, "echo_job", number=1)[1]
+    assert _run(device, "echo_job", number=2) == [3, process]
+    assert _wait(lambda: not _is_running(process))
+    assert _run(device, "echo_job", number=3)[0] == 4
+
+
 def test_a_child_stays_when_the_thread_that_started_it_has_ended(device: Device, pool: Children) -> None:
     with ThreadPoolExecutor(1) as other:
         process = other.submit(_run, device, "echo_job", number=1).result()[1]

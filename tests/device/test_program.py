@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import statistics
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyopencl as cl
 import pytest
 
-from clfractal.device import cache, compiler
+from clfractal.device import cache, compiler, isolate
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.loaded import MOST, LoadedPrograms
 from clfractal.device.program import Program, build, math_flags
@@ -132,6 +134,41 @@ def test_text_flags_and_launch_are_the_key(device: Device, empty_cache: Path) ->
         "triple", (16,), (1,), (Argument("buffer", 64), Argument("scalar", 0, "float32", 9.0))
     )
     assert cached(warm=other_values), "the values of a first launch do not change the machine code"
+
+
+def test_another_driver_or_device_has_its_own_programs(device: Device, empty_cache: Path) -> None:
+    """What one driver made is never given to another one: it may not even refuse it."""
+    assert not build(device, _TRIPLE, flags=_FLAGS, isolated=False).cached
+    infos = (
+        dataclasses.replace(device.info, driver="99.9"),
+        dataclasses.replace(device.info, name="Another processor"),
+    )
+    for info in infos:
+        other = Device(info, device.cl_device)
+        assert not build(other, _TRIPLE, flags=_FLAGS, isolated=False).cached
+    again = Device(device.info, device.cl_device)
+    assert build(again, _TRIPLE, flags=_FLAGS, isolated=False).cached
+
+
+@pytest.mark.parametrize("aborts", [1, 2])
+def test_a_compiler_that_crashes_is_tried_once_more(
+    device: Device, empty_cache: Path, aborts: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, tried = isolate.run, []
+
+    def crashing(job: str, *arguments: Any, **settings: Any) -> Any:
+        tried.append(job)
+        if len(tried) <= aborts:
+            raise isolate.DriverAbortedError("the driver aborted (signal 6) while building a program")
+        return run(job, *arguments, **settings)
+
+    monkeypatch.setattr(isolate, "run", crashing)
+    if aborts == 1:
+        assert _triples(build(device, _TRIPLE, flags=_FLAGS))
+    else:
+        with pytest.raises(isolate.DriverAbortedError, match="signal 6"):
+            build(device, _TRIPLE, flags=_FLAGS)
+    assert len(tried) == 2
 
 
 @pytest.mark.parametrize("damage", [b"", b"nonsense"])

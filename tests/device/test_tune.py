@@ -23,6 +23,11 @@ def rigged_job(request: dict[str, Any]) -> dict[str, Any]:
     return {"fault": "nonsense" if request["lanes"] == 4 else ""}
 
 
+def wide_numbers_job(request: dict[str, Any]) -> dict[str, Any]:
+    """A trial in which float64 computes nonsense."""
+    return {"fault": "nonsense" if request["precision"] == "float64" else ""}
+
+
 @pytest.fixture
 def _rigged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tune, "PROBE", f"{_HERE}:rigged_job")
@@ -61,6 +66,17 @@ def test_a_trial_is_remembered(device: Device, empty_cache: Path, monkeypatch: p
     facts = cache.recall("lanes")
     assert len(facts) == 4
     assert all(key.startswith(device.info.key) for key in facts)
+
+
+def test_each_number_type_has_its_own_trials(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tune, "PROBE", f"{_HERE}:wide_numbers_job")
+    both = Device(dataclasses.replace(device.info, has_float64=True), device.cl_device)
+    for _ in range(2):  # tried, then remembered
+        assert tune.accepted_lanes(both, "float32") == (1, 4, 8, 16)
+        assert tune.accepted_lanes(both, "float64") == ()
+    assert len(cache.recall("lanes")) == 8
 
 
 def test_a_device_without_float64_says_so(

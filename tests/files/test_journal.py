@@ -157,7 +157,7 @@ def test_a_missing_journal_is_begun(tmp_path: Path) -> None:
             {"samples": 9, "device": "GPU"},
             'the device was "PoCL cpu" and is "GPU", the samples was 4 and is 9',
         ),
-        ({"more": 1}, "the more was null and is 1"),
+        ({"more": 1}, "the more was unknown and is 1"),
     ],
 )
 def test_other_work_is_refused_with_what_differs(

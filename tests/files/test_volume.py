@@ -194,6 +194,19 @@ def test_where_voxels_are(extra: str, origin: list[float], steps: list[float], t
     assert volume.directions.tolist() == np.diag(steps).tolist()
 
 
+@pytest.mark.parametrize("space", ["left-anterior-superior", "LAS", "3D-left-handed"])
+def test_a_left_handed_space_is_mirrored(space: str, tmp_path: Path) -> None:
+    """Positions have another sign along x, whichever way the axes of the array run; ours are right-handed."""
+    steps = np.array([[0.5, 0.25, -1.0], [2.0, 0.0, 0.75], [-0.25, 3.0, 1.5]])
+    rows = " ".join(f"({','.join(map(str, row))})" for row in steps.tolist())
+    extra = f"space: {space}\nspace directions: {rows}\nspace origin: (10,-20,30)\n"
+    (tmp_path / "a.nrrd").write_bytes(head(extra).encode() + b"\n\1\2")
+    found = read_volume(tmp_path / "a.nrrd")
+    np.testing.assert_array_equal(found.origin, [-10, -20, 30])
+    np.testing.assert_array_equal(found.directions, steps * [-1, 1, 1])
+    assert found.values.shape == (1, 1, 2)
+
+
 def test_lines_and_bytes_before_the_data(tmp_path: Path) -> None:
     path = tmp_path / "v.nrrd"
     path.write_bytes(head("line skip: 2\nbyte skip: 3\n").encode() + b"one\ntwo\nxyz\x05\x07")

@@ -50,16 +50,40 @@ def test_equal_grays_stay_what_they_are(method: Method, glasses: Glasses) -> Non
         assert mix(pixel, pixel, (left, right)) == pytest.approx(pixel, rel=1e-6, abs=1e-7)
 
 
-def test_published_least_squares_figures_change_only_in_the_third_digit() -> None:
-    left, right = matrices("dubois", "red_cyan")
-    assert left[0] == pytest.approx([0.437, 0.449, 0.164], abs=1e-3)
-    assert right[2] == pytest.approx([-0.026, -0.093, 1.234], abs=2e-3)
-    left, right = matrices("dubois", "green_magenta")
-    assert left[1] == pytest.approx([0.284, 0.668, 0.143], abs=1e-3)
-    assert right[1] == pytest.approx([-0.016, -0.015, -0.065], abs=1e-3)
-    left, right = matrices("dubois", "amber_blue")
-    assert left[0] == pytest.approx([1.062, -0.205, 0.299], abs=1e-3)
-    assert right[2] == pytest.approx([0.094, 0.185, 0.911], abs=2e-3)
+# Dubois's published figures: rows red, green, blue of the anaglyph; columns left red, green, blue, right red, green, blue.
+PUBLISHED: dict[Glasses, list[list[float]]] = {
+    "red_cyan": [
+        [0.437, 0.449, 0.164, -0.011, -0.032, -0.007],
+        [-0.062, -0.062, -0.024, 0.377, 0.761, 0.009],
+        [-0.048, -0.050, -0.017, -0.026, -0.093, 1.234],
+    ],
+    "green_magenta": [
+        [-0.062, -0.158, -0.039, 0.529, 0.705, 0.024],
+        [0.284, 0.668, 0.143, -0.016, -0.015, -0.065],
+        [-0.015, -0.027, 0.021, 0.009, 0.075, 0.937],
+    ],
+    "amber_blue": [
+        [1.062, -0.205, 0.299, -0.016, -0.123, -0.017],
+        [-0.026, 0.908, 0.068, 0.006, 0.062, -0.017],
+        [-0.038, -0.173, 0.022, 0.094, 0.185, 0.911],
+    ],
+}
+
+
+@pytest.mark.parametrize("glasses", GLASSES)
+def test_published_least_squares_figures_change_only_in_the_third_digit(glasses: Glasses) -> None:
+    """All 18 figures of each pair; their rows have sums of 0.998 to 1.001, and are divided by them."""
+    found = np.hstack(matrices("dubois", glasses))
+    np.testing.assert_allclose(found, PUBLISHED[glasses], atol=1e-3, rtol=1.5e-3)
+
+
+@pytest.mark.parametrize("glasses", GLASSES)
+def test_the_projection_keeps_the_picture_of_each_eye_where_its_filter_passes(glasses: Glasses) -> None:
+    """Without the published figures: whose filter passes a primary alone gives nearly all of that primary's light."""
+    for eye, passed in zip(matrices("dubois", glasses), IDEAL[glasses], strict=True):
+        gray = eye @ np.ones(3)
+        assert (gray[np.array(passed) == 1] > 0.8).all()
+        assert (np.abs(gray[np.array(passed) == 0]) < 0.27).all()
 
 
 def test_red_cyan_is_near_a_least_squares_projection_of_other_measurements() -> None:

@@ -198,6 +198,26 @@ def test_one_quad(device: Device, renderer: str, camera: str, distance: float) -
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
+@pytest.mark.parametrize("opacity", [0.499, 0.5])
+def test_a_quad_that_stops_exactly_half(device: Device, renderer: str, opacity: float) -> None:
+    """Half of the light is enough for the data channels; less is not."""
+    scene = picture(renderer, PERSPECTIVE, [plane([0.0, -1.3, 0.3], [0.2, -1, 0.5], opacity)])
+    film = shoot(scene, device)
+    seen, t, room = met(scene, 0)
+    origin, direction, _ = rays(scene)
+    # Past the ball there is nothing else that the channels could tell of.
+    alone = seen & (room > 1e-4) & (to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)[1] > 1.1)
+    assert alone.sum() > 20
+    points = (origin + t[..., None] * direction)[alone]
+    if opacity < 0.5:
+        assert np.isposinf(film["Z"][alone]).all()
+        assert not points_of(film)[alone].any()
+    else:
+        np.testing.assert_allclose(points_of(film)[alone], points, atol=1e-5)
+        assert np.isfinite(film["Z"][alone]).all()
+
+
+@pytest.mark.parametrize("renderer", RENDERERS)
 @pytest.mark.parametrize("side", [1, -1])
 def test_several_quads_by_depth(device: Device, renderer: str, side: int) -> None:
     """Stacked and crossing planes, seen from both sides: each pixel has its own order."""

@@ -27,6 +27,9 @@ from tests.render.shots import (
     BALL,
     BALL_RADIUS,
     ORTHOGRAPHIC,
+    SOLIDS,
+    SPHERE_CENTER,
+    SPHERE_RADIUS,
     Floats,
     normals_of,
     points_of,
@@ -212,6 +215,35 @@ def test_steps_of_a_ball(device: Device) -> None:
     within = shoot(scene_of(BALL, inner, (SIDE, SIDE), renderer={"search": "steps"}), device)
     assert (within["A"] == 1).all()
     assert np.abs(within["Z"]).max() < 1e-6
+
+
+def test_shadows_of_steps_begin_small(device: Device) -> None:
+    """Place by place: steps of a ray to a light grow from the size of a pixel to the whole step, half as long again each
+    time. Here a whole step at once would pass most of the ball that hovers over the box."""
+    step, detail = 0.57, 0.25
+    scene = scene_of(
+        SOLIDS,
+        {**ORTHOGRAPHIC, "position": [0.4, -2, 1.6]},
+        lights=[{"direction": [0, 0, -1]}],
+        material={"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]},
+        renderer={"search": "steps", "step": step, "detail": detail},
+    )
+    film = shoot(scene, device)
+    footprint = rays(scene)[2][0, 0]
+    points = points_of(film)
+    ground = (film["A"] == 1) & (np.abs(points[..., 2]) < 1e-3) & (np.abs(points[..., :2]) < 1.15).all(-1)
+    assert ground.sum() > 600
+    places, pace = [0.0], footprint
+    while places[-1] < 2:
+        places.append(places[-1] + pace)
+        pace = min(1.5 * pace, step)
+    height = points[ground][:, None, 2] + 3 * detail * footprint + np.array(places)
+    across = np.linalg.norm(points[ground][:, :2] - SPHERE_CENTER[:2], axis=-1)
+    depth = SPHERE_RADIUS - np.hypot(across[:, None], height - SPHERE_CENTER[2]).min(axis=1)
+    sure = np.abs(depth) > 2e-3
+    assert sure.mean() > 0.97
+    np.testing.assert_array_equal((film["R"][ground] == 0)[sure], (depth > 0)[sure])
+    assert (across[depth > 0] > 0.8 * SPHERE_RADIUS).sum() > 10
 
 
 def check_boundary(found: Found, precision: Precision) -> None:

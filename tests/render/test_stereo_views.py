@@ -369,6 +369,27 @@ class TestParallax:
             assert wide == pytest.approx(middle.width / np.linalg.norm(middle.center - middle.origin))
             assert view.focus_distance == pytest.approx(np.linalg.norm(view.center - view.origin))
 
+    @given(settings, seeds)
+    def test_parallax_of_eyes_that_toe_in(self, setting: Setting, seed: int) -> None:
+        """Two pinholes that look at the middle of the plane, each with a picture as wide as the middle one's angle."""
+        stereo, views = setting.section(convergence="toe_in"), setting.views(convergence="toe_in")
+        middle = views["middle"]
+        assert middle.eye is not None
+        points = points_before(middle, seed)
+        distance = np.linalg.norm(middle.center - middle.eye)
+        scale = distance / stereo.screen_distance
+        found = {}
+        for name, way in zip(SIDES, (-1, 1), strict=True):
+            eye = middle.eye + way * scale * stereo.interpupillary_distance / 2 * middle.side
+            forward = unit(middle.center - eye)
+            right = np.cross(forward, middle.up)
+            offset = points - eye
+            tangents = np.stack([offset @ right, offset @ middle.up], axis=-1) / (offset @ forward)[:, None]
+            found[name] = tangents * stereo.screen_distance
+        np.testing.assert_allclose(
+            parallax(stereo, views, points), found["right"] - found["left"], rtol=1e-7, atol=1e-9
+        )
+
     @given(settings, st.floats(-5, 5))
     def test_degrees_by_the_angle_between_two_lines(self, setting: Setting, part: float) -> None:
         """The eyes' lines of sight through their places on the screen, the difference to those that meet on it."""

@@ -76,6 +76,27 @@ def test_equation_5(device: Device, formula: dict[str, Any], lights: str) -> Non
         assert not colors(film)[hit].any()
 
 
+@pytest.mark.parametrize("shininess", [0.5, 2.75, 12.5, 3000.0])
+def test_any_shininess(device: Device, shininess: float) -> None:
+    """Exponents that are no whole numbers, or too large for squaring."""
+    shiny = {**MATERIAL, "shininess": shininess}
+    camera = {**PERSPECTIVE, "fov": 20}
+    lights = [{"direction": [-1.5, 2.4, -1.3]}]  # from beside the camera: its highlight is in the picture
+    scene, dull = (
+        scene_of(QUICK_BALL, camera, lights=lights, material=material, renderer={"detail": 0.05})
+        for material in (shiny, {**shiny, "specular": 0})
+    )
+    film = shoot(scene, device)
+    hit = film["A"] == 1
+    points = points_of(film)
+    normals = points / np.linalg.norm(points, axis=-1, keepdims=True).clip(1e-9)
+    expected = eq5(scene, points, normals, rays(scene)[1])
+    np.testing.assert_allclose(colors(film)[hit], expected[hit], atol=3e-4 + 3e-6 * shininess)
+    # The highlight is a good part of what is compared.
+    highlight = expected - eq5(dull, points, normals, rays(scene)[1])
+    assert highlight[hit].max() > 0.3
+
+
 @pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "scalar rule"])
 @pytest.mark.parametrize("detail", [0.25, 1.0, 4.0])
 def test_no_acne(device: Device, formula: dict[str, Any], detail: float) -> None:

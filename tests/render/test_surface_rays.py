@@ -23,15 +23,18 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,
-    BALL_RADIUS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
+    QUICK_BALL,
     SOLIDS,
     SPHERE_CENTER,
     SPHERE_RADIUS,
     Floats,
+    normals_of,
+    plan_of,
     points_of,
     rays,
+    render_planned,
     scene_of,
     shoot,
     stacked,
@@ -45,12 +48,12 @@ def colors(film: Film) -> Floats:
     return stacked(film, ("R", "G", "B")).astype(float)
 
 
-def solids(light: dict[str, Any], material: dict[str, Any], **occlusion: Any) -> Scene:
-    """The ball over the box, under a light with a size and with ambient occlusion: one program for all of them."""
+def solids(light: dict[str, Any] | list[dict[str, Any]], material: dict[str, Any], **occlusion: Any) -> Scene:
+    """The ball over the box, under lights with a size and with ambient occlusion: one program for all of them."""
     return scene_of(
         SOLIDS,
         {**ORTHOGRAPHIC, "position": [0.4, -2, 1.6]},
-        lights=[light],
+        lights=light if isinstance(light, list) else [light],
         material={**BRIGHT, **material},
         renderer={"samples": 16, "detail": 0.25, "ambient_occlusion": occlusion or {"rays": 1}},
     )
@@ -94,6 +97,42 @@ def test_soft_shadow_is_the_part_of_the_lamp_that_is_hidden(device: Device, size
     assert abs(error.mean()) < 0.005
     assert np.abs(error).mean() < 0.01
     assert np.quantile(np.abs(error), 0.98) < (0.25 if size < 10 else 0.1)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)], ids=["soft first", "hard first"])
+def test_hard_and_soft_lights_together(device: Device, order: tuple[int, int]) -> None:
+    """Each light has its own number of rays, and brings as much light as it does alone."""
+    soft = {"direction": [0.5, 0.3, -1.0], "angular_size": 4, "rays": 8, "color": [1, 0, 0]}
+    hard = {"direction": [-0.4, 0.1, -1.0], "intensity": 0.5, "color": [0, 1, 0]}
+    film = shoot(solids([(soft, hard)[number] for number in order], {"diffuse": 1}), device)
+    on_ground = ground(film)
+    softly, hardly = (
+        colors(shoot(solids(light, {"diffuse": 1}), device))[on_ground] for light in (soft, hard)
+    )
+    together = colors(film)[on_ground]
+    np.testing.assert_allclose(together[:, 1], hardly[:, 1], atol=1e-6)
+    # Another place among the lights, other places on the lamp: only their mean is the same.
+    np.testing.assert_allclose(together[:, 0], softly[:, 0], atol=0.15)
+    assert together[:, 0].mean() == pytest.approx(softly[:, 0].mean(), rel=3e-3)
+    assert (hardly[:, 1] == 0).mean() > 0.02
+
+
+def test_rays_that_go_together_lose_no_number(device: Device) -> None:
+    """With ambient occlusion rays wait in a batch, and what they found comes back from there: all of it."""
+    for formula, scale in ((BALL, 1.0), (QUICK_BALL, 1.9)):  # 1.9: steps that end inside are counted, too
+        found = []
+        for occlusion in (None, {"rays": 1}):
+            settings = {"step_scale": scale, "over_relaxation": 1, "ambient_occlusion": occlusion}
+            scene = scene_of(formula, PERSPECTIVE, lights=[], renderer=settings)
+            plan = plan_of(scene, device)
+            film = Film(plan.channels, (64, 64), plan.region)
+            found.append((film, render_planned(scene, plan, device, film).bad_distances))
+        (alone, bad), (together, bad_together) = found
+        for name in ("A", "Z", "N.X", "N.Y", "N.Z", "iterations", "steps"):
+            np.testing.assert_allclose(together[name], alone[name], rtol=1e-5, atol=1e-6, err_msg=name)
+        assert alone["iterations"][alone["A"] == 1].min() > 0
+        assert bad == bad_together
+    assert bad > 100
 
 
 def test_ambient_occlusion_is_the_part_of_the_hemisphere_that_is_covered(device: Device) -> None:
@@ -158,17 +197,18 @@ def test_what_is_mirrored_and_seen_is_the_environment(
     environment = {"name": "dusk", "rotation": rotation, "rays": 1}
     scene = environment_scene(tmp_path, environment, 1.0, bounces=1)
     film = shoot(scene, device)
-    origin, direction, _ = rays(scene)
-    t, _ = to_sphere(origin, direction, [0, 0, 0], BALL_RADIUS)
+    direction = rays(scene)[1]
     hit = film["A"] == 1
-    normal = (origin + np.where(hit, t, 0)[..., None] * direction) / BALL_RADIUS
+    # Where the ball was hit, up to half a footprint off, matters to a mirror: so the normal that was found there.
+    normal = normals_of(film)
     mirrored = direction - 2 * (direction * normal).sum(-1, keepdims=True) * normal
     toward = np.where(hit[..., None], mirrored, direction)
     expected = look_up(shipped("dusk"), toward, rotation)
     assert 0.2 < hit.mean() < 0.8
-    assert (np.abs(colors(film) - expected) <= 0.005 + 0.02 * expected)[~hit].mean() > 0.999
-    # A hit is up to half a footprint off, which a mirror shows near the sun and at the ball's rim.
-    assert (np.abs(colors(film) - expected) <= 0.01 + 0.1 * expected)[hit].mean() > 0.88
+    assert (np.abs(colors(film) - expected) <= 0.005 + 0.02 * expected).mean() > 0.999
+    assert (np.abs(colors(film) - expected) <= 0.01 + 0.1 * expected).all()
+    points = points_of(film)[hit]
+    np.testing.assert_allclose(normal[hit], points / np.linalg.norm(points, axis=-1)[:, None], atol=1e-4)
 
 
 @pytest.mark.parametrize("reflection", [0.0, 0.4])
@@ -192,3 +232,40 @@ def test_under_a_white_sky_a_ball_has_its_own_colour(
     np.testing.assert_allclose(colors(film)[inside].mean(axis=0), expected, rtol=0.005)
     np.testing.assert_allclose(colors(film)[inside], np.broadcast_to(expected, (inside.sum(), 3)), rtol=0.12)
     np.testing.assert_allclose(colors(film)[film["A"] == 0], 1.0, atol=1e-5)
+
+
+def irradiance(pixels: Floats, normals: Floats) -> Floats:
+    """Light from all sides by the cosine to a normal, over pi: the map's pixels summed by their solid angles."""
+    height, width, _ = pixels.shape
+    rows, columns = (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
+    azimuth, elevation = (2 * columns - 1) * np.pi, (0.5 - rows) * np.pi
+    level, up = np.broadcast_arrays(np.cos(elevation)[:, None], np.sin(elevation)[:, None])
+    ways = np.stack(np.broadcast_arrays(level * np.sin(azimuth), level * np.cos(azimuth), up), -1)
+    part = level * np.ones(width) * (np.pi / height) * (2 * np.pi / width)
+    cosine = np.maximum(normals @ ways.reshape(-1, 3).T, 0)
+    return np.asarray(cosine @ (part[..., None] * pixels).reshape(-1, 3) / np.pi)
+
+
+@pytest.mark.parametrize(
+    ("light_rays", "occlusion"), [(1, None), (3, None), (4, None), (4, 5), (6, 1)], ids=str
+)
+def test_a_ball_under_a_sky_that_is_brighter_on_one_side(
+    device: Device, tmp_path: Path, light_rays: int, occlusion: int | None
+) -> None:
+    """Whatever the numbers of rays of both kinds are: odd, or more for the occlusion, each weighs as much as it should."""
+    open_part = None if occlusion is None else {"rays": occlusion}
+    environment = {"name": "dusk", "rays": light_rays}
+    scene = environment_scene(tmp_path, environment, 0.0, samples=16, ambient_occlusion=open_part)
+    film = shoot(scene, device)
+    hit = film["A"] == 1
+    # Halved: the sum over 16 times fewer pixels is the same to a thousandth.
+    sky = shipped("dusk")
+    sky = sky.reshape(sky.shape[0] // 4, 4, sky.shape[1] // 4, 4, 3).mean(axis=(1, 3))
+    expected = 0.9 * np.array([0.8, 0.5, 0.2]) * irradiance(sky, normals_of(film)[hit])
+    found = colors(film)[hit]
+    assert expected.max() > 3 * expected.min()
+    np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
+    bright = expected[:, 0] > np.median(expected[:, 0])
+    for half in (bright, ~bright):
+        np.testing.assert_allclose(found[half].mean(axis=0), expected[half].mean(axis=0), rtol=0.02)
+    assert np.sqrt(((found / expected - 1) ** 2).mean()) < 0.2

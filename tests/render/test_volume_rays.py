@@ -212,6 +212,31 @@ def test_normals_of_fog_are_those_of_its_surface(device: Device, folder: Path) -
     assert not points_of(film)[faint].any()
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_far_side_of_fog_faces_the_eye(device: Device, folder: Path, side: int) -> None:
+    """The ramp's normal is the same everywhere; seen from where it points away, it and its light are turned around."""
+    normal = np.array([0.2, 0.1, -0.15]) / -np.linalg.norm([0.2, 0.1, -0.15])  # away from larger values
+    position = CENTER + side * 4 * normal + [0.2, 0, 0.3]
+    camera = {
+        "projection": "orthographic",
+        "position": position.tolist(),
+        "target": CENTER.tolist(),
+        "height": 2,
+    }
+    light = {"direction": (CENTER - position).tolist(), "shadow": False}
+    look = {**FLAT, "material": {**FLAT["material"], "ambient": 0, "diffuse": 1}, "lights": [light]}
+    transfer = {"opacity": [{"at": -1, "opacity": 0.1}]}
+    film = shoot(volume_scene(camera, folder=folder, file="ramp.nrrd", transfer=transfer, look=look), device)
+    # Within the grid: at its faces values go on unchanged, and normals turn.
+    depth = np.array(SIDES) * VOXEL / 2 - np.abs(points_of(film) - CENTER)
+    inner = (depth > 2 * VOXEL).all(-1) & (film["A"] > 0.99)
+    assert inner.sum() > 100
+    np.testing.assert_allclose(normals_of(film)[inner], side * normal + 0 * points_of(film)[inner], atol=0.02)
+    toward = (position - CENTER) / np.linalg.norm(position - CENTER)
+    brightness = stacked(film, "RGB")[inner] / film["A"][inner, None]
+    np.testing.assert_allclose(np.median(brightness, axis=0), COLOR * side * (normal @ toward), rtol=0.05)
+
+
 OUTSIDE = {
     "inside": [{"at": 0, "opacity": 0.03}, {"at": 1, "opacity": 0}],
     # (0 is an entry of the table.)

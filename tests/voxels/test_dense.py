@@ -49,6 +49,21 @@ def test_bricks_below_the_threshold_are_left_out() -> None:
     np.testing.assert_array_equal((grid.dense_normals()[..., 3] == 255)[kept], (values > 30)[kept])
 
 
+@pytest.mark.parametrize("axis", [0, 1, 2], ids="zyx")
+def test_a_brick_is_seen_by_its_ninth_layer(axis: int) -> None:
+    """Between middles of voxels the ninth layer belongs to a brick, too: a voxel there makes both bricks visible."""
+    for place, bricks in ((7, (0,)), (8, (0, 1)), (9, (1,)), (16, (1, 2))):
+        values = np.zeros((25, 25, 25), np.float32)
+        at = [4, 4, 4]
+        at[axis] = place
+        values[tuple(at)] = 1
+        grid = grid_from_dense(values, device(), corner=CORNER, spacing=SPACING, threshold=0.5)
+        expected = np.zeros((3, 3, 3), bool)
+        for brick in bricks:
+            expected[tuple(brick if a == axis else 0 for a in range(3))] = True
+        np.testing.assert_array_equal(grid.table_entries >= 0, expected)
+
+
 def test_an_array_in_slabs_and_pools_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     values = noise((70, 21, 30)).astype(np.uint8)
     whole = grid_from_dense(values, device(), corner=CORNER, spacing=SPACING, threshold=10, normal_radius=3)

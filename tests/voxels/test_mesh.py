@@ -116,6 +116,36 @@ def test_normals_of_a_stretched_grid() -> None:
     assert np.sum(mesh.normals * expected, axis=1).min() > 0.9999
 
 
+@pytest.mark.parametrize(
+    "steps",
+    [
+        [[0.8, 0.6, 0.0], [-0.6, 0.8, 0.0], [0.0, 0.0, 1.0]],
+        [[1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, -0.7, 2.0]],
+        [[0.0, -1.0, 0.3], [1.0, 0.0, 0.0], [0.4, 0.2, 1.5]],
+        [[1.0, 0.2, 0.0], [0.3, -1.0, 0.0], [0.1, 0.0, 0.5]],
+    ],
+    ids=["rotated", "sheared", "both", "mirrored"],
+)
+def test_normals_of_a_grid_whose_steps_are_not_along_the_axes(steps: list[list[float]]) -> None:
+    """Of a linear function of the place: the surface is a plane, and its normal the same everywhere."""
+    slope, directions, origin = np.array([0.3, -0.5, 0.4]), np.array(steps), np.array([1.0, -2.0, 0.5])
+    z, y, x = np.indices((9, 8, 7))
+    places = origin + np.stack([x, y, z], axis=-1) @ directions
+    level = float(np.median(places @ slope)) + 0.01
+    mesh = extract(places @ slope, level, origin=origin, directions=directions, close=False)
+    outward = -slope / np.linalg.norm(slope)
+    np.testing.assert_allclose(mesh.vertices @ slope, level, atol=1e-3)
+    # At the outermost voxels values go on unchanged, and normals turn.
+    at = (mesh.vertices - origin) @ np.linalg.inv(directions)
+    inner = ((at >= 1) & (at <= np.array([5, 6, 7]))).all(axis=1)
+    assert inner.sum() > 30
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals[inner], np.tile(outward, (inner.sum(), 1)), atol=1e-5)
+    corners = mesh.vertices[mesh.triangles]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (flat @ outward > 0).all()
+
+
 @pytest.mark.parametrize("brick", [5, 16, 23])
 @pytest.mark.parametrize("kind", ["smooth", "bytes", "noise"])
 def test_bricks_leave_no_trace(brick: int, kind: str) -> None:

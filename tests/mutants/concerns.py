@@ -1,0 +1,137 @@
+"""Which tests a mistake in a file concerns: those that are asked first."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from fnmatch import fnmatch
+from functools import cache
+from pathlib import Path
+
+# The first row whose pattern fits a file names its tests, in the order in which they are asked: cheap ones first, without
+# `tests/`, `test_` and `.py`. To them come the tests that bear the file's name, and for Python those that import it.
+CONCERNS = """
+kernels/numbers/*: numbers/ formulas/distance render/surface_analytic
+kernels/show.cl: work/show viewer/display
+kernels/canvas.cl: work/canvas viewer/session
+kernels/cut_plane.cl: render/cut_plane render/cut_plane_periods
+kernels/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods
+kernels/planes.h: render/planes_in_picture render/planes_in_fog
+kernels/environment.h: render/environment_kernel render/surface_rays
+kernels/normals.h: render/normals render/normals_properties render/pixel_points
+kernels/pixel_points.h: render/pixel_points render/normals render/normals_properties
+kernels/sampling.h: render/sampling render/filters render/surface_rays render/lens_and_fog
+kernels/coloring.h: render/coloring render/surface_light
+kernels/color.h: render/coloring render/cut_plane render/surface_samples
+kernels/camera.h: render/surface_analytic render/lens_and_fog render/stereo_views
+kernels/spot.h: render/coloring render/lens_and_fog render/normals render/surface_light
+kernels/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
+kernels/secondary.h: render/surface_rays render/surface_light
+kernels/batch.h: render/surface_rays render/pixel_points
+kernels/march_steps.h: render/searches
+kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
+kernels/orbit.h: formulas/counts formulas/distance render/points render/surface_analytic
+kernels/p[ar]*: render/surface_samples render/passes device/tune
+kernels/pixel.h: render/surface_samples render/passes render/surface_light
+kernels/points.cl: render/points formulas/counts
+kernels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
+kernels/gather.h: render/volume_rays render/volume_surface
+kernels/volume*: render/volume_rays render/volume_surface render/volume_bits
+kernels/voxels*: voxels/ render/volume_surface
+kernels/tiles.h: render/tiles_bits render/surface_samples
+kernels/*: numbers/ render/surface_analytic render/surface_light
+clfractal/commands/*: cli bad_input exchange stereo_shell
+clfractal/api.py: api stereo_python work/engine
+clfractal/device/c[ah]*: device/isolate device/cache work/cancel
+clfractal/device/*: device/ work/cancel
+clfractal/files/*: files/
+clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/live formulas/catalog
+clfractal/optics/*: render/view render/stereo_views render/surface_analytic
+clfractal/pictures/*: render/film render/film_store render/compose render/anaglyph render/paste render/compose_files
+clfractal/renderers/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
+clfractal/scene/*: scene/ bad_input
+clfractal/voxels/*: voxels/ render/volume_rays render/volume_bits
+clfractal/work/var*: work/variations vary_shell
+clfractal/work/*: work/ render/passes resume comfort
+clfractal/viewer/panels/*: viewer/panels viewer/widgets viewer/formula_panels viewer/golden_panels
+clfractal/viewer/app.py: window/
+clfractal/viewer/window.py: window/
+clfractal/viewer/gl.py: window/
+clfractal/viewer/surface.py: window/
+clfractal/viewer/begin.py: window/
+clfractal/viewer/inputs.py: window/
+clfractal/viewer/ui_renderer.py: window/
+clfractal/viewer/outputs.py: window/
+clfractal/viewer/deeds.py: window/
+clfractal/viewer/motion.py: window/
+clfractal/viewer/*: viewer/studio viewer/session viewer/controls
+clfractal/*: cli api
+"""
+
+# Asked of every mistake that its own tests did not notice: quick ones that go through the whole program.
+QUICK = (
+    "tests/test_cli.py",
+    "tests/test_api.py",
+    "tests/scene",
+    "tests/render/test_film.py",
+    "tests/render/test_surface_samples.py",
+    "tests/render/test_stereo_pictures.py",
+    "tests/render/test_volume_surface.py",
+    "tests/test_scenes.py",
+)
+
+IMPORTERS = 5
+"""Tests that import a file are asked if they are no more: else the file is everybody's, and its own row says enough."""
+
+
+def concerned(path: str, root: Path) -> list[str]:
+    """The tests that a mistake in a file concerns, in the order in which they are to be asked."""
+    named = [test for test in _tests(root) if fnmatch(Path(test).name, f"test_{Path(path).stem}*.py")]
+    importing = _importers(root).get(path, [])
+    row = next(tests for pattern, tests in _rows() if fnmatch(path, pattern))
+    tests = _once(named + (importing if len(importing) <= IMPORTERS else []) + row)
+    return sorted(tests, key=lambda test: test.startswith("tests/window"))  # these take longest
+
+
+def _rows() -> Iterator[tuple[str, list[str]]]:
+    for line in CONCERNS.strip().splitlines():
+        pattern, _, names = line.partition(": ")
+        yield pattern, [_test(name) for name in names.split()]
+
+
+def _test(name: str) -> str:
+    """The file of a test, or the folder of those whose name ends in a slash."""
+    folder, _, last = name.rpartition("/")
+    return "/".join(filter(None, ["tests", folder, f"test_{last}.py" if last else ""]))
+
+
+def _once(tests: list[str]) -> list[str]:
+    """Without what an earlier folder or file covers already."""
+    kept: list[str] = []
+    for test in tests:
+        if not any(test == other or test.startswith(f"{other}/") for other in kept):
+            kept.append(test)
+    return kept
+
+
+@cache
+def _tests(root: Path) -> list[str]:
+    return sorted(path.relative_to(root).as_posix() for path in (root / "tests").rglob("test_*.py"))
+
+
+@cache
+def _importers(root: Path) -> dict[str, list[str]]:
+    """For each module's file the tests that import it by name."""
+    importers: dict[str, list[str]] = {}
+    for test in _tests(root):
+        for node in ast.walk(ast.parse((root / test).read_text(encoding="utf-8"))):
+            names: list[str] = []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            elif isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            for name in names:
+                file = f"{name.replace('.', '/')}.py"
+                if name.startswith("clfractal.") and test not in importers.setdefault(file, []):
+                    importers[file].append(test)
+    return importers
