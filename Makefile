@@ -8,6 +8,7 @@
 #   make soak          ten minutes of random events for the window, from a seed
 #   make lowest        render, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
+#   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
 #
 # Another Python: `make test PYTHON=python3.12 VENV=.venv-3.12`. An environment keeps the Python that it was made with.
@@ -31,7 +32,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test window soak lint lowest bench portability install clean
+.PHONY: demo view test window soak lint lowest bench mutate portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -78,6 +79,10 @@ lowest: $(LOWEST)/.installed
 bench: $(VENV)/.installed
 	$(BIN)/clfractal bench
 
+# Copies of the checkout are changed, so it is the checkout that is tested and not what is installed.
+mutate: $(VENV)/.mutates-with
+	PYTHONPATH=$(CURDIR) $(BIN)/python -P -m tests.mutants $(ARGUMENTS)
+
 portability: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && $(BIN)/python -m tests.portability $(ARGUMENTS)
 
@@ -108,6 +113,10 @@ $(VENV)/.viewer: $(VENV)/.installed
 
 $(VENV)/.tested-with: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[test]'
+	@touch $@
+
+$(VENV)/.mutates-with: $(VENV)/.tested-with
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[mutate]'
 	@touch $@
 
 $(LINT)/.installed: requirements-lint.txt | $(LINT)/bin/python

@@ -2,8 +2,9 @@
 
 Golden pictures are 96 x 54 with one sample per pixel (see `tests.pictures`). Rounding differs between OpenCL
 implementations, and where a fractal's rim or a shadow falls between two pixels a whole pixel changes. So
-pictures are compared by a mean, which a few such pixels hardly move, and by means over blocks of 6 x 6
-pixels, which find a missing part, another light or another colour that is small on the whole.
+pictures are compared by the share of pixels that differ, by a mean, which a few such pixels hardly move, and by
+means over blocks of 6 x 6 pixels, which find a missing part, another light or another colour that is small on the
+whole.
 """
 
 from __future__ import annotations
@@ -31,9 +32,12 @@ from tests.pictures import (
 # In levels of 8 bits. PoCL 3.1 and the PoCL wheel give the same pictures, bit for bit; Intel's runtime differs
 # in five scenes, by a mean of at most 0.27 and in a block by at most 8.7 (both in hast_above,
 # the one with the finest spray).
-MEAN_LIMIT = 1.0
+MEAN_LIMIT = 0.75
 BLOCK_LIMIT = 14.0
 BLOCK = 6
+# Another processor's estimates of roots, and other lane counts, change whole pixels, but few: at most 1.6 % of a scene's
+# (octahedral_ifs), none in a half of all scenes. The others have the same bits, so a faint change everywhere is found.
+SHARE_LIMIT = 0.03
 
 SCENES = scene_paths()
 THESIS_FIGURES = {
@@ -79,6 +83,11 @@ def worst_block(picture: Picture, golden: Picture) -> float:
     rows, columns, _ = difference.shape
     blocks: npt.NDArray[np.float64] = difference.reshape(rows // BLOCK, BLOCK, columns // BLOCK, BLOCK, 3)
     return float(np.abs(blocks.mean(axis=(1, 3))).max())
+
+
+def share_changed(picture: Picture, golden: Picture) -> float:
+    """The part of the pixels that differ by more than one level, which rounding may take."""
+    return float((np.abs(picture.astype(np.int16) - golden).max(axis=-1) > 1).mean())
 
 
 def test_there_are_scenes_for_the_whole_library() -> None:
@@ -154,9 +163,11 @@ def test_normals_have_length_one_and_face_the_eye(path: Path) -> None:
 def test_it_looks_as_it_did(path: Path) -> None:
     picture, golden = small_picture(path), read_picture(golden_path(path))
     mean, block = mean_difference(picture, golden), worst_block(picture, golden)
-    if mean > MEAN_LIMIT or block > BLOCK_LIMIT:
+    share = share_changed(picture, golden)
+    if mean > MEAN_LIMIT or block > BLOCK_LIMIT or share > SHARE_LIMIT:
         kept = keep_failure(path.stem, picture, golden)
-        pytest.fail(f"{path.stem}: mean difference {mean:.2f}, worst block {block:.1f} levels; see {kept}")
+        told = f"mean difference {mean:.2f}, worst block {block:.1f} levels, {share:.1%} of pixels changed"
+        pytest.fail(f"{path.stem}: {told}; see {kept}")
 
 
 def test_golden_pictures_have_scenes() -> None:
@@ -170,6 +181,9 @@ def test_the_comparison_finds_what_matters() -> None:
     assert mean_difference(golden, golden) == 0 == worst_block(golden, golden)
     brighter = np.clip(golden * 1.07, 0, 255).astype(np.uint8)
     assert mean_difference(brighter, golden) > MEAN_LIMIT
+    assert share_changed(golden, golden) == 0
+    faintly = np.clip(golden * 1.02, 0, 255).astype(np.uint8)
+    assert share_changed(faintly, golden) > SHARE_LIMIT
     hole = golden.copy()
     hole[24:30, 48:54] = 0
     assert worst_block(hole, golden) > BLOCK_LIMIT

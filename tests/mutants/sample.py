@@ -9,7 +9,6 @@ from pathlib import Path
 
 from tests.mutants.kernel_code import kernel_mutants
 from tests.mutants.mutant import Mutant
-from tests.mutants.python_code import python_mutant, python_places
 
 KERNELS = (".cl", ".h")
 
@@ -43,6 +42,8 @@ def _one(name: str, text: str, source: random.Random) -> Mutant | None:
     if name.endswith(KERNELS):
         mutants = kernel_mutants(name, text)
         return source.choice(mutants) if mutants else None
+    from tests.mutants.python_code import python_mutant, python_places  # cosmic-ray is an extra of its own
+
     places = python_places(text)
     if not places:
         return None

@@ -64,7 +64,7 @@ class Trial:
                     break
                 if noticed == "":
                     return Outcome(mutant, "timed out", " ".join(stage), time.monotonic() - began)
-                if self._passes(noticed):
+                if noticed in deselected or self._passes(noticed):
                     return Outcome(mutant, "killed", noticed, time.monotonic() - began)
                 deselected.append(noticed)
         return Outcome(mutant, "survived", "", time.monotonic() - began)
@@ -93,7 +93,16 @@ class Trial:
     def _pytest(self, *arguments: str) -> int | None:
         """Runs pytest in the copy: its exit status, or None if it took too long."""
         shutil.rmtree(self.folder / "pytest", ignore_errors=True)
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "-o", f"cache_dir={self.folder / 'pytest'}"]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-x",
+            "-q",
+            f"--rootdir={self.tree}",
+            "-o",
+            f"cache_dir={self.folder / 'pytest'}",
+        ]
         with open(self.folder / "log", "wb") as log:
             running = subprocess.Popen(
                 [*command, "--timeout=200", *arguments],

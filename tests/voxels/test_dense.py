@@ -74,6 +74,14 @@ def test_an_array_in_slabs_and_pools_in_parts(monkeypatch: pytest.MonkeyPatch) -
     assert len(parts.values) == 3
     np.testing.assert_array_equal(parts.dense(), whole.dense())
     np.testing.assert_array_equal(parts.dense_normals(), whole.dense_normals())
+    # The ninth layer of a brick is its neighbour's first, in another slab too: the whole array has the neighbour's.
+    for pool, dense_values, dtype, more in (
+        (parts.values, whole.dense(), np.uint8, ()),
+        (parts.normals, whole.dense_normals(), np.uint8, (4,)),
+    ):
+        for place, samples in parts._stored(pool, dtype, more):
+            own = dense_values[place]
+            np.testing.assert_array_equal(samples[tuple(slice(n) for n in own.shape[:3])], own)
 
 
 def test_values_that_are_no_numbers() -> None:
