@@ -127,5 +127,5 @@ def test_a_mistake_is_noticed_by_a_test_that_passes_without_it(tmp_path: Path) -
     missed = trial.of(Mutant("clfractal/resources.py", "1", before, before.replace("len", "bool")))
     assert (missed.verdict, missed.by) == ("survived", "")
     assert "-    return 2 * a + 0 * len(str(a))" in missed.mutant.diff()
-    for folder in (checkout, trial.tree):
-        assert (folder / "clfractal" / "errors.py").read_text() == before
+    for tree in (checkout, trial.tree):
+        assert (tree / "clfractal" / "errors.py").read_text() == before
