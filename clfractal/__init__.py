@@ -73,12 +73,14 @@ _HOMES = {
 __all__ = ["__version__", *_HOMES]
 
 
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        found = getattr(import_module(_HOMES[name]), name)
-        globals()[name] = found  # the next time it is an attribute as any other
-        return found
-    raise AttributeError(f"module 'clfractal' has no attribute {name!r}")
+if not TYPE_CHECKING:  # for a type checker every name would exist
+
+    def __getattr__(name: str) -> Any:
+        if name in _HOMES:
+            found = getattr(import_module(_HOMES[name]), name)
+            globals()[name] = found  # the next time it is an attribute as any other
+            return found
+        raise AttributeError(f"module 'clfractal' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

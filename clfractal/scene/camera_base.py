@@ -99,7 +99,7 @@ class CameraBase(Section):
             aspect: width of the picture divided by its height.
 
         Raises:
-            pydantic.ValidationError: `shift` leads out of the range of coordinates.
+            SceneError: `shift` leads out of the range of coordinates.
         """
         fov = getattr(self, "fov", None)
         axis = axes(self.position, self.target, self.up)[0]

@@ -1,0 +1,231 @@
+"""What Python programs pass is checked as the shell's options are: our own errors, one line, that name the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.pictures.film import Film
+from tests.shell import SCENE
+
+POINTS = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]]
+BULB = {"name": "mandelbulb"}
+
+RENDER: list[tuple[dict[str, Any], str]] = [
+    ({"samples": 2.7}, "samples: must be a whole number, got 2.7"),
+    ({"samples": True}, "samples: must be a whole number, got true"),
+    ({"samples": "3"}, "samples: must be a whole number, got '3'"),
+    ({"samples": np.int64(0)}, "samples: must be from 1 to 65536, got 0"),
+    ({"samples": np.float32(2.0)}, "samples: must be a whole number, got 2.0"),
+    ({"region": (0, 0, 8)}, "region: must be 4 whole numbers, x, y, width, height in pixels; got (0, 0, 8)"),
+    ({"region": (0, 0, 8, 8.5)}, "region: must be 4 whole numbers, "),
+    ({"region": 7}, "region: must be 4 whole numbers, "),
+    ({"region": (0, 0, 41, 1)}, "region: must lie inside the picture of 40 x 36 pixels, got 0,0,41,1"),
+    ({"precision": 64}, "precision: must be auto, float32 or float64, got 64"),
+    (
+        {"precision": "flot32"},
+        "precision: must be auto, float32 or float64, got 'flot32'; did you mean 'float32'?",
+    ),
+    ({"channels": "RGB"}, "channels: must be a list of texts, got 'RGB'"),
+    ({"channels": ["R", 3]}, "channels: must be a list of texts, got 3"),
+    ({"channels": ["R", "Q"]}, "channels: unknown channel 'Q'"),
+    ({"channels": []}, "channels: a picture needs at least one channel"),
+    ({"device": 3}, "device: must be text such as cpu, gpu, 0:0 or part of a name, got 3"),
+    ({"progress": 3}, "progress: must be a function, got 3"),
+]
+
+
+def refused(
+    call: Callable[[], object], message: str, kind: type[Exception] = clfractal.ClfractalError
+) -> None:
+    with pytest.raises(kind) as caught:
+        call()
+    text = str(caught.value)
+    assert text.startswith(message), text
+    assert "\n" not in text
+    assert isinstance(caught.value, clfractal.ClfractalError)
+    assert caught.value.status == 2
+
+
+@pytest.mark.parametrize(("settings", "message"), RENDER, ids=[message for _, message in RENDER])
+def test_wrong_arguments_of_a_render(settings: dict[str, Any], message: str) -> None:
+    refused(lambda: clfractal.render(SCENE, **settings), message)
+
+
+def test_wrong_arguments_of_an_engine() -> None:
+    refused(lambda: clfractal.Engine(3), "device: must be text")  # type: ignore[arg-type]
+    refused(lambda: clfractal.Engine(budget_seconds=0), "budget_seconds: must be at least 0.0001, got 0")
+    refused(lambda: clfractal.Engine(tell="yes"), "tell: must be a function")  # type: ignore[arg-type]
+    with clfractal.Engine() as engine:
+        wrong: Any = "stop"
+        refused(lambda: engine.render(SCENE, token=wrong), "token: must be a CancelToken, got 'stop'")
+        refused(lambda: engine.refine(SCENE, token=wrong), "token: must be a CancelToken")
+        refused(lambda: next(engine.refine(SCENE, samples=wrong)), "samples: must be a whole number")
+        assert engine.render(SCENE, samples=np.int64(1))["R"].shape == (36, 40)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"bits": 7}, "bits: must be 8 or 16, got 7"),
+        ({"bits": 8.0}, "bits: must be a whole number, got 8.0"),
+        ({"exposure": float("nan")}, "exposure: must be a finite number, got nan"),
+        ({"exposure": 1e6}, "exposure: must be at most 100, got 1000000.0"),
+        ({"exposure": "bright"}, "exposure: must be a number, got 'bright'"),
+        ({"transparent": "no"}, "transparent: must be true or false, got 'no'"),
+        ({"half": "R"}, "half: must be a list of texts, got 'R'"),
+        ({"half": ["Q"]}, "half: unknown channel 'Q'"),
+    ],
+)
+def test_a_film_is_saved_as_asked_or_not_at_all(
+    settings: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    film = Film(("R", "G", "B", "A"), (4, 4))
+    refused(lambda: film.save(tmp_path / "a.png", **settings), message)
+    assert list(tmp_path.iterdir()) == []
+    refused(lambda: film.save(3), "path: must be a path, got 3")  # type: ignore[arg-type]
+    refused(lambda: film.to_rgb8(exposure=float("inf")), "exposure: must be a finite number, got inf")
+
+
+def test_numbers_of_numpy_are_numbers(tmp_path: Path) -> None:
+    film = clfractal.render(SCENE, samples=np.int64(2), region=np.array([4, 4, 8, 8]))  # type: ignore[arg-type]
+    assert clfractal.load_scene(film.header["scene"]).renderer.samples == 2
+    assert film["R"].shape == (8, 8)
+    film.save(tmp_path / "a.png", bits=np.int16(16), exposure=np.float32(0.5), transparent=np.bool_(False))
+    assert (tmp_path / "a.png").read_bytes()[24] == 16
+    assert film.to_rgb8(exposure=np.float64(1)).shape == (8, 8, 3)
+    counts, _ = clfractal.escape(
+        {"name": "mandelbulb", "parameters": {"power": np.int32(2)}},
+        np.array(POINTS, np.float32),
+        iterations=np.uint8(12),  # type: ignore[arg-type]
+        bailout=np.float32(2),  # type: ignore[arg-type]
+    )
+    assert counts.tolist() == [12, 1]
+
+
+def test_numbers_of_numpy_in_scenes() -> None:
+    plain: dict[str, Any] = {
+        "version": 1,
+        "formula": {"name": "mandelbulb", "iterations": 9, "parameters": {"power": 6}},
+        "image": {"width": 32, "height": 24},
+        "camera": {"position": [0.5, -3.0, 0.25], "fov": 30.0},
+        "lights": [{"direction": [1.0, 1.0, -1.0], "shadow": False}],
+    }
+    numpy: dict[str, Any] = {
+        "version": np.int8(1),
+        "formula": {
+            "name": np.str_("mandelbulb"),
+            "iterations": np.int64(9),
+            "parameters": {"power": np.uint16(6)},
+        },
+        "image": {"width": np.int32(32), "height": np.array(24)},
+        "camera": {"position": np.array([0.5, -3, 0.25], np.float32), "fov": np.float32(30)},
+        "lights": [{"direction": (np.float32(1), np.int64(1), np.float64(-1)), "shadow": np.bool_(False)}],
+    }
+    scene = clfractal.load_scene(plain)
+    assert clfractal.load_scene(numpy) == scene
+    assert clfractal.load_scene(clfractal.load_scene(numpy).resolved()) == scene
+    camera = scene.camera.model_copy(update={"position": np.array([1, 2, 3]), "fov": np.float32(40)})
+    assert camera.position == (1, 2, 3)
+    assert isinstance(camera.position[0], float)
+    wider = scene.model_copy(update={"image": {"width": np.int64(64), "height": np.int64(48)}})
+    assert (wider.image.width, type(wider.image.width)) == (64, int)
+    assert (
+        scene.model_copy(update={"bookmarks": {"a": {"position": np.zeros(3) + 2}}})
+        .bookmarks["a"]
+        .position[0]
+        == 2
+    )
+
+
+@pytest.mark.parametrize(
+    ("update", "message"),
+    [
+        ({"camera": {"fov": 400}}, "camera.fov: must be below 180, got 400"),
+        ({"camera": {"fob": 40}}, "camera: unknown key 'fob'; did you mean 'fov'?"),
+        ({"image": {"width": 2.5}}, "image.width: must be a whole number, got 2.5"),
+        ({"kamera": {}}, "unknown key 'kamera'; did you mean 'camera'?"),
+        ({"lights": [{"direction": [0, 0]}]}, "lights.0.direction: must be a list of 3 numbers"),
+    ],
+)
+def test_a_copy_of_a_scene_is_checked(update: Mapping[str, Any], message: str) -> None:
+    scene = clfractal.load_scene(SCENE)
+    refused(lambda: scene.model_copy(update=update), message, clfractal.SceneError)
+
+
+def test_a_copy_of_a_section_is_checked() -> None:
+    scene = clfractal.load_scene(SCENE)
+    refused(lambda: scene.camera.model_copy(update={"fov": 400}), "fov: must be below 180, got 400")
+    refused(lambda: scene.image.model_copy(update={"width": 0}), "width: must be at least 1, got 0")
+    plane = clfractal.load_scene(SCENE + "renderer: {type: cut_plane}\n").renderer
+    from clfractal.scene.cut_plane import CutPlaneRenderer
+    from clfractal.scene.plane import moved
+
+    assert isinstance(plane, CutPlaneRenderer)
+    refused(lambda: moved(plane.plane, normal=1e9), "center", clfractal.SceneError)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"formula": 5}, "formula: must be a name of the library, a path or a mapping, got 5"),
+        ({"formula": None}, "formula: must be a name of the library, a path or a mapping, got nothing"),
+        ({"parameters": [8]}, "parameters: must be a mapping, got a list of 1"),
+        ({"bailout": 0}, "bailout: must be above 0, got 0"),
+        ({"bailout": float("nan")}, "bailout: must be a finite number, got nan"),
+        ({"bailout": "far"}, "bailout: must be a number, got 'far'"),
+        ({"bailout": 1e12}, "bailout: must be at most 1e+09, got 1000000000000.0"),
+        ({"iterations": -1}, "iterations: must be from 0 to 2000000000, got -1"),
+        ({"iterations": 2**32}, "iterations: must be from 0 to 2000000000, got 4294967296"),
+        ({"iterations": True}, "iterations: must be a whole number, got true"),
+        ({"precision": "auto"}, "precision: must be float32 or float64, got 'auto'"),
+        ({"points": [[0, 0, float("inf")]]}, "points: must be finite"),
+        ({"points": [["a", "b", "c"]]}, "points: must be numbers of shape (n, 3)"),
+        ({"points": [[0, 0], [1]]}, "points: must be numbers of shape (n, 3)"),
+        ({"points": None}, "points: must be numbers of shape (n, 3)"),
+        ({"device": 3}, "device: must be text"),
+    ],
+)
+def test_wrong_questions_about_points(settings: dict[str, Any], message: str) -> None:
+    asked = {"formula": "mandelbulb", "points": POINTS, "iterations": 5, **settings}
+    refused(lambda: clfractal.escape(**asked), message)
+    if "bailout" not in settings and settings.get("iterations") not in (-1, 2**32):
+        refused(lambda: clfractal.distances(**asked), message)
+
+
+def test_other_functions_name_their_arguments() -> None:
+    wrong: Any = 5
+    scene = clfractal.load_scene(SCENE)
+    refused(lambda: clfractal.load_scene(wrong), "scene: must be a path, YAML text or a mapping, got 5")
+    refused(
+        lambda: clfractal.load_scene(SCENE, overrides="camera.fov=3"), "overrides: must be a list of texts"
+    )
+    refused(lambda: clfractal.load_scene(SCENE, folder=wrong), "folder: must be a path, got 5")
+    refused(lambda: clfractal.render(wrong), "scene: must be a path")
+    refused(lambda: clfractal.dump_scene(wrong), "scene: must be a Scene, got 5")
+    refused(lambda: clfractal.variations(wrong), "scene: must be a Scene")
+    refused(lambda: clfractal.variations(scene, count=2.5), "count: must be a whole number")  # type: ignore[arg-type]
+    refused(lambda: clfractal.variations(scene, seed=wrong / 2), "seed: must be a whole number, got 2.5")
+    refused(
+        lambda: clfractal.variations(scene, strength=wrong),
+        "strength: must be slight, medium or heavy, got 5",
+    )
+    refused(lambda: clfractal.variations(scene, kinds=["colour"]), "kinds: unknown kind 'colour'")  # type: ignore[list-item]
+    refused(lambda: clfractal.variations(scene, locked="camera"), "locked: must be a list of texts")
+    refused(lambda: clfractal.voxelize(wrong), "scene: must be a path")
+    refused(lambda: clfractal.voxelize(scene, resolution=2.5), "resolution: must be")  # type: ignore[arg-type]
+    refused(
+        lambda: clfractal.voxelize(scene, precision=wrong),
+        "precision: must be auto, float32 or float64, got 5",
+    )
+    refused(lambda: clfractal.mesh(scene, level=float("nan")), "level: must be a finite number")
+    refused(lambda: clfractal.mesh(scene, close=wrong), "close: must be true or false, got 5")
+    refused(
+        lambda: clfractal.distances("mandelbulb", POINTS, iterations=0),
+        "iterations: must be from 1 to 1000000",
+    )
