@@ -8,11 +8,14 @@ import pty
 import subprocess
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 import clfractal
+from clfractal.commands.app import app
 from clfractal.commands.progress import Reporter
 from clfractal.commands.shell import Shell
 from clfractal.files.exr import read_exr
@@ -72,6 +75,19 @@ def test_what_a_picture_tells_of_itself(here: Path, shell: InProcess) -> None:
     np.testing.assert_allclose(np.array([0, 0, 1, 1]) @ to_camera, [0, 1, 3, 1], atol=1e-6)
     projected = np.array([0, 0, 0, 1]) @ to_ndc
     np.testing.assert_allclose(projected[:2] / projected[3], [0.5, 0.5], atol=1e-6)
+
+
+def test_no_switch_is_on_unless_it_is_given() -> None:
+    """Of every command: nobody asked for details, for silence or for another way."""
+    group: Any = typer.main.get_command(app)
+    switches = {
+        f"{name} {parameter.opts[0]}": parameter.default
+        for name, each in group.commands.items()
+        for parameter in each.params
+        if getattr(parameter, "is_flag", False) and not parameter.secondary_opts  # --panels has --no-panels
+    }
+    assert {"render --quiet", "vary --verbose", "check --parallax", "mesh --no-close"} <= switches.keys()
+    assert {name: default for name, default in switches.items() if default is not False} == {}
 
 
 def test_a_picture_is_a_scene(here: Path, shell: InProcess) -> None:

@@ -36,7 +36,7 @@ kernels/pixel.h: render/surface_samples render/passes render/surface_light
 kernels/points.cl: render/points formulas/counts
 kernels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
 kernels/gather.h: render/volume_rays render/volume_surface
-kernels/volume*: render/volume_rays render/volume_surface render/volume_bits
+kernels/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/volume_bits
 kernels/voxels*: voxels/ render/volume_surface
 kernels/tiles.h: render/tiles_bits render/surface_samples
 kernels/*: numbers/ render/surface_analytic render/surface_light

@@ -19,6 +19,7 @@ from clfractal.device.select import Device
 from clfractal.files.environment import read_environment
 from clfractal.files.exr import write_exr
 from clfractal.pictures.film import Film
+from clfractal.renderers.records import HemisphereRays, hemisphere_rays, march_record
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import (
@@ -209,6 +210,26 @@ def test_what_is_mirrored_and_seen_is_the_environment(
     assert (np.abs(colors(film) - expected) <= 0.01 + 0.1 * expected).all()
     points = points_of(film)[hit]
     np.testing.assert_allclose(normal[hit], points / np.linalg.norm(points, axis=-1)[:, None], atol=1e-4)
+
+
+def test_rays_of_the_hemisphere(tmp_path: Path) -> None:
+    """Half of the environment's rays follow its brightness, of an odd number the smaller half; without an environment rays
+    end where nothing counts any more."""
+    for light_rays, occlusion, cosine, by_map in (
+        (1, None, 1, 0),
+        (5, None, 3, 2),
+        (8, {"rays": 2}, 4, 4),
+        (2, {"rays": 7}, 7, 1),
+        (None, {"rays": 3, "distance": 0.5}, 3, 0),
+    ):
+        environment = None if light_rays is None else {"name": "dusk", "rays": light_rays}
+        scene = scene_of(
+            BALL, PERSPECTIVE, environment=environment, renderer={"ambient_occlusion": occlusion}
+        )
+        assert hemisphere_rays(scene) == HemisphereRays(cosine, by_map, light_rays is not None)
+        march = march_record(scene, "float32")
+        assert march["ambient_far"] > 1e30 if light_rays is not None else march["ambient_far"] == 0.5
+        assert march["occlusion_share"] == pytest.approx(0 if occlusion is None else 1 / cosine)
 
 
 @pytest.mark.parametrize("reflection", [0.0, 0.4])
