@@ -1,0 +1,88 @@
+"""The dock's buttons have room: none is narrower than its text, lies over another one, or leaves the dock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import pytest
+
+pytest.importorskip("imgui_bundle")
+
+from imgui_bundle import imgui
+
+from clfractal import resources
+from clfractal.viewer.panels import scene_dock
+from clfractal.viewer.panels import widgets as w
+from tests.viewer.panel_harness import Stage, headless, make_ui
+
+# A surface, a volume for two eyes, planes that cut, a cut plane alone, a chain.
+SCENES = ("mandelbulb", "stereo_volume", "cut_geode", "cut_mandelbrot", "mengerbulb")
+
+
+@pytest.fixture(autouse=True)
+def _context() -> Iterator[None]:
+    with headless():
+        yield
+
+
+@dataclass(frozen=True)
+class Button:
+    """A button's text, the corners of its rectangle in points, the width of its text, and the window that it is in."""
+
+    text: str
+    left: float
+    top: float
+    right: float
+    bottom: float
+    needed: float
+    end: float
+
+    def overlaps(self, other: Button) -> bool:
+        across = min(self.right, other.right) - max(self.left, other.left)
+        return across > 0.5 and min(self.bottom, other.bottom) - max(self.top, other.top) > 0.5
+
+
+def buttons_of(scene: str, monkeypatch: pytest.MonkeyPatch) -> list[Button]:
+    """All of the dock's buttons, with every panel open."""
+    ui, _ = make_ui(resources.folder("scenes") / f"{scene}.yaml")
+    ui.size = (1280, 4000)
+    ui.memory["open"] = dict.fromkeys(scene_dock.KEYS, True)
+    found: list[Button] = []
+
+    def noted(plain: Any, is_icon: bool) -> Any:
+        def button(text: str, *arguments: Any, **options: Any) -> bool:
+            end = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+            clicked: bool = plain(text, *arguments, **options)
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            icon = options.get("icon", "")
+            shown = text.partition("##")[0]
+            shown = f"{icon}  {shown}" if icon and shown else icon or shown
+            needed = imgui.calc_text_size(shown).x
+            name = str(arguments[0]) if is_icon and arguments else text
+            found.append(Button(name, low.x, low.y, high.x, high.y, needed, end))
+            return clicked
+
+        return button
+
+    monkeypatch.setattr(w, "button", noted(w.button, False))
+    monkeypatch.setattr(w, "icon_button", noted(w.icon_button, True))
+    stage = Stage(ui, scene_dock.draw, window=False)
+    found.clear()
+    stage.frame()
+    return found
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_buttons_have_room(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = buttons_of(scene, monkeypatch)
+    assert len(found) > 15
+    assert {
+        each.text: each.right - each.left - each.needed
+        for each in found
+        if each.right - each.left < each.needed
+    } == {}
+    assert [each.text for each in found if each.right > each.end + 0.5] == []
+    assert [(a.text, b.text) for a, b in combinations(found, 2) if a.overlaps(b)] == []
