@@ -86,3 +86,20 @@ def test_buttons_have_room(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
     } == {}
     assert [each.text for each in found if each.right > each.end + 0.5] == []
     assert [(a.text, b.text) for a, b in combinations(found, 2) if a.overlaps(b)] == []
+
+
+def test_tips_of_the_steps_of_a_plane(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lengths are told in the plane's height; angles and factors are no lengths."""
+    tips: dict[str, str] = {}
+    plain = w.row
+
+    def row(ui: Any, label: str, **options: Any) -> Any:
+        tips[options.get("path", "")] = options.get("tip", "")
+        return plain(ui, label, **options)
+
+    monkeypatch.setattr(w, "row", row)
+    buttons_of("cut_geode", monkeypatch)
+    amounts = {path: tip for path, tip in tips.items() if tip.startswith("by how much")}
+    assert len(amounts) > 1
+    for path, tip in amounts.items():
+        assert tip.endswith("of the plane's height") == (path == "step.move"), path
