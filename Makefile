@@ -61,6 +61,8 @@ lint: $(LINT)/.installed
 	$(LINT)/bin/ruff check .
 	$(LINT)/bin/ruff format --check .
 	$(LINT)/bin/mypy --strict
+	$(LINT)/bin/mypy --strict --platform win32 clfractal
+	$(LINT)/bin/mypy --strict --platform darwin clfractal
 	$(LINT)/bin/lint-imports
 
 # The pictures and files are made in a folder outside the checkout, so that the installed program is what runs.

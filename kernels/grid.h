@@ -95,7 +95,7 @@ INLINE vec pool_normal(__global const uchar *normals, cell c, ints at) {
     vec sum = vec_of(R(0.0), R(0.0), R(0.0));
     real all = R(0.0);
     #pragma unroll
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < TURNS(8); ++i) {
         const real across = (i & 1) ? c.u : R(1.0) - c.u, up = (i & 2) ? c.v : R(1.0) - c.v, deep = (i & 4) ? c.w : R(1.0) - c.w;
         const int further = (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
         const ints found = gather_ints((__global const int *)normals, at + further);
@@ -114,7 +114,7 @@ INLINE real grid_value(cell c, ints slots, mask active, grid g) {
     return pool_value(g.values[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner);
 #else
     real value = R(0.0);
-    for (int pool = 0; pool < POOLS; ++pool) {
+    for (int pool = 0; pool < TURNS(POOLS); ++pool) {
         const ints place = slots - pool * g.about->pool_bricks;
         const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
         if (!any_lane(here)) continue;
@@ -131,7 +131,7 @@ INLINE vec grid_normal(cell c, ints slots, mask active, grid g) {
     return vec_normalize(pool_normal(g.normals[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner));
 #else
     vec normal = vec_of(R(0.0), R(0.0), R(0.0));
-    for (int pool = 0; pool < POOLS; ++pool) {
+    for (int pool = 0; pool < TURNS(POOLS); ++pool) {
         const ints place = slots - pool * g.about->pool_bricks;
         const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
         if (!any_lane(here)) continue;

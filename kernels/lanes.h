@@ -96,6 +96,15 @@ typedef JOIN(int, LANES) mask;
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
+// The count of a loop whose body copies structs. Where a driver loses such copies when it unrolls the loop, the count is one that
+// its compiler cannot know. (COUNTS_AT_RUN_TIME is defined for such a driver: see `loses_copies_when_unrolling` in
+// clfractal/device/select.py. The number of dimensions is 1, 2 or 3.)
+#ifdef COUNTS_AT_RUN_TIME
+#define TURNS(count) ((count) + (int)(get_work_dim() >> 2))
+#else
+#define TURNS(count) (count)
+#endif
+
 // Sum of a quantity over the lanes of a packet.
 INLINE scalar lanes_sum(real value) {
     scalar each[LANES];

@@ -40,7 +40,7 @@ __kernel void march_probe(__global float *met, __constant const struct March *se
 
     mask active = equal(R(0.0), R(0.0));
     real went = R(-1.0);
-    for (int goal = GOAL_SURFACE; goal <= GOAL_SHADOW; ++goal) {
+    for (int goal = GOAL_SURFACE; goal < TURNS(GOAL_SHADOW + 1); ++goal) {
         active &= ray_clip(&r, settings->bounds_center, settings->bounds_radius);
         march m = {0};
         march_begin(&m, r, active, goal, settings);

@@ -96,7 +96,7 @@ INLINE vec corners_normal(vec a, vec b, vec c, mask *usable) {
 INLINE vec compass_plane(const vec *compass, const mask *found, mask *usable) {
     plane_sums sums = plane_none();
     #pragma unroll 1
-    for (int i = 0; i < 9; ++i) sums = plane_add(sums, found[i], compass[i]);
+    for (int i = 0; i < TURNS(9); ++i) sums = plane_add(sums, found[i], compass[i]);
     real residual;
     return plane_normal(sums, &residual, usable);
 }
@@ -122,7 +122,7 @@ INLINE vec triangle_normal(const vec *compass, const mask *found, mask *usable) 
 // is not usable where a corner is missing, none where the centre is.
 INLINE void eight_normals(const vec *compass, const mask *found, vec *normals, mask *usable) {
     const int around[9] = {0, 3, 6, 7, 8, 5, 2, 1, 0};
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < TURNS(8); ++i) {
         const int first = around[i], second = around[i + 1];
         mask spread;
         const vec normal = corners_normal(compass[4], compass[first], compass[second], &spread);
@@ -136,7 +136,7 @@ INLINE vec eight_mean(const vec *compass, const mask *found, mask *usable) {
     vec normals[8], sum = vec_of(R(0.0), R(0.0), R(0.0));
     mask each[8], some = less(R(1.0), R(0.0));
     eight_normals(compass, found, normals, each);
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < TURNS(8); ++i) {
         sum = vec_pick(each[i], vec_add(sum, normals[i]), sum);
         some |= each[i];
     }

@@ -51,7 +51,7 @@ INLINE void points_touched(pixel_points *p, crossing met, ray eye_ray, world w) 
     p->right = vec_normalize(vec_along(side, -vec_dot(side, p->toward), p->toward));
     p->up = vec_cross(p->toward, p->right);
     p->sums = plane_none();
-    for (int i = 0; i < 9; ++i) {
+    for (int i = 0; i < TURNS(9); ++i) {
         p->compass[i] = vec_of(R(0.0), R(0.0), R(0.0));
         p->compass_found[i] = met.hit & ~met.hit;
     }
@@ -136,7 +136,7 @@ INLINE mask points_spot(const pixel_points *p, ray eye_ray, spot *here, real *co
     here->residual = residual / p->touch_cone;
 #endif
 #if NORMAL == NORMAL_GRADIENT
-    for (int i = 0; i < POINTS; ++i) {
+    for (int i = 0; i < TURNS(POINTS); ++i) {
         here->normals[i] = p->normals[i];
         here->weights[i] = p->weights[i] * share;
     }
@@ -157,9 +157,9 @@ INLINE mask points_spot(const pixel_points *p, ray eye_ray, spot *here, real *co
     mask whole[8];
     eight_normals(p->compass, p->compass_found, around, whole);
     real number = R(0.0);
-    for (int i = 0; i < 8; ++i) number += pick(whole[i], R(1.0), R(0.0));
+    for (int i = 0; i < TURNS(8); ++i) number += pick(whole[i], R(1.0), R(0.0));
     const mask some = less(R(0.0), number);
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < TURNS(8); ++i) {
         here->normals[i] = vec_pick(whole[i], points_to_space(p, around[i]), here->normal);
         here->weights[i] = pick(some, pick(whole[i], R(1.0) / number, R(0.0)), R(0.125));
     }

@@ -2,7 +2,8 @@
 // loops whose lanes end at different times? Each work-item takes LANES points of a plane through the
 // Mandelbulb of power 8 (White and Nylander's rule, polynomial form) and counts applications until it escapes; the second
 // kernel calls every built-in function that the number types use, because some drivers lack a few for wide vectors; the
-// third those with several ways of evaluation, in packets whose lanes need different ones (see repairs.h).
+// third those with several ways of evaluation, in packets whose lanes need different ones (see repairs.h); the fourth iterates
+// two packets side by side, in arrays and loops of a constant count as voxels.h has them, and goes on after they escaped.
 
 __kernel void escape_counts(__global scalar *counts, int width, int limit) {
     const int first = (int)get_global_id(0) * LANES;
@@ -62,5 +63,44 @@ __kernel void mixed_lanes(__global scalar *values, __global const scalar *argume
     for (int function = 0; function < 4; ++function) {
         lanes_store(results[function], each);
         for (int lane = 0; lane < LANES; ++lane) values[function * count + first + lane] = each[lane];
+    }
+}
+
+typedef struct {
+    real x, y;
+} probe_state;
+
+INLINE probe_state probe_apply(probe_state z, probe_state c) {
+    const probe_state next = {z.x * z.x - z.y * z.y + c.x, R(2.0) * z.x * z.y + c.y};
+    return next;
+}
+
+// Whether points of the plane of the Mandelbrot set are still within |z| <= 2 after `limit` applications, a multiple of 4.
+__kernel void side_by_side(__global scalar *inside, int width, int limit) {
+    const scalar scale = S(3.0) / (scalar)width;
+    const int first = (int)get_global_id(0) * 2 * LANES;
+    probe_state c[2], z[2];
+    mask alive[2], open = equal(R(0.0), R(0.0));
+    for (int p = 0; p < TURNS(2); ++p) {
+        scalar across[LANES];
+        for (int lane = 0; lane < LANES; ++lane) across[lane] = (scalar)((first + p * LANES + lane) % width) * scale - S(2.25);
+        c[p].x = lanes_load(across);
+        c[p].y = (real)((scalar)(first / width) * scale - S(1.25));
+        z[p] = c[p];
+        alive[p] = less_equal(z[p].x * z[p].x + z[p].y * z[p].y, R(4.0));
+    }
+    for (int n = 0; n + 4 <= limit && any_lane(open); n += 4) {
+        for (int step = 0; step < TURNS(4); ++step) {
+            for (int p = 0; p < TURNS(2); ++p) {
+                z[p] = probe_apply(z[p], c[p]);
+                alive[p] &= less_equal(z[p].x * z[p].x + z[p].y * z[p].y, R(4.0));
+            }
+        }
+        open = alive[0] | alive[1];
+    }
+    for (int p = 0; p < TURNS(2); ++p) {
+        scalar each[LANES];
+        lanes_store(pick(alive[p], R(1.0), R(0.0)), each);
+        for (int lane = 0; lane < LANES; ++lane) inside[first + p * LANES + lane] = each[lane];
     }
 }

@@ -198,7 +198,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
                 here.normal = normal;
                 here.smooth = smooth;
                 here.residual = R(0.0);
-                for (int i = 0; i < NORMAL_COUNT; ++i) {
+                for (int i = 0; i < TURNS(NORMAL_COUNT); ++i) {
                     here.normals[i] = normal;
                     here.weights[i] = i == 0 ? R(1.0) : R(0.0);
                 }

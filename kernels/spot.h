@@ -51,7 +51,7 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
     const real cone = (real)(w.settings->detail) * (r.footprint + r.spread * met->t);
     const real wanted = R(0.5) * cone;
     real t = met->t, before = met->t, height_before = R(0.0);
-    for (int i = 0; i < POLISH; ++i) {
+    for (int i = 0; i < TURNS(POLISH); ++i) {
         there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, w.orbit, w.k, &surface);
         cost->count += pick(active, there.end.count, R(0.0));
         cost->steps += pick(active, R(1.0), R(0.0));
@@ -84,7 +84,7 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
 // Whether any normal of the spot faces that way. (With the mean normal only, a rough spot's other normals would have no shadow.)
 INLINE mask faces(const spot *s, vec direction) {
     mask any_normal = less(R(1.0), R(0.0));
-    for (int i = 0; i < NORMAL_COUNT; ++i) {
+    for (int i = 0; i < TURNS(NORMAL_COUNT); ++i) {
         any_normal |= less(R(0.0), s->weights[i]) & less(R(0.0), vec_dot(s->normals[i], direction));
     }
     return any_normal;
@@ -94,7 +94,7 @@ INLINE mask faces(const spot *s, vec direction) {
 INLINE color lit_by(const spot *s, incidence in, mask lit, real open, vec to_viewer, __constant const struct Light *light,
                     __constant const struct Material *material) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
-    for (int i = 0; i < NORMAL_COUNT; ++i) {
+    for (int i = 0; i < TURNS(NORMAL_COUNT); ++i) {
         const color one = phong(s->tint, s->normals[i], to_viewer, in, lit, open, light, material);
         sum = color_add(sum, color_scale(one, s->weights[i]));
     }

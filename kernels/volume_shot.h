@@ -166,7 +166,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     }
     // The crossing lies between this place and the one before.
     real low = most(number - R(1.0), R(0.0)), high = number;
-    for (int i = 0; i < HALVINGS; ++i) {
+    for (int i = 0; i < TURNS(HALVINGS); ++i) {
         if (!any_lane(found)) break;
         const real middle = R(0.5) * (low + high);
         const cell c = cell_at(place_of(g, middle), about);
@@ -198,7 +198,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     real half_number = R(-1.0);
     // Light is the costly part: places are kept until a lane has PENDING of them, and lit together.
     pending kept_places[PENDING];
-    for (int k = 0; k < PENDING; ++k) kept_places[k].number = kept_places[k].value = kept_places[k].weight = R(0.0);
+    for (int k = 0; k < TURNS(PENDING); ++k) kept_places[k].number = kept_places[k].value = kept_places[k].weight = R(0.0);
     real count = R(0.0);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->max_steps; ++i) {
@@ -217,7 +217,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
                     sight_quads(&e, t, adds, &hits, &next, w.planes);
 #endif
                     const real weight = sight_pass(&e, opacity, t, value, adds);
-                    for (int k = 0; k < PENDING; ++k) {
+                    for (int k = 0; k < TURNS(PENDING); ++k) {
                         const mask here = adds & equal(count, (real)((scalar)k));
                         kept_places[k].number = pick(here, number, kept_places[k].number);
                         kept_places[k].value = pick(here, value, kept_places[k].value);
@@ -231,7 +231,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
             number = onward;
         }
         if (any_lane(active) && !any_lane(less_equal((real)((scalar)PENDING), count))) continue;
-        for (int k = 0; k < PENDING; ++k) {
+        for (int k = 0; k < TURNS(PENDING); ++k) {
             const mask lit_here = less((real)((scalar)k), count);
             if (!any_lane(lit_here)) break;
             const real at = kept_places[k].number;

@@ -46,23 +46,23 @@ INLINE void packet_values(ulong place, int first, real *values, __global const s
                           __constant const struct Lattice *lattice, __constant const struct Orbit *orbit,
                           __constant const scalar *k) {
 #if FILL_KIND == FILL_ITERATIONS
-    for (int p = 0; p < PACKETS; ++p) {
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
         values[p] = solid_count(voxel_points(place, first + p * LANES, (int3)(0), axes, lattice), orbit, k);
     }
 #else
     const int n = FILL_KIND == FILL_COVERAGE ? lattice->sub_points : 1;
-    for (int p = 0; p < PACKETS; ++p) values[p] = R(0.0);
+    for (int p = 0; p < TURNS(PACKETS); ++p) values[p] = R(0.0);
     for (int sub = 0; sub < n * n * n; ++sub) {
         const int3 sub_point = (int3)(sub % n, sub / n % n, sub / (n * n));
         vec points[PACKETS];
         mask inside[PACKETS];
         #pragma unroll
-        for (int p = 0; p < PACKETS; ++p) points[p] = voxel_points(place, first + p * LANES, sub_point, axes, lattice);
+        for (int p = 0; p < TURNS(PACKETS); ++p) points[p] = voxel_points(place, first + p * LANES, sub_point, axes, lattice);
         solid_inside(points, inside, orbit, k);
         #pragma unroll
-        for (int p = 0; p < PACKETS; ++p) values[p] += pick(inside[p], R(1.0), R(0.0));
+        for (int p = 0; p < TURNS(PACKETS); ++p) values[p] += pick(inside[p], R(1.0), R(0.0));
     }
-    for (int p = 0; p < PACKETS; ++p) values[p] /= (real)((scalar)(n * n * n));
+    for (int p = 0; p < TURNS(PACKETS); ++p) values[p] /= (real)((scalar)(n * n * n));
 #endif
 }
 
@@ -82,10 +82,10 @@ __kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks
         vec points[PACKETS];
         mask inside[PACKETS];
         #pragma unroll
-        for (int p = 0; p < PACKETS; ++p) points[p] = voxel_points(place, item + part + p * LANES, (int3)(0), axes, lattice);
+        for (int p = 0; p < TURNS(PACKETS); ++p) points[p] = voxel_points(place, item + part + p * LANES, (int3)(0), axes, lattice);
         solid_inside(points, inside, orbit, k);
         #pragma unroll
-        for (int p = 0; p < PACKETS; ++p) bits |= lanes_bits(inside[p]) << (part + p * LANES);
+        for (int p = 0; p < TURNS(PACKETS); ++p) bits |= lanes_bits(inside[p]) << (part + p * LANES);
     }
     __global uchar *bytes = samples + (brick * BRICK_VOXELS + item) / 8;
     for (int i = 0; i < ITEM_VOXELS / 8; ++i) bytes[i] = (uchar)(bits >> (8 * i));
@@ -93,9 +93,9 @@ __kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks
     __global SAMPLE *values = samples + brick * BRICK_VOXELS + item;
     for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {
         real found[PACKETS];
-        for (int p = 0; p < PACKETS; ++p) found[p] = full ? R(1.0) : R(0.0);
+        for (int p = 0; p < TURNS(PACKETS); ++p) found[p] = full ? R(1.0) : R(0.0);
         if (!empty && !full) packet_values(place, item + part, found, axes, lattice, orbit, k);
-        for (int p = 0; p < PACKETS; ++p) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
             scalar each[LANES];
             lanes_store(found[p], each);
             for (int lane = 0; lane < LANES; ++lane) {

@@ -118,7 +118,7 @@ INLINE real bend_square(state a, state b, state middle) {
 INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
                         __constant const scalar *k) {
     state c[CORNERS + 1], z[CORNERS + 1];
-    for (int i = 0; i < CORNERS; ++i) {
+    for (int i = 0; i < TURNS(CORNERS); ++i) {
         const vec corner = vec_of(middle.x + ((i & 1) != 0 ? half_side.x : -half_side.x),
                                   middle.y + ((i & 2) != 0 ? half_side.y : -half_side.y),
                                   middle.z + ((i & 4) != 0 ? half_side.z : -half_side.z));
@@ -128,7 +128,7 @@ INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant c
     mask alive = candidates;
     for (int n = min(FIRST_COUNT, orbit->iterations);; ++n) {
         real spread = R(0.0), bend = R(0.0);
-        for (int i = 0; i < CORNERS / 2; ++i) {
+        for (int i = 0; i < TURNS(CORNERS / 2); ++i) {
             spread = fmax(spread, halved_difference_square(z[i], z[CORNERS - 1 - i]));
             bend = fmax(bend, bend_square(z[i], z[CORNERS - 1 - i], z[CORNERS]));
         }
@@ -137,7 +137,7 @@ INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant c
         alive &= less_equal(reach, (real)(orbit->bailout_square));
         alive &= less_equal(bend, (real)(BEND * BEND) * spread + R(1e-10));
         if (n >= orbit->iterations || !any_lane(alive)) break;
-        for (int i = 0; i <= CORNERS; ++i) z[i] = apply(n, z[i], c[i], k);
+        for (int i = 0; i < TURNS(CORNERS + 1); ++i) z[i] = apply(n, z[i], c[i], k);
     }
     return alive;
 }

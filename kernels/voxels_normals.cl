@@ -63,17 +63,17 @@ INLINE void find_surface(const lines *l, real side, real *place, mask *found, __
     mask before[PACKETS], here[PACKETS];
     vec points[PACKETS];
     const real step = side * R(2.0) * (real)(SEARCH) / (real)((scalar)SEARCH_STEPS);
-    for (int p = 0; p < PACKETS; ++p) {
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
         found[p] = less(R(1.0), R(0.0));
         before[p] = found[p];
         inner[p] = outer[p] = R(0.0);
     }
     // Of several places the nearest to the middle.
-    for (int i = 0; i <= SEARCH_STEPS; ++i) {
+    for (int i = 0; i < TURNS(SEARCH_STEPS + 1); ++i) {
         const real at = (real)((scalar)i) * step - side * (real)(SEARCH);
-        for (int p = 0; p < PACKETS; ++p) points[p] = vec_along(l->from[p], at, l->out[p]);
+        for (int p = 0; p < TURNS(PACKETS); ++p) points[p] = vec_along(l->from[p], at, l->out[p]);
         solid_inside(points, here, orbit, k);
-        for (int p = 0; p < PACKETS; ++p) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
             const mask crossed = before[p] & ~here[p];
             const real middle = at - R(0.5) * step;
             const mask nearer = crossed & (~found[p] | less(fabs(middle), fabs(R(0.5) * (inner[p] + outer[p]))));
@@ -83,18 +83,18 @@ INLINE void find_surface(const lines *l, real side, real *place, mask *found, __
             before[p] = here[p];
         }
     }
-    for (int i = 0; i < HALVINGS; ++i) {
-        for (int p = 0; p < PACKETS; ++p) {
+    for (int i = 0; i < TURNS(HALVINGS); ++i) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
             points[p] = vec_along(l->from[p], R(0.5) * (inner[p] + outer[p]), l->out[p]);
         }
         solid_inside(points, here, orbit, k);
-        for (int p = 0; p < PACKETS; ++p) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
             const real middle = R(0.5) * (inner[p] + outer[p]);
             inner[p] = pick(here[p], middle, inner[p]);
             outer[p] = pick(here[p], outer[p], middle);
         }
     }
-    for (int p = 0; p < PACKETS; ++p) place[p] = outer[p];
+    for (int p = 0; p < TURNS(PACKETS); ++p) place[p] = outer[p];
 }
 
 #if NORMALS == NORMALS_EXACT
@@ -103,7 +103,7 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
                             __constant const scalar *k) {
     real place[PACKETS];
     find_surface(l, side, place, usable, orbit, k);
-    for (int p = 0; p < PACKETS; ++p) {
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
         surface_point surface;
         orbit_dual_distance(vec_along(l->from[p], place[p], l->out[p]), usable[p], orbit, k, &surface);
         normal[p] = vec_normalize(surface.gradient);
@@ -118,7 +118,7 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
     vec across[PACKETS], up[PACKETS];
     plane_sums sums[PACKETS];
     lines line = *l;
-    for (int p = 0; p < PACKETS; ++p) {
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
         const vec n = l->out[p];
         const mask steep = less(fabs(n.x), R(0.6));
         const vec aside = vec_pick(steep, vec_of(R(1.0), R(0.0), R(0.0)), vec_of(R(0.0), R(1.0), R(0.0)));
@@ -127,16 +127,16 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
         sums[p] = plane_none();
     }
     #pragma unroll 1
-    for (int i = 0; i < LINES; ++i) {
+    for (int i = 0; i < TURNS(LINES); ++i) {
         const real x = side * (real)(LINE_STEP) * (real)((scalar)(i % 3 - 1));
         const real y = side * (real)(LINE_STEP) * (real)((scalar)(i / 3 - 1));
         real place[PACKETS];
         mask found[PACKETS];
-        for (int p = 0; p < PACKETS; ++p) line.from[p] = vec_along(vec_along(l->from[p], x, across[p]), y, up[p]);
+        for (int p = 0; p < TURNS(PACKETS); ++p) line.from[p] = vec_along(vec_along(l->from[p], x, across[p]), y, up[p]);
         find_surface(&line, side, place, found, orbit, k);
-        for (int p = 0; p < PACKETS; ++p) sums[p] = plane_add(sums[p], found[p], vec_of(x, y, place[p]));
+        for (int p = 0; p < TURNS(PACKETS); ++p) sums[p] = plane_add(sums[p], found[p], vec_of(x, y, place[p]));
     }
-    for (int p = 0; p < PACKETS; ++p) {
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
         real residual;
         const vec plane = plane_normal(sums[p], &residual, &usable[p]);
         normal[p] = vec_along(vec_along(vec_scale(l->out[p], plane.z), plane.x, across[p]), plane.y, up[p]);
@@ -160,7 +160,7 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
     const int wanted = surface_samples(normal, list);
     for (int start_at = 0; start_at < wanted; start_at += LANES * PACKETS) {
         lines l;
-        for (int p = 0; p < PACKETS; ++p) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
             scalar x[LANES], y[LANES], z[LANES], nx[LANES], ny[LANES], nz[LANES];
             for (int lane = 0; lane < LANES; ++lane) {
                 // The last lanes repeat the last sample.
@@ -182,7 +182,7 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
         vec found[PACKETS];
         mask usable[PACKETS];
         surface_normals(&l, side, found, usable, orbit, k);
-        for (int p = 0; p < PACKETS; ++p) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
             scalar nx[LANES], ny[LANES], nz[LANES], good[LANES];
             lanes_store(found[p].x, nx);
             lanes_store(found[p].y, ny);

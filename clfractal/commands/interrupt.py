@@ -13,6 +13,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
 
 GRACE_SECONDS = 0.35
@@ -36,7 +37,9 @@ def watch(last_words: Callable[[], None], status: int) -> None:
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         return
     reading, writing = os.pipe()
-    os.set_blocking(writing, False)
+    if hasattr(os, "set_blocking"):  # not on Windows before Python 3.12, which does not ask for it either
+        with suppress(OSError):
+            os.set_blocking(writing, False)
     signal.signal(signal.SIGINT, _raise_once)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     _thread.start_new_thread(_end_by_force, (reading, last_words, status))

@@ -21,6 +21,7 @@ from clfractal.errors import (
     FileError,
     Where,
 )
+from clfractal.files.system import read_at
 
 _NOISE_SHOWN = 20_000  # bytes
 
@@ -58,9 +59,7 @@ class Shell:
             return
         with suppress(OSError, ValueError):
             own = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1)
-            self._noise = (
-                os.memfd_create("driver") if hasattr(os, "memfd_create") else os.open(os.devnull, os.O_RDWR)
-            )
+            self._noise = _noise_file()
             os.dup2(self._noise, 2)
             self._errors = own
 
@@ -137,13 +136,24 @@ class Shell:
             return ""
         with suppress(OSError):
             size = os.fstat(self._noise).st_size
-            return os.pread(self._noise, _NOISE_SHOWN, max(0, size - _NOISE_SHOWN)).decode("utf-8", "replace")
+            tail = read_at(self._noise, _NOISE_SHOWN, max(0, size - _NOISE_SHOWN))
+            return tail.decode("utf-8", "replace")
         return ""
 
     def _write(self, line: str) -> None:
         with suppress(OSError, ValueError):  # closed by whoever started us
             self._errors.write(line + "\n")
             self._errors.flush()
+
+
+def _noise_file() -> int:
+    """A file without a name that goes with the process."""
+    if hasattr(os, "memfd_create"):
+        return int(os.memfd_create("driver"))
+    import tempfile
+
+    with tempfile.TemporaryFile() as file:
+        return os.dup(file.fileno())
 
 
 def _system_line(error: OSError) -> str:

@@ -7,7 +7,6 @@ done again. So no function here raises an error because of the disk.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import json
 import os
@@ -18,6 +17,7 @@ from typing import Any
 
 from clfractal.device.cache_folder import ENVIRONMENT_VARIABLE as ENVIRONMENT_VARIABLE
 from clfractal.device.cache_folder import folder as folder
+from clfractal.files import system
 
 # A binary is some 100 KB; the oldest go first.
 MAXIMUM_BLOBS = 400
@@ -94,7 +94,7 @@ def _replace(path: Path, content: bytes) -> None:
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        os.replace(temporary, path)
+        system.replace(Path(temporary), path)
     except BaseException:
         with contextlib.suppress(OSError):
             os.unlink(temporary)
@@ -116,5 +116,5 @@ def _locked(section: str) -> Iterator[None]:
     root = folder()
     root.mkdir(parents=True, exist_ok=True)
     with open(root / f".{section}.lock", "w", encoding="utf-8") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        system.lock(lock.fileno(), wait=True)
         yield

@@ -1,11 +1,11 @@
-"""The child process that talks to drivers which may abort: `python -m clfractal.device.child DESCRIPTOR`.
+"""The child process that talks to drivers which may abort: `python -m clfractal.device.child PARENT`.
 
-It takes one job after the other, because starting a driver takes longer than many compilations. A line on standard input
-names a folder that holds `request.json`; the answer goes into `answer.json` there, and a line into the pipe DESCRIPTOR. A
+It takes one job after the other, as starting a driver takes longer than many compilations. A line on standard input
+names a folder that holds `request.json`; the answer goes into `answer.json` there, and a line to its first output. A
 job is a function of one argument, the request, that returns JSON data; it may leave files there. Nothing is printed:
 what appears on the standard streams comes from the driver, and goes into the folder's `driver.log`.
 
-It ends when there is no request for some seconds, when its parent ends, and after a failed job.
+It ends when there is no request for some seconds, when its parent ends or closes standard input, and after a failed job.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import ctypes
 import importlib
 import json
 import os
-import resource
-import select
+import queue
 import signal
 import sys
+import threading
 import traceback
 from pathlib import Path
 from typing import Any
@@ -41,25 +41,36 @@ _LONGEST_LINE = 4096
 
 def main() -> None:
     """Do what the requests ask and leave at once, without a driver's clean-up, which may hang or crash."""
-    done = int(sys.argv[1])
-    _die_with(int(sys.argv[2]))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # Drivers write to the descriptors 1 and 2 as they like.
+    done = os.dup(1)
+    _die_with(int(sys.argv[1]))
+    _leave_no_core()
+    folders: queue.SimpleQueue[Path] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(folders,), daemon=True).start()
     for _ in range(MOST_JOBS):
-        folder = _next_folder()
-        if folder is None:
+        try:
+            folder = folders.get(timeout=IDLE_S)
+        except queue.Empty:
             break
         _work(folder)
         os.write(done, DONE)
     os._exit(0)
 
 
-def _next_folder() -> Path | None:
-    """The folder of the next request; None if there is none for some time, or the parent has ended."""
-    if not select.select([0], [], [], IDLE_S)[0]:
-        return None
+def _listen(folders: queue.SimpleQueue[Path]) -> None:
+    """Takes requests as they come; when the parent has ended, or closed the pipe, nobody waits for an answer either."""
     # The parent writes a line at once, and no other before it is answered.
-    line = os.read(0, _LONGEST_LINE)
-    return Path(os.fsdecode(line.rstrip(b"\n"))) if line else None
+    while line := os.read(0, _LONGEST_LINE):
+        folders.put(Path(os.fsdecode(line.rstrip(b"\r\n"))))
+    os._exit(0)
+
+
+def _leave_no_core() -> None:
+    """A driver that aborts leaves no file of the process's memory."""
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def _work(folder: Path) -> None:
@@ -86,11 +97,11 @@ def _work(folder: Path) -> None:
 
 
 def _die_with(parent: int) -> None:
-    """Ask the kernel to kill this process when its parent ends, however that happens (Linux)."""
-    if sys.platform.startswith("linux"):
+    """Ask the kernel to kill this process when its parent ends, however that happens (elsewhere `_listen` sees it)."""
+    if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
-    if os.getppid() != parent:  # the parent ended before the call above
-        os._exit(1)
+        if os.getppid() != parent:  # the parent ended before the call above
+            os._exit(1)
 
 
 def _play_broken_driver(request: str) -> None:

@@ -10,7 +10,6 @@ import atexit
 import contextlib
 import os
 import queue
-import select
 import signal
 import subprocess
 import sys
@@ -24,6 +23,8 @@ from clfractal.errors import DeviceError, Stopped
 
 POLL_S = 0.01
 """Seconds between checks whether a waiting caller should stop."""
+_KILLED = -getattr(signal, "SIGKILL", 9)
+_PATIENCE_S = 0.1  # of a wait that Ctrl-C does not end on Windows
 _SWEEP_S = 1.0  # how often children that have ended by themselves are looked for
 
 
@@ -37,26 +38,35 @@ class Child:
     def __init__(self, environment: Mapping[str, str]) -> None:
         self.environment = dict(environment)
         self.jobs = 0
-        reading, writing = os.pipe()
-        try:
-            self.process = subprocess.Popen(
-                # -P: nothing is imported from the current folder.
-                [sys.executable, "-P", "-m", "clfractal.device.child", str(writing), str(os.getpid())],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                env=self.environment,
-                pass_fds=[writing],
-                # Ctrl-C at the terminal must reach only this process, which then decides about its children.
-                start_new_session=True,
-                bufsize=0,
-            )
-        except BaseException:
-            os.close(reading)
-            raise
-        finally:
-            os.close(writing)
-        self.answers = reading
+        self.process: subprocess.Popen[bytes] = subprocess.Popen(
+            # -P: nothing is imported from the current folder.
+            [sys.executable, "-P", "-m", "clfractal.device.child", str(os.getpid())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=self.environment,
+            bufsize=0,
+            # Ctrl-C at the terminal must reach only this process, which then decides about its children. On Windows that is
+            # a group, and without the other flag each child would open a console.
+            start_new_session=True,
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+            | getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        # A thread waits for answers, because Windows has no way to wait for a pipe and a time together.
+        self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, name="clfractal-answers", daemon=True).start()
+
+    def _listen(self) -> None:
+        """Passes on what the child writes; nothing, once, when it has ended."""
+        assert self.process.stdout is not None
+        while True:
+            try:
+                answer = self.process.stdout.read(len(DONE))
+            except (OSError, ValueError):  # the pipe was closed here
+                answer = b""
+            self._answers.put(answer)
+            if not answer:
+                return
 
     def ask(self, folder: Path, timeout_s: float, stopped: Callable[[], bool] | None) -> int | None:
         """Send the job in `folder` and wait until it is done.
@@ -77,14 +87,15 @@ class Child:
                 return None
             if stopped is not None and stopped():
                 raise Stopped
-            if select.select([self.answers], [], [], left if stopped is None else min(left, POLL_S))[0]:
+            with contextlib.suppress(queue.Empty):
+                answer = self._answers.get(timeout=min(left, _PATIENCE_S if stopped is None else POLL_S))
                 break
-        if os.read(self.answers, len(DONE)):
+        if answer:
             return 0
         status = self.process.wait()
         # It had just waited long enough (0), or somebody ended it (SIGKILL): no driver does either. A new child that
         # ends before its first job is a fault, and the next one would do the same.
-        if self.jobs > 1 and (not sent or status in (0, -signal.SIGKILL)):
+        if self.jobs > 1 and (not sent or status in (0, _KILLED)):
             raise EndedError
         return status
 
@@ -92,7 +103,7 @@ class Child:
         assert self.process.stdin is not None
         try:
             self.process.stdin.write(line)
-        except BrokenPipeError:
+        except OSError:  # a pipe without a reader: EPIPE, or EINVAL on Windows
             return False
         return True
 
@@ -103,8 +114,11 @@ class Child:
     def kill(self) -> None:
         """End it, whatever it does; a thread that waits for its answer then gets an error."""
         if not self.has_ended():
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(self.process.pid, signal.SIGKILL)
+            if sys.platform == "win32":
+                self.process.kill()
+            else:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(self.process.pid, signal.SIGKILL)
             self.process.wait()
 
     def end(self) -> None:
@@ -114,11 +128,9 @@ class Child:
 
     def close(self) -> None:
         """Close the pipes. A second call does nothing."""
-        answers, self.answers = self.answers, -1
-        if answers >= 0:
-            os.close(answers)
-        if self.process.stdin is not None:
-            self.process.stdin.close()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                pipe.close()
 
 
 class Lease:
@@ -236,10 +248,9 @@ class Children:
 
 
 def _processors() -> int:
-    try:
+    if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # elsewhere than on Linux
-        return os.cpu_count() or 1
+    return os.cpu_count() or 1
 
 
 pool = Children(_processors())

@@ -42,10 +42,14 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     program = build(device, flat.text, flags=math_flags(precision), sources=flat.sources, isolated=False)
     fault = _built_ins_fault(program, precision, lanes) or _mixed_lanes_fault(program, precision, lanes)
     width, rows = (_WIDTH_SIMULATED, _ROWS_SIMULATED) if is_simulator(device.info) else (_WIDTH, _ROWS)
-    counts = _escape_counts(program, precision, lanes, width, rows)
+    counts = _launch(program, "escape_counts", precision, rows, width, rows * width // lanes)
     differing = np.mean(counts[::_CHECKED, ::_CHECKED] != _expected_counts(width, rows))
     if differing > _COUNTS_MAY_DIFFER:
         fault = fault or f"{differing:.0%} of the escape counts are wrong"
+    inside = _launch(program, "side_by_side", precision, rows, width, rows * width // (2 * lanes))
+    differing = np.mean(inside != _expected_inside(width, rows))
+    if differing > _COUNTS_MAY_DIFFER:
+        fault = fault or f"{differing:.0%} of the points of packets side by side are wrong"
     return {"fault": fault}
 
 
@@ -82,25 +86,30 @@ def _mixed_lanes_fault(program: Program, precision: Precision, lanes: int) -> st
         exact = t.astype(np.float64)
         expected = np.stack([np.sin(exact), np.cos(exact), np.abs(exact) ** 1.7, np.log(np.abs(exact))])
         error = np.abs(values - expected) / np.maximum(np.abs(expected), 1.0)
-    right = (values == expected) | (error <= 4 * _TOLERANCE[precision]) | np.isnan(expected)
+    limits = np.full(t.shape, 4 * _TOLERANCE[precision])
+    if precision == "float64":
+        # Mesa 25's sin is that of an argument that is off by its last digit, which is what our arguments are too.
+        limits += np.spacing(np.abs(np.where(np.isfinite(exact), exact, 0)))
+    right = (values == expected) | (error <= limits) | np.isnan(expected)
     if right.all():
         return ""
     function = ("sin", "cos", "pow", "log")[int(np.argmin(right.all(axis=1)))]
     return f"{function} is wrong in packets of unlike lanes"
 
 
-def _escape_counts(
-    program: Program, precision: Precision, lanes: int, width: int, rows: int
+def _launch(
+    program: Program, kernel_name: str, precision: Precision, rows: int, width: int, items: int
 ) -> npt.NDArray[Any]:
+    """What a kernel finds for each point of a plane, shape (rows, width)."""
     device = program.device
-    counts = np.empty((rows, width), precision)
-    buffer = _buffer(device, counts)
-    kernel = program.kernel("escape_counts")
+    found = np.empty((rows, width), precision)
+    buffer = _buffer(device, found)
+    kernel = program.kernel(kernel_name)
     kernel.set_args(buffer, np.int32(width), np.int32(_LIMIT))
     with device.failures("counting escapes"):
-        cl.enqueue_nd_range_kernel(device.queue, kernel, (counts.size // lanes,), None)
-        cl.enqueue_copy(device.queue, counts, buffer)
-    return counts
+        cl.enqueue_nd_range_kernel(device.queue, kernel, (items,), None)
+        cl.enqueue_copy(device.queue, found, buffer)
+    return found
 
 
 def _buffer(device: Device, values: npt.NDArray[Any]) -> cl.Buffer:
@@ -136,3 +145,15 @@ def _expected_counts(width: int, rows: int) -> npt.NDArray[np.float64]:
         count[alive] = n + 1
         alive &= np.asarray(x * x + y * y + z * z <= 4)
     return count
+
+
+def _expected_inside(width: int, rows: int) -> npt.NDArray[np.bool_]:
+    """What `side_by_side` finds, by complex numbers."""
+    scale = 3.0 / width
+    c = np.arange(width) * scale - 2.25 + 1j * (np.arange(rows)[:, None] * scale - 1.25)
+    z = c.copy()
+    inside: npt.NDArray[np.bool_] = np.abs(z) <= 2
+    for _ in range(_LIMIT):
+        z[inside] = z[inside] ** 2 + c[inside]
+        inside &= np.abs(z) <= 2
+    return inside

@@ -16,7 +16,7 @@ import pyopencl as cl
 from clfractal.device import cache, compiler, isolate
 from clfractal.device.buildlog import build_error
 from clfractal.device.compiler import BuildFailureError, Warm
-from clfractal.device.select import Device, cannot_run_optimised_code
+from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
 
@@ -90,6 +90,8 @@ def build(
     start = time.perf_counter()
     if cannot_run_optimised_code(device.info):
         text, flags = "#define INTERPRETED\n" + text, [*flags, "-cl-opt-disable"]
+    if loses_copies_when_unrolling(device.info):
+        text = "#define COUNTS_AT_RUN_TIME\n" + text
     key = _key(device, text, flags, warm)
     program = device.loaded.get(key)
     if program is not None:

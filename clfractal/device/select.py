@@ -244,6 +244,22 @@ def is_intel_cpu(info: DeviceInfo) -> bool:
     return info.kind == "cpu" and info.platform.startswith("Intel(R)")
 
 
+def is_rusticl(info: DeviceInfo) -> bool:
+    """Mesa's OpenCL, for AMD's and Intel's GPUs and, as llvmpipe, for processors."""
+    return info.platform.casefold() == "rusticl"
+
+
+def loses_copies_when_unrolling(info: DeviceInfo) -> bool:
+    """Whether loops of a constant count must not copy structs; kernels are told by COUNTS_AT_RUN_TIME.
+
+    Mesa 25.0.7's rusticl unrolls short ones and then reads copies that were never written. After
+    `struct {float a, b;} z = {x, y}, v;` the loop `for (int i = 0; i < 4; ++i) { v = z; z.a = v.a * v.a - v.b * v.b;
+    z.b = 2 * v.a * v.b; }` ends with other numbers than with a count that only the launch knows, or with the fields copied
+    one by one. Hints not to unroll do not help.
+    """
+    return is_rusticl(info)
+
+
 def cannot_run_optimised_code(info: DeviceInfo) -> bool:
     """Oclgrind's interpreter lacks intrinsics that its own compiler makes; kernels are told by INTERPRETED.
 
@@ -262,11 +278,11 @@ def has_float64(info: DeviceInfo) -> bool:
 def vectorises_across_work_items(info: DeviceInfo) -> bool:
     """Whether neighbouring work-items share a vector unit even where their loops part ways.
 
-    GPUs do so by construction and Intel's compiler with masks; PoCL's work-group vectoriser gives up on a
+    GPUs do so by construction, Intel's and Mesa's compilers with masks; PoCL's work-group vectoriser gives up on a
     loop whose trip count differs between work-items (one ray an item runs 6 to 9 times slower there than
     eight).
     """
-    return info.kind == "gpu" or is_intel_cpu(info)
+    return info.kind == "gpu" or is_intel_cpu(info) or is_rusticl(info)
 
 
 def sees_host_writes(info: DeviceInfo) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from clfractal.device import cache, isolate
-from clfractal.device.select import Device, has_float64, vectorises_across_work_items
+from clfractal.device.select import Device, has_float64, is_rusticl, vectorises_across_work_items
 from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
 
@@ -19,7 +19,7 @@ LANE_COUNTS = (1, 4, 8, 16)
 PROBE = "clfractal.device.probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
-_VERSION = 4  # of the probes: older measurements no longer count
+_VERSION = 5  # of the probes: older measurements no longer count
 _SECTION = "lanes"
 
 
@@ -81,6 +81,9 @@ def accepted_lanes(device: Device, precision: Precision) -> tuple[int, ...]:
 
 def promising(device: Device) -> tuple[tuple[int, ...], ...]:
     """Groups of lane counts; a group is tried if none before it works. Each trial costs seconds."""
+    if is_rusticl(device.info):
+        # It compiles packets number by number: one lane takes a second where eight take half a minute.
+        return (1,), (4,), (8,), (16,)
     if not vectorises_across_work_items(device.info):
         return (16, 8), (4, 1)
     if device.info.kind == "cpu":

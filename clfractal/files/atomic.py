@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from clfractal.errors import FileError, Where
+from clfractal.files import system
 from clfractal.files.inputs import note
 
 PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".webp")
@@ -35,8 +36,7 @@ def _open_beside(target: Path) -> tuple[int, Path]:
     """A new hidden file in the folder of `target`, with the permissions that a plain new file would have."""
     # A name may already have the greatest length that the file system allows, so only its beginning is used.
     beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
-    flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0)
-    return os.open(beside, flags, 0o666), beside
+    return os.open(beside, system.CREATE, 0o666), beside
 
 
 def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> None:
@@ -98,25 +98,18 @@ def atomic_writer(path: str | Path) -> Iterator[Path]:
         yield beside
         os.fsync(descriptor)
         with suppress(FileNotFoundError):
-            os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
-        os.replace(beside, target)
-        sync_folder(target.parent)
+            system.set_mode(descriptor, beside, stat.S_IMODE(target.stat().st_mode))
+        os.close(descriptor)
+        descriptor = -1
+        system.replace(beside, target)
+        system.flush_folder(target.parent)
     except OSError as error:
         raise file_error(path, "cannot be written", error) from error
     finally:
-        os.close(descriptor)
+        if descriptor >= 0:
+            os.close(descriptor)
         with suppress(OSError):
             beside.unlink(missing_ok=True)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flushes a rename to the disk; on file systems that cannot do this for folders, it does nothing."""
-    with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 def open_regular(path: str | Path) -> BinaryIO:
@@ -127,8 +120,7 @@ def open_regular(path: str | Path) -> BinaryIO:
     """
     note(path)
     try:
-        # Without O_NONBLOCK, opening a pipe would wait for somebody to write into it.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+        descriptor = os.open(path, system.READ)
         mode = os.fstat(descriptor).st_mode
         if stat.S_ISREG(mode):
             return os.fdopen(descriptor, "rb")

@@ -17,7 +17,6 @@ render again.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import secrets
@@ -33,6 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import FileError, Where
+from clfractal.files import system
 from clfractal.files.atomic import file_error
 
 Floats = npt.NDArray[np.float32]
@@ -78,23 +78,31 @@ class Journal:
         with suppress(FileNotFoundError):
             earlier = _open_locked(target)
             try:
-                if not stat.S_ISREG(os.fstat(earlier).st_mode) or os.pread(earlier, 8, 0) != MAGIC:
+                if not stat.S_ISREG(os.fstat(earlier).st_mode) or system.read_at(earlier, 8, 0) != MAGIC:
                     raise file_error(target, "is in the way and holds no work in progress; move it away", "")
             finally:
                 os.close(earlier)
         text = _identity_text(identity, channels, tile_count)
         beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
         try:
-            descriptor = os.open(beside, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o666)
+            descriptor = os.open(beside, system.CREATE, 0o666)
         except (OSError, ValueError) as error:
             raise file_error(target, "cannot be written", error) from error
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            _write_all(descriptor, [_HEAD.pack(MAGIC, len(text), zlib.crc32(text)), text], 0)
+            with suppress(OSError):  # a file system without locks
+                system.lock(descriptor)
+            system.write_at(descriptor, [_HEAD.pack(MAGIC, len(text), zlib.crc32(text)), text], 0)
             os.fsync(descriptor)
-            os.replace(beside, target)
+            if system.RENAMES_OPEN_FILES:
+                os.replace(beside, target)
+            else:
+                os.close(descriptor)
+                descriptor = -1
+                system.replace(beside, target)
+                descriptor = _open_locked(target)
         except BaseException as error:
-            os.close(descriptor)
+            if descriptor >= 0:
+                os.close(descriptor)
             with suppress(OSError):
                 beside.unlink()
             if isinstance(error, OSError):
@@ -151,7 +159,7 @@ class Journal:
         check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", tile_index)))
         offset = self._start + self._records * self._size
         try:
-            _write_all(self._descriptor, [_RECORD.pack(tile_index, check), payload], offset)
+            system.write_at(self._descriptor, [_RECORD.pack(tile_index, check), payload], offset)
         except OSError as error:
             raise file_error(self.path, "cannot be written", error) from error
         self._place[tile_index] = self._records
@@ -184,13 +192,15 @@ class Journal:
 
     def discard(self) -> None:
         """Removes the file: the work is done."""
+        if not system.RENAMES_OPEN_FILES:
+            self.close()
         with suppress(FileNotFoundError):
             self.path.unlink()
         self.close()
 
     def _record(self, number: int) -> tuple[int, Floats] | None:
         """Tile index and payload of a record; None if it is damaged or not all there."""
-        data = os.pread(self._descriptor, self._size, self._start + number * self._size)
+        data = system.read_at(self._descriptor, self._size, self._start + number * self._size)
         if len(data) < self._size:
             return None
         index, check = _RECORD.unpack_from(data)
@@ -218,15 +228,14 @@ def _open_locked(path: Path) -> int:
         FileError: it cannot be opened, or another process has it open.
     """
     try:
-        # Without O_NONBLOCK, opening a pipe would wait for its other end.
-        descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | os.O_NONBLOCK)
+        descriptor = os.open(path, system.READ_AND_WRITE)
     except FileNotFoundError:
         raise
     except (OSError, ValueError) as error:
         raise file_error(path, "cannot be opened", error) from error
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
+        system.lock(descriptor)
+    except system.HeldError as error:
         os.close(descriptor)
         raise file_error(path, "is in use: another process renders this picture", "") from error
     except OSError:
@@ -241,14 +250,14 @@ def _identity_text(identity: Mapping[str, Any], channels: Sequence[str], tile_co
 
 def _check_identity(path: Path, descriptor: int, wanted: bytes) -> int:
     """Where the records of a journal begin; FileError if it is another one's."""
-    head = os.pread(descriptor, _HEAD.size, 0)
+    head = system.read_at(descriptor, _HEAD.size, 0)
     not_one = file_error(path, "holds no work in progress that could be resumed", "")
     if len(head) < _HEAD.size or head[:8] != MAGIC:
         raise not_one
     _, length, check = _HEAD.unpack(head)
     if length > _LARGEST_IDENTITY:
         raise not_one
-    text = os.pread(descriptor, length, _HEAD.size)
+    text = system.read_at(descriptor, length, _HEAD.size)
     if zlib.crc32(text) != check or len(text) != length:
         raise not_one
     if text != wanted:
@@ -268,15 +277,3 @@ def _differences(found: bytes, wanted: bytes) -> str:
             short = max(len(old), len(new)) <= 60
             changes.append(f"the {key} was {old} and is {new}" if short else f"the {key} has changed")
     return ", ".join(changes)
-
-
-def _write_all(descriptor: int, parts: Sequence[bytes], offset: int) -> None:
-    """Writes all bytes at `offset`; the system may take them in pieces."""
-    waiting = [memoryview(part) for part in parts]
-    while waiting:
-        written = os.pwritev(descriptor, waiting, offset)
-        offset += written
-        while waiting and written >= len(waiting[0]):
-            written -= len(waiting.pop(0))
-        if waiting:
-            waiting[0] = waiting[0][written:]

@@ -1,9 +1,9 @@
-"""How much memory the machine has left, for saying beforehand that something does not fit."""
+"""How much memory the machine has left, for saying beforehand that something does not fit; and how much was used."""
 
 from __future__ import annotations
 
-import os
 import re
+import sys
 
 _UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB")
 
@@ -12,7 +12,9 @@ def available() -> int:
     """Bytes that may be taken without swapping: what the system says, or a container allows, whichever is less."""
     free = _number("/proc/meminfo", r"MemAvailable:\s*(\d+) kB", 1024)
     if free is None:
-        free = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        import psutil
+
+        return int(psutil.virtual_memory().available)
     limit = _number("/sys/fs/cgroup/memory.max", r"(\d+)", 1)
     used = _number("/sys/fs/cgroup/memory.current", r"(\d+)", 1)
     if limit is not None and used is not None:
@@ -20,6 +22,18 @@ def available() -> int:
         cached = _number("/sys/fs/cgroup/memory.stat", r"\binactive_file (\d+)", 1) or 0
         free = min(free, max(0, limit - used + cached))
     return free
+
+
+def peak() -> int:
+    """The largest number of bytes that this process has held at one time."""
+    if sys.platform == "win32":
+        import psutil
+
+        return int(psutil.Process().memory_info().peak_wset)
+    import resource
+
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most
 
 
 def shown(size: int) -> str:

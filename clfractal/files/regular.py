@@ -7,6 +7,7 @@ import stat
 from pathlib import Path
 
 from clfractal.errors import FileError, Where
+from clfractal.files import system
 from clfractal.files.inputs import note
 
 MAX_BYTES = 1_000_000
@@ -34,8 +35,7 @@ def read_bytes(
     shown = name or str(path)
     note(path)
     try:
-        # Without O_NONBLOCK opening a FIFO would wait for a writer.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
+        descriptor = os.open(path, system.READ)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise FileError(f"cannot be read: {reason}", Where(shown)) from error

@@ -27,6 +27,7 @@ from clfractal.files import memory, nrrd
 from clfractal.files.atomic import atomic_writer, check_output, file_error, open_regular
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.regular import read_text_file
+from clfractal.files.system import flush
 
 Values = npt.NDArray[Any]
 Doubles = npt.NDArray[np.float64]
@@ -232,9 +233,9 @@ def _write_values(
             while len(piece):  # an unbuffered file may write less than it is given
                 piece = piece[stream.write(piece) :]
             if waiting >= _FLUSHED:
-                os.fdatasync(stream.fileno())
+                flush(stream.fileno())
                 waiting = 0
-    os.fdatasync(stream.fileno())
+    flush(stream.fileno())
     if planes != shape[0]:
         raise ValueError(f"a volume of {shape[0]} planes got {planes}")
 

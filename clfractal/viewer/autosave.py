@@ -20,28 +20,13 @@ from typing import Any, Self
 
 from clfractal.device import cache
 from clfractal.errors import ClfractalError
+from clfractal.files import system
 from clfractal.files.document import read_document
 from clfractal.files.regular import read_text_file
 from clfractal.scene.load import SceneText, load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.saving import SceneSource, open_source, scene_text
 
-if sys.platform == "win32":  # there a file that is open cannot be removed, and has other locks
-
-    def _lock(descriptor: int, *, wait: bool) -> None:
-        import msvcrt
-
-        msvcrt.locking(descriptor, msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, 1)
-
-else:
-
-    def _lock(descriptor: int, *, wait: bool) -> None:
-        import fcntl
-
-        fcntl.flock(descriptor, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-_CLOSED_WITH_EXEC = getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 _VERSION = 1
 
 
@@ -105,9 +90,8 @@ class Autosave:
         """The same, when the window closes."""
         self.clear()
         if self._lock is not None:
-            with suppress(OSError):
-                (self._folder / f"{self._name}.lock").unlink()
-        self.release()
+            _end_lock(self._lock, self._folder / f"{self._name}.lock")
+            self._lock = None
 
     def release(self) -> None:
         """Leaves what was kept for the next window."""
@@ -131,9 +115,7 @@ class Autosave:
             recovered = _read(self._folder, path.stem, lock)
             if recovered is None:
                 _remove(self._folder, path.stem)
-                with suppress(OSError):
-                    path.unlink()
-                os.close(lock)
+                _end_lock(lock, path)
             else:
                 found.append(recovered)
         return sorted(found, key=lambda each: each.time, reverse=True)
@@ -177,9 +159,9 @@ class Recovered:
     def discard(self) -> None:
         """Removes them: they have been given up, or are kept by this window now."""
         _remove(self._store, self._name)
-        with suppress(OSError):
-            (self._store / f"{self._name}.lock").unlink()
-        self.release()
+        if self._lock is not None:
+            _end_lock(self._lock, self._store / f"{self._name}.lock")
+            self._lock = None
 
     def release(self) -> None:
         """Leaves them for the next window."""
@@ -219,26 +201,36 @@ def _read(folder: Path, name: str, lock: int) -> Recovered | None:
 def _locked_file(path: Path) -> int:
     """A descriptor of a new file that this process holds locked; OSError if that is not possible."""
     while True:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | _CLOSED_WITH_EXEC, 0o600)
+        descriptor = os.open(path, system.READ_AND_WRITE | os.O_CREAT, 0o600)
         # (Where files cannot be locked, the note's process number has to do.)
         with suppress(OSError):
-            _lock(descriptor, wait=True)
+            system.lock(descriptor, wait=True)
         # Another window may have taken the new file for a left one and removed it before it was locked.
         if _is_at(descriptor, path):
             return descriptor
         os.close(descriptor)
 
 
+def _end_lock(descriptor: int, path: Path) -> None:
+    """Removes a lock that this process holds, before others may take it where a file that is open can be removed."""
+    if not system.RENAMES_OPEN_FILES:
+        os.close(descriptor)
+    with suppress(OSError):
+        path.unlink()
+    if system.RENAMES_OPEN_FILES:
+        os.close(descriptor)
+
+
 def _taken(path: Path) -> int | None:
     """A descriptor of the lock of a window that has ended, now held by this process; None if it is held elsewhere."""
     try:
-        descriptor = os.open(path, os.O_RDWR | _CLOSED_WITH_EXEC)
+        descriptor = os.open(path, system.READ_AND_WRITE)
     except OSError:
         return None
     try:
-        _lock(descriptor, wait=False)
+        system.lock(descriptor)
         gone = _is_at(descriptor, path)
-    except (BlockingIOError, PermissionError):
+    except system.HeldError:
         gone = False
     except OSError:
         # A file system without locks: the note tells whose it is.
@@ -267,7 +259,14 @@ def _runs(note: Path) -> bool:
 
 
 def _process_start(pid: int) -> str | None:
-    """When a process started, in the system's ticks since it was booted; None if there is no such process."""
+    """When a process started, as the system counts it; None if there is no such process."""
+    if sys.platform != "linux":
+        import psutil
+
+        try:
+            return str(psutil.Process(pid).create_time())
+        except psutil.Error:
+            return None
     try:
         status = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -279,7 +278,7 @@ def _process_start(pid: int) -> str | None:
 def _replace(path: Path, text: str) -> None:
     beside = path.with_name(f".{path.name}.new")
     beside.write_bytes(text.encode())
-    os.replace(beside, path)
+    system.replace(beside, path)
 
 
 def _remove(folder: Path, name: str) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import resource
-import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import clfractal
+from clfractal.files import memory
 from clfractal.files.atomic import atomic_writer
 from clfractal.optics.view import scene_view
 from clfractal.work.comfort import Comfort
@@ -103,5 +102,4 @@ def sentence(values: dict[str, Any]) -> str:
 
 def peak_memory_mb() -> float:
     """The largest amount of memory that this process has held at one time, in MiB."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / (2**20 if sys.platform == "darwin" else 2**10)
+    return memory.peak() / 2**20
