@@ -6,6 +6,7 @@
 #   make view          the window (needs a display)
 #   make window        tests of the window, on a screen of their own (needs Xvfb, xdotool, openbox and Mesa)
 #   make soak          ten minutes of random events for the window, from a seed
+#   make locks         which versions the dependencies resolve to on Linux, macOS and Windows (tests/platforms/locks)
 #   make lowest        render, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
@@ -32,7 +33,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test window soak lint lowest bench mutate portability install clean
+.PHONY: demo view test window soak lint locks lowest bench mutate portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -64,6 +65,10 @@ lint: $(LINT)/.installed
 	$(LINT)/bin/mypy --strict --platform win32 clfractal
 	$(LINT)/bin/mypy --strict --platform darwin clfractal
 	$(LINT)/bin/lint-imports
+
+locks: $(LOWEST)/bin/python
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
+	$(LOWEST)/bin/python -m tests.platforms.systems $(LOWEST)/bin/uv
 
 # The pictures and files are made in a folder outside the checkout, so that the installed program is what runs.
 lowest: $(LOWEST)/.installed

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 import tempfile
 import warnings
 from functools import lru_cache
@@ -92,12 +93,15 @@ def _usable(wanted: str, is_chosen: bool) -> Path:
 
 def _temporary(wanted: str, reason: str) -> Path:
     """A temporary folder that nobody else can write into: always the same one for a user, if nobody took its name."""
-    user = f"-{os.getuid()}" if hasattr(os, "getuid") else ""
+    own = -1
+    if sys.platform != "win32":
+        own = os.getuid()
+    user = "" if own < 0 else f"-{own}"
     try:
         path = Path(tempfile.gettempdir(), f"clfractal-cache{user}")
         path.mkdir(mode=0o700, exist_ok=True)
         status = path.lstat()
-        is_ours = not user or (status.st_uid == os.getuid() and not status.st_mode & 0o022)
+        is_ours = own < 0 or (status.st_uid == own and not status.st_mode & 0o022)
         if stat.S_ISDIR(status.st_mode) and is_ours and not problem(str(path)):
             return path
     except OSError:
