@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from clfractal.api import escape as escape
     from clfractal.api import load_scene as load_scene
     from clfractal.api import mesh as mesh
+    from clfractal.api import probe as probe
     from clfractal.api import render as render
     from clfractal.api import render_pair as render_pair
     from clfractal.api import voxelize as voxelize
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from clfractal.files.mesh import Mesh as Mesh
     from clfractal.files.volume import Volume as Volume
     from clfractal.pictures.film import Film as Film
+    from clfractal.pictures.probe import Probe as Probe
     from clfractal.renderers.points import Distances as Distances
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
@@ -47,6 +49,7 @@ _HOMES = {
     "escape": "clfractal.api",
     "load_scene": "clfractal.api",
     "mesh": "clfractal.api",
+    "probe": "clfractal.api",
     "render": "clfractal.api",
     "render_pair": "clfractal.api",
     "voxelize": "clfractal.api",
@@ -62,6 +65,7 @@ _HOMES = {
     "Mesh": "clfractal.files.mesh",
     "Volume": "clfractal.files.volume",
     "Film": "clfractal.pictures.film",
+    "Probe": "clfractal.pictures.probe",
     "Distances": "clfractal.renderers.points",
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",

@@ -23,12 +23,13 @@ if TYPE_CHECKING:
     from clfractal.files.volume import Volume
     from clfractal.formulas.language import Chain
     from clfractal.pictures.film import Film
+    from clfractal.pictures.probe import Probe
     from clfractal.renderers.points import Distances
     from clfractal.scene.coloring import Coloring
     from clfractal.work.grids import Talk
     from clfractal.work.run import ProgressCallback
 
-__all__ = ["distances", "escape", "load_scene", "mesh", "render", "render_pair", "voxelize"]
+__all__ = ["distances", "escape", "load_scene", "mesh", "probe", "render", "render_pair", "voxelize"]
 
 SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 """A scene, or what `load_scene` takes."""
@@ -95,6 +96,35 @@ def render_pair(
 
     with Engine(device) as engine:
         return engine.render_pair(scene, progress, precision=precision, samples=samples, channels=channels)
+
+
+def probe(
+    scene: Scene | str | Path | Mapping[str, Any],
+    x: int,
+    y: int,
+    device: str | None = None,
+    *,
+    precision: str | None = None,
+) -> Probe:
+    """What lies at a pixel of a scene's picture, found by one ray through its middle; a lens is closed for it.
+
+    Args:
+        scene: as for `render`.
+        x, y: the pixel, from the top left of the finished picture.
+        device: as for `render`.
+        precision: as for `render`.
+
+    Returns:
+        The point, its normal, depth and distance (scene units), and counts: see `Probe`.
+
+    Raises:
+        SceneError, FormulaError: the scene is wrong, or the pixel is not in its picture.
+        DeviceError, KernelBuildError: as for `render`.
+    """
+    from clfractal.work.engine import Engine
+
+    with Engine(device) as engine:
+        return engine.probe(scene, x, y, precision=precision)
 
 
 def escape(

@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from clfractal.commands.options import DeviceOption, Overrides, Quiet, Scene, Verbose, Work, app, shell_of
+from clfractal.commands.options import (
+    DeviceOption,
+    Overrides,
+    Precision,
+    Quiet,
+    Scene,
+    Verbose,
+    Work,
+    app,
+    shell_of,
+)
 
 
 @app.command()
@@ -29,6 +39,33 @@ def check(
 
     shell = shell_of(context, verbose=verbose)
     return lambda: check_scene(scene, tuple(overrides or ()), shell, parallax=parallax, device=device)
+
+
+@app.command()
+def probe(
+    context: typer.Context,
+    scene: Scene,
+    pixel: Annotated[str, typer.Argument(metavar="X,Y", help="The pixel, counted from the top left.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    device: DeviceOption = None,
+    precision: Precision = None,
+    size: Annotated[
+        str | None,
+        typer.Option("--size", metavar="WxH", help="Size of the picture in pixels, instead of the scene's."),
+    ] = None,
+    overrides: Overrides = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Tell what lies at a pixel: point, normal, depth, distance, counts."""
+    from clfractal.commands.order import Order
+    from clfractal.commands.probe import probe_pixel
+
+    order = Order(
+        scene=scene, device=device, precision=precision, size=size, overrides=tuple(overrides or ())
+    )
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: probe_pixel(order, pixel, shell, as_json=as_json)
 
 
 @app.command()

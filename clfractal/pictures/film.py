@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal import arguments
-from clfractal.errors import unknown_name
+from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.tone import Tone
 from clfractal.pictures.develop import Development, developed, rgb8
+from clfractal.pictures.probe import Probe
 from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -77,6 +78,8 @@ class Film:
         self.grid = TileGrid(self.region)
         self._header = _Known(header or {})
         self._stats = _Known({})
+        self.prober: Callable[[Film, int, int], Probe] | None = None
+        """Answers `probe`, of a film that was rendered."""
         self.inputs: tuple[Path, ...] = ()
         """Files that were read for the picture; `save` replaces none of them."""
         self.mixed_from: Picture | None = None
@@ -214,6 +217,23 @@ class Film:
             part = slice(row - self.region.y, end - self.region.y)
             yield row, {name: plane[part] for name, plane in self._planes.items()}
             row = end
+
+    def probe(self, x: int, y: int) -> Probe:
+        """What lies at a pixel: the point, its normal, depth and distance, counts.
+
+        A film that has the channels Z, N, P, iterations and steps tells it from them; of several samples they have
+        the one nearest to the pixel's middle. For any other film one ray is rendered, through the pixel's middle.
+
+        Args:
+            x, y: the pixel, from the top left of the whole picture, as of `region`.
+
+        Raises:
+            SceneError: the film does not hold that pixel, or was not made by a render.
+            DeviceError, KernelBuildError: a ray is needed, and the film's device is gone or failed.
+        """
+        if self.prober is None:
+            raise SceneError("only films that were rendered can be probed", Where())
+        return self.prober(self, x, y)
 
     def save(self, path: str | Path, **settings: Any) -> None:
         """Writes an .exr, .png, .jpg or .webp file; settings as in `outputs.save_outputs`.

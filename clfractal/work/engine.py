@@ -18,6 +18,7 @@ from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.pictures.film import Film
+from clfractal.pictures.probe import Probe
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.work.films import JobFilms, Took
@@ -25,6 +26,7 @@ from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.look import Look
 from clfractal.work.prepare import prepare
+from clfractal.work.probing import checked_pixel, probed
 from clfractal.work.refine import Refinement, refined
 from clfractal.work.run import ProgressCallback, run
 from clfractal.work.settle import is_settled, settled
@@ -191,6 +193,12 @@ class Engine:
             state = run(job, films.films, self.executor, progress=progress, token=token)
             eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start)))
             return eyes["left"], eyes["right"]
+
+    def probe(self, scene: SceneLike, x: int, y: int, *, precision: str | None = None) -> Probe:
+        """What lies at a pixel of a scene's picture; arguments, result and errors as for `clfractal.probe`."""
+        with self._alone():
+            job = self.prepare(scene, precision=precision)
+            return probed(job, *checked_pixel(x, y, job.region), self.look)
 
     def refine(
         self,

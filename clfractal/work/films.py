@@ -12,6 +12,7 @@ from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Picture
 from clfractal.work.comfort import comfort_of_films
 from clfractal.work.job import Job
+from clfractal.work.probing import FilmProber
 from clfractal.work.remarks import remarks_of
 from clfractal.work.run import Progress
 from clfractal.work.stats import statistics
@@ -53,14 +54,20 @@ class JobFilms:
             took: what it took so far, for `Film.stats`.
         """
         composed = len(self.films) != 1
-        return self._whole(self.job.picture(self.films, self.header if composed else None), took)
+        return self._whole(
+            self.job.picture(self.films, self.header if composed else None), took, FilmProber(self.job)
+        )
 
     def eyes(self, took: Took | None = None) -> dict[Side, Film]:
         """Each eye's picture; `took` as for `picture`: both films have the statistics of the pair."""
-        return {side: self._whole(picture, took) for side, picture in self.job.eyes(self.films).items()}
+        return {
+            side: self._whole(picture, took, FilmProber(self.job, side))
+            for side, picture in self.job.eyes(self.films).items()
+        }
 
-    def _whole(self, picture: Picture, took: Took | None) -> Film:
+    def _whole(self, picture: Picture, took: Took | None, prober: FilmProber) -> Film:
         film = in_memory(picture)
+        film.prober = prober
         film.inputs = self.job.scene.files
         if took is not None:
             film.tell_stats(partial(self._statistics, took))
