@@ -64,6 +64,10 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     from clfractal.work.engine import Engine
 
     engine = Engine(order.device, tell=shell.say)
+    # (One exposure for the whole stack: that of the scene's own plane, in its middle.)
+    settled = engine.settled(scene)
+    if settled is not scene:
+        scenes = [slice_scene(settled, stack, number) for number in numbers]
     with naming_options():
         precision = order.precision or _precision(scenes, engine.device)
     told, rays, number = begun, 0, stack.start
