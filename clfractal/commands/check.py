@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clfractal.commands.pipes import piped
 from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where, speaking_of
 from clfractal.scene.load import dump_scene, load_scene
@@ -27,7 +28,9 @@ def check_scene(
         ClfractalError: the scene is wrong; or `parallax` of a scene without stereo, or without a device.
     """
     shell.mute_drivers()  # and the library that reads environment maps
-    scene = load_scene(Path(source), overrides=overrides)
+    with piped(shell, source, ()) as files:
+        source = files.source
+        scene = load_scene(Path(source), overrides=overrides, folder=files.folder)
     if parallax and scene.stereo is None:
         raise SceneError("needs a scene with a stereo section", Where("--parallax", path=""))
     lines, warning = [], ""

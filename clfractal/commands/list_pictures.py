@@ -19,7 +19,7 @@ def render(
         typer.Option(
             "-o",
             "--output",
-            help="An .exr, .png, .jpg or .webp file; repeatable.  [default: the scene's name with .png]",
+            help="An .exr, .png, .jpg or .webp file, or - for standard output; repeatable.  [default: SCENE with .png]",
         ),
     ] = None,
     device: DeviceOption = None,

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from clfractal.commands.pipes import piped
 from clfractal.commands.shell import Shell
 from clfractal.commands.voxelize import GridOrder, load_order, speaking_of_order, talk_of
 from clfractal.errors import FileError, SceneError, Where
@@ -28,6 +30,13 @@ def make_mesh(order: GridOrder, shell: Shell, *, level: float | None = None, clo
     Raises:
         ClfractalError: anything wrong with the input, the files or the device; an existing file stays unchanged.
     """
+    with piped(shell, order.source, [(order.output, ".ply")]) as files:
+        (output,) = files.outputs
+        named = replace(order, source=files.source, folder=files.folder, output=output)
+        _make_mesh(named, shell, level, close)
+
+
+def _make_mesh(order: GridOrder, shell: Shell, level: float | None, close: bool) -> None:
     start = time.perf_counter()
     shell.mute_drivers()
     check_output(order.output, EXTENSIONS)

@@ -24,7 +24,10 @@ app = typer.Typer(
 )
 
 Scene = Annotated[
-    str, typer.Argument(metavar="SCENE", help="A scene file, or a picture that clfractal wrote.")
+    str,
+    typer.Argument(
+        metavar="SCENE", help="A scene file, or a picture that clfractal wrote; - is standard input."
+    ),
 ]
 Overrides = Annotated[
     list[str] | None,

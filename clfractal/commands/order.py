@@ -27,6 +27,10 @@ class Order:
     samples: int | None = None
     resume: bool = False
     stats: Path | None = None
+    folder: Path | None = None
+    """Where files that the scene names are looked for; None: beside it."""
+    streamed: Path | None = None
+    """The output that stands for standard output."""
 
 
 OF_RENDER = {"region": "--region", "precision": "--precision"}

@@ -10,9 +10,10 @@ from pathlib import Path
 from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
 from clfractal.commands.order import naming_options
+from clfractal.commands.pipes import STREAM, is_stream, piped
 from clfractal.commands.progress import Reporter
-from clfractal.commands.shell import Shell
-from clfractal.errors import ClfractalError, SceneError, Where, speaking_of
+from clfractal.commands.shell import OUTPUT, Shell
+from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
@@ -20,7 +21,33 @@ from clfractal.scene.model import Scene
 
 
 def render_scene(order: Order, shell: Shell) -> None:
-    """Renders a scene to all outputs of an order.
+    """Renders a scene to all outputs of an order; `-` is standard input and output.
+
+    Raises:
+        ClfractalError: see `render_files`, and `pipes.piped`.
+    """
+    outputs = order.outputs
+    if not outputs:
+        if order.scene == STREAM:
+            raise FileError("is needed where the scene comes from standard input", Where("-o"))
+        outputs = (Path(Path(order.scene).with_suffix(".png").name),)
+    if order.resume and all(map(is_stream, outputs)):
+        raise FileError("needs an output file, beside which unfinished work is kept", Where("--resume"))
+    stats = () if order.stats is None else ((order.stats, ".json"),)
+    with piped(shell, order.scene, [*((path, ".png") for path in outputs), *stats]) as files:
+        named = replace(
+            order,
+            scene=files.source,
+            folder=files.folder,
+            outputs=files.outputs[: len(outputs)],
+            stats=files.outputs[-1] if stats else None,
+            streamed=files.streamed,
+        )
+        render_files(named, shell)
+
+
+def render_files(order: Order, shell: Shell) -> None:
+    """Renders a scene to all outputs of an order, which are files.
 
     Raises:
         ClfractalError: anything wrong with the input, the files or the device. Finished work stays in
@@ -47,9 +74,10 @@ def render_scene(order: Order, shell: Shell) -> None:
     if job.remark:
         shell.say(f"{order.scene}: {job.remark}")
     header = job.header()
-    with Unfinished(job, header, outputs[0], shell, resume=order.resume) as unfinished:
+    with Unfinished(job, header, _beside(order), shell, resume=order.resume) as unfinished:
         reporter = Reporter(shell, job.tiles)
-        shell.state = unfinished.interrupted
+        if _beside(order) != order.streamed:  # of a temporary file nothing stays
+            shell.state = unfinished.interrupted
         try:
             state = run(job, unfinished.films, engine.executor, progress=reporter)
         finally:
@@ -93,7 +121,7 @@ def ordered_scene(order: Order) -> Scene:
         given["renderer.precision"] = ("--precision", json.dumps(order.precision))
     overrides = [*order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
-        return load_scene(Path(order.scene), overrides=overrides)
+        return load_scene(Path(order.scene), overrides=overrides, folder=order.folder)
     except ClfractalError as error:
         where = error.where
         key = (where.file or "").removeprefix("--set ")
@@ -102,6 +130,11 @@ def ordered_scene(order: Order) -> Scene:
         if key == where.file or key not in given:
             raise
         raise type(error)(error.message, replace(where, file=given[key][0])) from error
+
+
+def _beside(order: Order) -> Path:
+    """The output beside which unfinished work is kept: the first that is a file of the user's."""
+    return next((path for path in order.outputs if path != order.streamed), order.outputs[0])
 
 
 def _region(text: str | None) -> tuple[int, int, int, int] | None:
@@ -128,12 +161,14 @@ def numbers_of(option: str, text: str, separator: str, count: int, form: str) ->
 
 def _outputs(order: Order, scene: Scene, region: tuple[int, int, int, int] | None) -> tuple[Path, ...]:
     """The files to write, all of them checked before anything is rendered."""
-    outputs = order.outputs or (Path(Path(order.scene).with_suffix(".png").name),)
     from clfractal.commands.unfinished import possible_paths
     from clfractal.pictures.formats import Content
     from clfractal.pictures.formats import check_output as check_picture
     from clfractal.pictures.outputs import output_files
 
+    outputs = order.outputs
+    if order.streamed in outputs and len(output_files(scene.stereo, order.streamed)) > 1:
+        raise FileError("takes one file, but a pair is two; name a file", Where(OUTPUT))
     files = [file for path in outputs for file in output_files(scene.stereo, path)]
     content = Content.of(scene, region)
     for file in files:
@@ -141,5 +176,5 @@ def _outputs(order: Order, scene: Scene, region: tuple[int, int, int, int] | Non
     if order.stats is not None:
         check_output(order.stats, (order.stats.suffix.lower(),))
         files.append(order.stats)
-    refuse_overwriting([*files, *possible_paths(scene, outputs[0])], scene.files)
+    refuse_overwriting([*files, *possible_paths(scene, _beside(order))], scene.files)
     return outputs

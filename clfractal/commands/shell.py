@@ -7,11 +7,12 @@ which `--verbose` shows when something failed.
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, TextIO
+from typing import Any, BinaryIO, TextIO
 
 from clfractal.errors import (
     STATUS_BAD_INPUT,
@@ -22,6 +23,8 @@ from clfractal.errors import (
     Where,
 )
 from clfractal.files.system import read_at
+
+OUTPUT = "standard output"
 
 _NOISE_SHOWN = 20_000  # bytes
 
@@ -40,6 +43,9 @@ class Shell:
         self._errors: TextIO = sys.stderr
         self._noise: int | None = None
         self._interrupted = False
+        self._kept: BinaryIO | None = None
+        self.names: dict[str, str] = {}
+        """What messages call a file, by its path."""
         self.state: Callable[[], str] = lambda: "clfractal: interrupted"
         """The message for an interrupt."""
 
@@ -86,17 +92,58 @@ class Shell:
         Raises:
             FileError: it cannot be written (a full disk).
         """
-        try:
+
+        def write() -> None:
             sys.stdout.write(text if text.endswith("\n") else text + "\n")
             sys.stdout.flush()
+
+        self._to_output(write)
+
+    def keep_output(self, *, is_text: bool) -> None:
+        """Keeps standard output for a file that will be sent: from now on what drivers print there is dropped.
+
+        Raises:
+            FileError: it is closed; or a terminal, and the file is no text.
+        """
+        if sys.stdout is None or sys.stdout.closed:
+            raise FileError("is closed", Where(OUTPUT))
+        if not is_text and sys.stdout.isatty():
+            raise FileError("is a terminal; send it to a file or a program, or name a file", Where(OUTPUT))
+        if self._owns_process and self._kept is None:
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+                self._kept = os.fdopen(os.dup(1), "wb")
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+
+    def send(self, stream: BinaryIO) -> None:
+        """Writes bytes to standard output; nothing more if its reader is gone.
+
+        Raises:
+            FileError: it cannot be written (a full disk).
+        """
+
+        def write() -> None:
+            target = self._kept or sys.stdout.buffer
+            shutil.copyfileobj(stream, target, 1 << 20)
+            target.flush()
+
+        self._to_output(write)
+
+    def _to_output(self, write: Callable[[], None]) -> None:
+        try:
+            write()
         except BrokenPipeError:
             # The reader closed the pipe, as `head` does; the rest of the output is dropped.
-            with suppress(OSError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            self._drop_output()
         except OSError as error:
-            with suppress(OSError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise FileError(f"cannot be written: {error.strerror}", Where("standard output")) from error
+            self._drop_output()
+            raise FileError(f"cannot be written: {error.strerror}", Where(OUTPUT)) from error
+
+    def _drop_output(self) -> None:
+        """What is still in a buffer goes nowhere, instead of failing again when the process ends."""
+        with suppress(OSError):
+            target = self._kept.fileno() if self._kept is not None else sys.stdout.fileno()
+            os.dup2(os.open(os.devnull, os.O_WRONLY), target)
 
     def refuse(self, line: str) -> None:
         """One line about wrong input; `--quiet` does not silence it."""
@@ -141,6 +188,8 @@ class Shell:
         return ""
 
     def _write(self, line: str) -> None:
+        for path, name in self.names.items():
+            line = line.replace(path, name)
         with suppress(OSError, ValueError):  # closed by whoever started us
             self._errors.write(line + "\n")
             self._errors.flush()

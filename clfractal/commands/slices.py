@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clfractal.commands.order import PARTIAL, naming_options
+from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where
@@ -49,6 +50,13 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     Raises:
         ClfractalError: anything wrong with the input, the files or the device.
     """
+    for path in order.outputs:
+        refuse_stream(path, "slices are several files")
+    with piped(shell, order.scene, [(path, "") for path in order.outputs]) as files:
+        _render_slices(replace(order, scene=files.source, folder=files.folder), stack, shell)
+
+
+def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     begun = time.perf_counter()
     shell.mute_drivers()
     _check(stack)

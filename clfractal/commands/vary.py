@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import FileError, SceneError, Where, speaking_of, unknown_name
@@ -68,12 +69,19 @@ def vary_scene(order: Order, choice: Choice, shell: Shell) -> None:
     Raises:
         ClfractalError: anything wrong with the input, the files or the device; no variation shows anything.
     """
+    refuse_stream(choice.folder, "variations are several files; name a folder")
+    refuse_stream(choice.sheet, "the sheet needs a file")
+    with piped(shell, order.scene, ()) as files:
+        _vary(replace(order, scene=files.source, folder=files.folder), choice, shell)
+
+
+def _vary(order: Order, choice: Choice, shell: Shell) -> None:
     begun = time.perf_counter()
     shell.mute_drivers()
     kinds = _checked(choice)
     sized = ordered_scene(order)
     # The scene files keep the scene's own size: the option is for the small pictures.
-    scene = load_scene(Path(order.scene), overrides=order.overrides)
+    scene = load_scene(Path(order.scene), overrides=order.overrides, folder=order.folder)
     size = (sized.image.width, sized.image.height) if order.size is not None else _small(scene)
     stem = Path(order.scene).stem
     digits = max(2, len(str(choice.count)))

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clfractal.commands.order import naming_options
+from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.progress import LINE_EVERY_SECONDS
 from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
@@ -44,6 +45,8 @@ class GridOrder:
     device: str | None = None
     precision: str | None = None
     overrides: tuple[str, ...] = ()
+    folder: Path | None = None
+    """Where files that the scene names are looked for; None: beside it."""
 
 
 class StageProgress:
@@ -67,6 +70,14 @@ def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
     Raises:
         ClfractalError: anything wrong with the input, the files or the device; an earlier file stays as it was.
     """
+    if str(order.output).lower() == "-.npy":
+        refuse_stream(order.output, "beside an NPY there is a second file; use -.nrrd")
+    with piped(shell, order.source, [(order.output, ".nrrd")]) as files:
+        (output,) = files.outputs
+        _voxelize(replace(order, source=files.source, folder=files.folder, output=output), shell, compress)
+
+
+def _voxelize(order: GridOrder, shell: Shell, compress: bool) -> None:
     start = time.perf_counter()
     shell.mute_drivers()
     check_output(order.output, EXTENSIONS)
@@ -111,7 +122,8 @@ def load_order(order: GridOrder) -> tuple[Scene, Coloring]:
         given["renderer.resolution"] = ("--resolution", _resolution(order.resolution))
     if order.precision is not None:
         given["renderer.precision"] = ("--precision", json.dumps(order.precision))
-    text = read_scene(Path(order.source))
+    read = read_scene(Path(order.source))
+    text = read if order.folder is None else replace(read, folder=order.folder)
     kind = text.value("renderer", "type") or "surface"
     coloring = load_coloring(
         text,
