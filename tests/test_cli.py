@@ -80,14 +80,13 @@ def test_what_a_picture_tells_of_itself(here: Path, shell: InProcess) -> None:
 def test_no_switch_is_on_unless_it_is_given() -> None:
     """Of every command: nobody asked for details, for silence or for another way."""
     group: Any = typer.main.get_command(app)
-    switches = {
-        f"{name} {parameter.opts[0]}": parameter.default
-        for name, each in group.commands.items()
-        for parameter in each.params
-        if getattr(parameter, "is_flag", False) and not parameter.secondary_opts  # --panels has --no-panels
-    }
+    parameters = [(f"{name} {p.opts[0]}", p) for name, each in group.commands.items() for p in each.params]
+    switches = {name: p for name, p in parameters if getattr(p, "is_flag", False)}
     assert {"render --quiet", "vary --verbose", "check --parallax", "mesh --no-close"} <= switches.keys()
-    assert {name: default for name, default in switches.items() if default is not False} == {}
+    # Those that have an opposite (--panels, --no-panels) are on.
+    on = {name for name, p in switches.items() if p.secondary_opts}
+    assert {"view --panels", "view --share"} <= on
+    assert {name for name, p in switches.items() if p.default is not (name in on)} == set()
 
 
 def test_a_picture_is_a_scene(here: Path, shell: InProcess) -> None:

@@ -14,6 +14,8 @@ import pytest
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.autosave import Autosave, default_folder
+from clfractal.viewer.files import Files
+from clfractal.viewer.options import Options
 from clfractal.viewer.saving import SceneSource, open_source, save_scene
 from tests.viewer.test_saving import desk, with_camera  # noqa: F401 (a fixture)
 
@@ -101,6 +103,27 @@ def test_a_window_that_is_closed_leaves_nothing(desk: Path, store: Path) -> None
         assert Autosave(store).found() == []
         assert own.write(source, present_of(source, 26))
     assert list(store.iterdir()) == []
+
+
+def test_what_was_offered_and_not_taken_is_offered_again(
+    desk: Path,  # noqa: F811
+    store: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Also to a window of the same process, as a program of one's own may open them."""
+    killed = window(desk / "scene.yaml", store, 20)
+    killed.kill()
+    killed.wait()
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(store.parent))
+    first = Files(Options())
+    first.recovered = Autosave(store).found()
+    assert len(first.recovered) == 1
+    assert Autosave(store).found() == []
+    first.close()
+    (again,) = Autosave(store).found()
+    assert again.text == first.recovered[0].text
+    again.discard()
+    assert Autosave(store).found() == []
 
 
 def test_an_error_keeps_the_work(desk: Path, store: Path) -> None:  # noqa: F811
