@@ -16,7 +16,8 @@ def draw(ui: Ui) -> None:
     """Draws the panel."""
     measured = round(ui.studio.exposure, 2)
     w.field(ui, "output.exposure", unit=" stops", start=measured, auto=f"automatic, {measured:+.2f}")
-    w.field(ui, "output.tone", segmented=True, words={"agx": "AgX"})
+    w.field(ui, "output.tone", words={"agx": "AgX"})
     w.group(ui, "Files")
     w.fields(ui, "image", ("width", "height"), width={"unit": " px"}, height={"unit": " px"})
     w.field(ui, "output.png_bits", segmented=True)
+    w.field(ui, "output.quality")

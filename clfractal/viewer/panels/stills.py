@@ -31,7 +31,7 @@ PRESETS: dict[str, tuple[int, int] | None] = {
     "Square 4096": (4096, 4096),
 }
 """Sizes to choose from; None: as large as the window's picture."""
-FORMATS = {"png": "PNG", "jpg": "JPEG", "webp": "WebP", "exr": "EXR", "both": "Both"}
+FORMATS = {"png": "PNG", "jpg": "JPEG", "webp": "WebP", "exr": "EXR", "both": "PNG and EXR"}
 _ENDINGS = {
     "png": (".png",),
     "jpg": (".jpg",),
@@ -166,7 +166,7 @@ def _settings(ui: Ui, state: Wanted) -> None:
     if w.icon_button(theme.RESET, about, name="stills.samples.reset", enabled=state.samples is not None):
         state.samples = None
     width = _label("Format")
-    chosen = w.segments("stills.kind", FORMATS, state.kind, width)
+    chosen = w.choose("stills.kind", FORMATS, state.kind, width)
     if chosen is not None:
         state.kind, state.problem = chosen, ""
     width = _label("Name")
