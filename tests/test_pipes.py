@@ -102,6 +102,7 @@ def test_statistics(here: Path, piped: Piped) -> None:
 
 def test_scenes_for_other_commands(here: Path, piped: Piped) -> None:
     assert piped("check", "-", given=SCENE)[:2] == piped("check", "scene.yaml")[:2]
+    assert piped("probe", "-", "20,18", given=SCENE)[:2] == piped("probe", "scene.yaml", "20,18")[:2]
     cut = ("--set", "renderer={type: cut_plane}", "--count", "2", "-q")
     assert piped("slices", "-", "-o", "s.png", *cut, given=SCENE) == (0, b"", "")
     small = ("--count", "1", "--size", "16x9", "-q")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from clfractal.commands.pipes import piped
 from clfractal.commands.render import Order, numbers_of, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where, speaking_of
@@ -25,7 +27,9 @@ def probe_pixel(order: Order, pixel: str, shell: Shell, *, as_json: bool) -> Non
     """
     shell.mute_drivers()
     x, y = numbers_of("X,Y", pixel, ",", 2, "X,Y, such as 640,360")
-    scene = ordered_scene(order)
+    with piped(shell, order.scene, ()) as files:
+        order = replace(order, scene=files.source, folder=files.folder)
+        scene = ordered_scene(order)
     from clfractal.work.engine import Engine
     from clfractal.work.probing import probed
 
