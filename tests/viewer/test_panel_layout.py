@@ -14,6 +14,7 @@ pytest.importorskip("imgui_bundle")
 from imgui_bundle import imgui
 
 from clfractal import resources
+from clfractal.scene.load import load_scene
 from clfractal.viewer.panels import scene_dock
 from clfractal.viewer.panels import widgets as w
 from tests.viewer.panel_harness import Stage, headless, make_ui
@@ -45,9 +46,10 @@ class Button:
         return across > 0.5 and min(self.bottom, other.bottom) - max(self.top, other.top) > 0.5
 
 
-def buttons_of(scene: str, monkeypatch: pytest.MonkeyPatch) -> list[Button]:
-    """All of the dock's buttons, with every panel open."""
-    ui, _ = make_ui(resources.folder("scenes") / f"{scene}.yaml")
+def buttons_of(scene: str, monkeypatch: pytest.MonkeyPatch, **changes: Any) -> list[Button]:
+    """All of the dock's buttons, with every panel open; `changes` of the scene by their paths."""
+    overrides = [f"{path}={value}" for path, value in changes.items()]
+    ui, _ = make_ui(load_scene(resources.folder("scenes") / f"{scene}.yaml", overrides=overrides))
     ui.size = (1280, 4000)
     ui.memory["open"] = dict.fromkeys(scene_dock.KEYS, True)
     found: list[Button] = []
@@ -103,3 +105,23 @@ def test_tips_of_the_steps_of_a_plane(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(amounts) > 1
     for path, tip in amounts.items():
         assert tip.endswith("of the plane's height") == (path == "step.move"), path
+
+
+def test_few_words_to_choose_from_stand_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a click is enough, nobody opens a list: for the way of a ray's thickness, for one."""
+    shown: dict[str, dict[str, int]] = {"segments": {}, "choose": {}}
+
+    def noted(kind: str, plain: Any) -> Any:
+        def show(path: str, words: Any, *arguments: Any) -> Any:
+            shown[kind][path] = len(words)
+            return plain(path, words, *arguments)
+
+        return show
+
+    for kind in shown:
+        monkeypatch.setattr(w, kind, noted(kind, getattr(w, kind)))
+    buttons_of("mandelbulb", monkeypatch, **{"coloring.by": "thickness"})
+    for scene in ("cut_geode", "stereo_volume"):
+        buttons_of(scene, monkeypatch)
+    assert "coloring.along" in shown["segments"]
+    assert {path for path, count in shown["choose"].items() if count <= 2} == set()
