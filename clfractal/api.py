@@ -46,6 +46,7 @@ def render(
     samples: int | None = None,
     region: tuple[int, int, int, int] | None = None,
     channels: Sequence[str] | None = None,
+    quality: str | None = None,
 ) -> Film:
     """Renders a scene into memory; a stereo scene's two pictures are combined by its mode (see `render_pair`).
 
@@ -58,6 +59,8 @@ def render(
         samples: rays per pixel; None: the scene's.
         region: x, y, width, height of the part to render, pixels from the top left; None: all of it.
         channels: names of the channels; None: the scene's `output.channels`.
+        quality: `draft`, `good`, `final` or `print`: samples, noise and detail together, in the place of the scene's;
+            `samples` wins.
 
     Returns:
         A film: `film["R"]`, `film["Z"]`, ... are float32 arrays of shape (height, width) of the region;
@@ -72,7 +75,13 @@ def render(
 
     with Engine(device) as engine:
         return engine.render(
-            scene, progress, precision=precision, samples=samples, region=region, channels=channels
+            scene,
+            progress,
+            precision=precision,
+            samples=samples,
+            region=region,
+            channels=channels,
+            quality=quality,
         )
 
 
@@ -84,6 +93,7 @@ def render_pair(
     precision: str | None = None,
     samples: int | None = None,
     channels: Sequence[str] | None = None,
+    quality: str | None = None,
 ) -> tuple[Film, Film]:
     """Renders both eyes' pictures of a stereo scene into memory, for any `stereo.mode`.
 
@@ -95,7 +105,9 @@ def render_pair(
     from clfractal.work.engine import Engine
 
     with Engine(device) as engine:
-        return engine.render_pair(scene, progress, precision=precision, samples=samples, channels=channels)
+        return engine.render_pair(
+            scene, progress, precision=precision, samples=samples, channels=channels, quality=quality
+        )
 
 
 def probe(

@@ -22,7 +22,15 @@ OWNERS = {
     "rich": {"commands/progress.py"},
     "typer": {
         f"commands/{name}.py"
-        for name in ("app", "options", "list_facts", "list_grids", "list_pictures", "list_window")
+        for name in (
+            "app",
+            "options",
+            "list_facts",
+            "list_grids",
+            "list_pictures",
+            "list_scenes",
+            "list_window",
+        )
     },
     "cmap": {"scene/palette.py"},
     "skimage": {"voxels/mesh.py"},

@@ -65,6 +65,25 @@ def test_scenes_pictures_and_a_sheet(clf: InProcess) -> None:
     assert "stereo" not in Path("out/scene-01.yaml").read_text()
 
 
+def test_a_sheet_with_the_scenes_beside_it(clf: InProcess) -> None:
+    Path("there").mkdir()
+    ended = clf("vary", "scene.yaml", "-n", "3", "--size", "32x18", "-o", "there/sheet.png")
+    assert ended.status == 0, ended
+    assert names("there") == ["scene-01.yaml", "scene-02.yaml", "scene-03.yaml", "sheet.png"]
+    sheet = pixels("there/sheet.png")
+    assert sheet.shape == (18 + 16, 3 * 40 + 8, 3)
+    again = clf("vary", "scene.yaml", "-n", "3", "--size", "32x18", "-o", "pictures")
+    assert again.status == 0
+    for number in (1, 2, 3):
+        name = f"scene-0{number}"
+        assert Path(f"there/{name}.yaml").read_text() == Path(f"pictures/{name}.yaml").read_text()
+        # Below its number in the sheet each picture is the one that a folder holds.
+        shown = sheet[8 + 14 : 8 + 18, 8 + 40 * (number - 1) : 8 + 40 * (number - 1) + 32]
+        np.testing.assert_array_equal(shown, pixels(f"pictures/{name}.png")[14:])
+    ended = clf("vary", "scene.yaml", "-n", "1", "-o", "there/sheet.png")
+    assert ended.is_one_line(2, "there/sheet.png: exists already and is not replaced")
+
+
 def test_the_same_options_give_the_same_files(clf: InProcess) -> None:
     for folder in ("a", "b"):
         assert clf("vary", "scene.yaml", *SMALL, "-o", folder, "--quiet", "--seed", "4").err == ""
@@ -141,8 +160,10 @@ REFUSED = {
     ("--size", "big"): "--size: must be WIDTHxHEIGHT",
     ("--set", "camera.fow=3"): "--set camera.fow: unknown key 'fow'; did you mean 'fov'?",
     ("-o", "none/there"): "none/there: cannot be made: No such file or directory",
-    ("-o", "scene.yaml"): "scene.yaml: cannot be made: File exists",
-    ("--sheet", "sheet.jpg"): "sheet.jpg: unknown extension '.jpg'; known: .png",
+    ("-o", "scene.yaml"): "scene.yaml: exists already and is not replaced",
+    ("-o", "none/sheet.png"): "none/sheet.png: ",
+    ("-o", "sheet.gif"): "sheet.gif: unknown extension '.gif'",
+    ("--sheet", "sheet.gif"): "sheet.gif: unknown extension '.gif'",
     ("--sheet", "scene-01.png"): "scene-01.png: would be written twice",
     ("--device", "abacus"): "abacus",
 }

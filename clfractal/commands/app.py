@@ -8,19 +8,22 @@ from typing import Annotated
 import typer
 
 import clfractal
-from clfractal.commands import list_facts, list_grids, list_pictures, list_window
+from clfractal.commands import list_facts, list_grids, list_pictures, list_scenes, list_window
 from clfractal.commands.options import app
 from clfractal.commands.shell import Shell
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_INTERRUPTED
 
-__all__ = ["app", "call", "list_facts", "list_grids", "list_pictures", "list_window"]
+__all__ = ["app", "call", "list_facts", "list_grids", "list_pictures", "list_scenes", "list_window"]
 
 # As `clfractal --help` lists them; a command that is missing here comes last.
 _ORDER = (
     "render",
     "view",
-    "slices",
+    "watch",
+    "scenes",
+    "new",
     "vary",
+    "slices",
     "check",
     "formulas",
     "devices",

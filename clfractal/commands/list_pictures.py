@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from clfractal.commands.options import DeviceOption, Overrides, Quiet, Scene, Verbose, Work, app, shell_of
+from clfractal.commands.options import (
+    DeviceOption,
+    Overrides,
+    Quality,
+    Quiet,
+    Scene,
+    Verbose,
+    Work,
+    app,
+    shell_of,
+)
 
 
 @app.command()
@@ -41,6 +51,7 @@ def render(
         ),
     ] = None,
     samples: Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")] = None,
+    quality: Quality = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the work kept in OUTPUT.partial.")
     ] = False,
@@ -64,6 +75,7 @@ def render(
         samples=samples,
         resume=resume,
         stats=stats,
+        quality=quality,
     )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
     return lambda: render_scene(order, shell)
@@ -127,9 +139,15 @@ def vary(
     context: typer.Context,
     scene: Scene,
     output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="FOLDER", help="Where the files go.  [default: here]")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="A picture, a sheet of all, with the scenes beside it; or a folder, for scenes each with its"
+            " picture.  [default: here]",
+        ),
     ] = Path(),
-    count: Annotated[int, typer.Option("--count", help="Number of variations.")] = 12,
+    count: Annotated[int, typer.Option("-n", "--count", help="Number of variations.")] = 12,
     strength: Annotated[str, typer.Option("--strength", help="slight, medium or heavy.")] = "medium",
     seed: Annotated[int, typer.Option("--seed", help="Number that selects the variations.")] = 0,
     only: Annotated[
@@ -139,7 +157,7 @@ def vary(
         ),
     ] = None,
     sheet: Annotated[
-        Path | None, typer.Option("--sheet", metavar="FILE.png", help="Also write one picture of all.")
+        Path | None, typer.Option("--sheet", metavar="FILE", help="Also write one picture of all.")
     ] = None,
     size: Annotated[
         str | None,
@@ -152,7 +170,7 @@ def vary(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Work:
-    """Write variations of a scene to choose from, each with a small picture."""
+    """Write variations of a scene to choose from, with a sheet of small pictures or each with its own."""
     from clfractal.commands.order import Order
     from clfractal.commands.vary import Choice, vary_scene
 

@@ -51,6 +51,14 @@ Precision = Annotated[
     str | None,
     typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
 ]
+Quality = Annotated[
+    str | None,
+    typer.Option(
+        "--quality",
+        metavar="PRESET",
+        help="draft, good, final or print: samples, noise and detail together; other options win.",
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Show more: statistics, causes of errors, drivers' messages.")

@@ -31,9 +31,10 @@ class Order:
     """Where files that the scene names are looked for; None: beside it."""
     streamed: Path | None = None
     """The output that stands for standard output."""
+    quality: str | None = None
 
 
-OF_RENDER = {"region": "--region", "precision": "--precision"}
+OF_RENDER = {"region": "--region", "precision": "--precision", "quality": "--quality"}
 """Arguments of Python functions, and the options that give them."""
 
 

@@ -57,7 +57,7 @@ def render_files(order: Order, shell: Shell) -> None:
     region = _region(order.region)
     shell.mute_drivers()
     scene = ordered_scene(order)
-    outputs = _outputs(order, scene, region)
+    outputs = checked_outputs(order, scene, region)
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands.unfinished import Unfinished
     from clfractal.pictures.outputs import output_files
@@ -121,7 +121,7 @@ def ordered_scene(order: Order) -> Scene:
         given["renderer.precision"] = ("--precision", json.dumps(order.precision))
     overrides = [*order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
-        return load_scene(Path(order.scene), overrides=overrides, folder=order.folder)
+        scene = load_scene(Path(order.scene), overrides=overrides, folder=order.folder)
     except ClfractalError as error:
         where = error.where
         key = (where.file or "").removeprefix("--set ")
@@ -130,6 +130,14 @@ def ordered_scene(order: Order) -> Scene:
         if key == where.file or key not in given:
             raise
         raise type(error)(error.message, replace(where, file=given[key][0])) from error
+    if order.quality is None:
+        return scene
+    from clfractal.work.quality import with_quality
+
+    # What is said in so many words wins over the preset.
+    kept = [text.partition("=")[0].strip() for text in overrides]
+    with naming_options():
+        return with_quality(scene, order.quality, kept=kept)
 
 
 def _beside(order: Order) -> Path:
@@ -159,8 +167,14 @@ def numbers_of(option: str, text: str, separator: str, count: int, form: str) ->
     raise SceneError(f"must be {form}; got {text[:60]!r}", Where(option))
 
 
-def _outputs(order: Order, scene: Scene, region: tuple[int, int, int, int] | None) -> tuple[Path, ...]:
-    """The files to write, all of them checked before anything is rendered."""
+def checked_outputs(
+    order: Order, scene: Scene, region: tuple[int, int, int, int] | None = None
+) -> tuple[Path, ...]:
+    """The files to write, all of them checked before anything is rendered.
+
+    Raises:
+        FileError: one cannot be written, or would replace a file that is read.
+    """
     from clfractal.commands.unfinished import possible_paths
     from clfractal.pictures.formats import Content
     from clfractal.pictures.formats import check_output as check_picture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -41,27 +40,45 @@ Pixels: TypeAlias = npt.NDArray[np.uint8]
 
 MOST_VARIATIONS = 999
 _CHANNELS = ("R", "G", "B", "A")
-# Pixels along a picture's longer side, if no size is given; and between the pictures of a sheet.
+# Pixels along a picture's longer side, if no size is given.
 _LONGER_SIDE = 320
-_GAP = 8
 # So many variations may show nothing before the search for others ends, for each one that is wanted.
 _EMPTY_PER_WANTED = 6
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The options of `clfractal vary` beside those of a render; `order.size` is that of the small pictures."""
+    """The options of `clfractal vary` beside those of a render; `order.size` is that of the small pictures.
 
-    folder: Path = Path()
+    `output` is a folder for scenes and their pictures; or a picture, a sheet of all of them, with the scenes beside it.
+    """
+
+    output: Path = Path()
     count: int = 12
     strength: str = "medium"
     seed: int = 0
     sheet: Path | None = None
     only: str | None = None
 
+    @property
+    def is_sheet(self) -> bool:
+        """Whether the output is a picture of all variations."""
+        return bool(self.output.suffix) and not self.output.is_dir()
+
+    @property
+    def folder(self) -> Path:
+        """Where the scenes go."""
+        return self.output.parent if self.is_sheet else self.output
+
+    @property
+    def sheets(self) -> tuple[Path, ...]:
+        """The pictures of all variations that are wanted."""
+        wanted = (self.output if self.is_sheet else None, self.sheet)
+        return tuple(path for path in wanted if path is not None)
+
 
 def vary_scene(order: Order, choice: Choice, shell: Shell) -> None:
-    """Writes variations of a scene to NAME-01.yaml, NAME-02.yaml, ..., each with a picture of the same name.
+    """Writes variations of a scene to NAME-01.yaml, NAME-02.yaml, ...: with a sheet of all, or a picture each.
 
     Variations whose picture would show nothing are left out. All files appear complete or not at all; files that exist are
     never replaced. Pairs that are complete stay if a later one fails.
@@ -69,7 +86,7 @@ def vary_scene(order: Order, choice: Choice, shell: Shell) -> None:
     Raises:
         ClfractalError: anything wrong with the input, the files or the device; no variation shows anything.
     """
-    refuse_stream(choice.folder, "variations are several files; name a folder")
+    refuse_stream(choice.output, "variations are several files; name a folder, or a file for the sheet")
     refuse_stream(choice.sheet, "the sheet needs a file")
     with piped(shell, order.scene, ()) as files:
         _vary(replace(order, scene=files.source, folder=files.folder), choice, shell)
@@ -97,6 +114,7 @@ def _vary(order: Order, choice: Choice, shell: Shell) -> None:
     drawn = chain([first], drawn)
     _check_files(scene, choice, names)
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
+    from clfractal.pictures.sheet import sheet_of
     from clfractal.work.engine import Engine
 
     pictures: list[Pixels] = []
@@ -107,17 +125,19 @@ def _vary(order: Order, choice: Choice, shell: Shell) -> None:
         for name, variation in zip(names, _worthwhile(scene, drawn, choice.count, engine), strict=False):
             film = engine.render(preview_scene(variation.scene, *size), channels=_CHANNELS)
             text = write_document(to_folder.plain(variation.scene))
-            # The picture holds the variation itself, rather than what made the picture small and quick.
-            film.tell("scene", text)
-            film.save(choice.folder / f"{name}.png")
+            if not choice.is_sheet:
+                # The picture holds the variation itself, rather than what made the picture small and quick.
+                film.tell("scene", text)
+                film.save(choice.folder / f"{name}.png")
             path = choice.folder / f"{name}.yaml"
             _write(path, (_heading(order, choice, len(pictures) + 1, variation) + text).encode())
             pictures.append(film.to_rgb8())
             shell.say(f"{path}: {variation.remark}")
     if not pictures:
         raise SceneError("no variation shows anything", Where(order.scene))
-    if choice.sheet is not None:
-        _write_sheet(choice.sheet, pictures)
+    for sheet in choice.sheets:
+        sheet_of(pictures, [str(number) for number in range(1, len(pictures) + 1)]).save(sheet)
+        shell.say(f"{sheet}: {len(pictures)} pictures, each with its number")
     shell.state = lambda: "clfractal: interrupted"
     few = f" (no more of {choice.count} show anything)" if len(pictures) < choice.count else ""
     shell.say(f"{len(pictures)} variations{few}: {time.perf_counter() - begun:.2f} s")
@@ -145,20 +165,23 @@ def _small(scene: Scene) -> tuple[int, int]:
 
 def _check_files(scene: Scene, choice: Choice, names: Sequence[str]) -> None:
     """Makes the folder if it is missing, and refuses files that exist, before anything is rendered."""
-    if choice.sheet is not None:
-        check_output(choice.sheet, (".png",))
-    files = [choice.folder / f"{name}{suffix}" for name in names for suffix in (".yaml", ".png")]
-    for file in (*files, *([choice.sheet] if choice.sheet is not None else ())):
+    from clfractal.pictures.formats import check_output as check_picture
+
+    suffixes = (".yaml",) if choice.is_sheet else (".yaml", ".png")
+    files = [choice.folder / f"{name}{suffix}" for name in names for suffix in suffixes]
+    for file in (*choice.sheets, *files):
         if file.exists() or file.is_symlink():
             raise FileError(
                 "exists already and is not replaced; choose another folder with -o", Where(str(file))
             )
+    for sheet in choice.sheets:
+        check_picture(sheet)
     try:
         choice.folder.mkdir(exist_ok=True)
     except OSError as error:
         raise file_error(choice.folder, "cannot be made", error) from error
     check_output(files[0], (".yaml",))
-    refuse_overwriting([*files, *([choice.sheet] if choice.sheet is not None else ())], scene.files)
+    refuse_overwriting([*files, *choice.sheets], scene.files)
 
 
 def _worthwhile(scene: Scene, drawn: Iterator[Variation], count: int, engine: Engine) -> Iterator[Variation]:
@@ -237,23 +260,3 @@ def _plainest() -> Scene:
 def _write(path: Path, data: bytes) -> None:
     with atomic_writer(path) as beside:
         beside.write_bytes(data)
-
-
-def _write_sheet(path: Path, pictures: Sequence[Pixels]) -> None:
-    """One picture with all small ones, in rows of at most four, each with its number."""
-    from PIL import Image, ImageDraw
-
-    across = min(4, len(pictures))
-    down = -(-len(pictures) // across)
-    height, width = pictures[0].shape[:2]
-    size = (across * (width + _GAP) + _GAP, down * (height + _GAP) + _GAP)
-    sheet = Image.new("RGB", size, (24, 24, 24))
-    draw = ImageDraw.Draw(sheet)
-    for number, picture in enumerate(pictures):
-        x = _GAP + number % across * (width + _GAP)
-        y = _GAP + number // across * (height + _GAP)
-        sheet.paste(Image.fromarray(picture), (x, y))
-        draw.text((x + 5, y + 3), str(number + 1), fill="white", stroke_width=2, stroke_fill="black")
-    data = io.BytesIO()
-    sheet.save(data, format="PNG")
-    _write(path, data.getvalue())

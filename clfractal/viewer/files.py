@@ -12,13 +12,13 @@ from clfractal import resources
 from clfractal.errors import ClfractalError, SceneError
 from clfractal.files.atomic import check_output
 from clfractal.files.png import SCENE_KEY, write_png_pixels
+from clfractal.files.watching import Watched
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.autosave import Autosave, Recovered
 from clfractal.viewer.options import Options
 from clfractal.viewer.saving import save_scene, scene_text
 from clfractal.viewer.sources import SceneSource, is_protected, open_source, suggested_name
-from clfractal.viewer.watching import Watched
 
 if TYPE_CHECKING:
     from clfractal.viewer.app import Viewer

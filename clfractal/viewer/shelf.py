@@ -1,12 +1,7 @@
-"""Scene files with small pictures, as a gallery shows them. A thread reads scenes, and pictures kept on the disk.
-
-Kept pictures are optional, as all of the cache is: without them they are rendered again.
-"""
+"""Scene files with small pictures, as a gallery shows them. A thread reads scenes, and pictures kept on the disk."""
 
 from __future__ import annotations
 
-import os
-import re
 from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -15,25 +10,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-import clfractal
-from clfractal.device import cache
 from clfractal.errors import ClfractalError
-from clfractal.files.png import read_png_pixels, write_png_pixels
-from clfractal.scene.load import dump_scene, load_scene, read_text
+from clfractal.scene.load import load_scene, read_text
 from clfractal.scene.model import Scene
-from clfractal.work.variations import small_scene
-
-Pixels = npt.NDArray[np.uint8]
-
-SIZE = (480, 270)
-"""Pixels of a picture: it is shown at half that size, or on a screen of twice the resolution."""
-SAMPLES = 4
-"""Of a pixel."""
-_TAKES = re.compile(r"Takes (about|some)? ?[^.]*\d+ x \d+[^.]*\.")
-MOST_KEPT = 500
-"""Pictures on the disk; the oldest go first. One has some 250 KB."""
+from clfractal.work import thumbnails
+from clfractal.work.thumbnails import Pixels
 
 
 @dataclass(slots=True, eq=False)
@@ -92,7 +74,7 @@ class Shelf:
     def keep(self, entry: Entry) -> None:
         """Keeps the picture of a scene on the disk."""
         if entry.key and entry.pixels is not None:
-            self._pool.submit(_store, entry.key, entry.pixels)
+            self._pool.submit(thumbnails.store, entry.key, entry.pixels)
 
     @property
     def read(self) -> bool:
@@ -127,16 +109,12 @@ class Shelf:
         self.woken()
 
     def _find(self, entry: Entry, scene: Scene) -> None:
-        key = cache.key_of("thumbnail", dump_scene(scene), clfractal.__version__, self.device, SIZE)
-        entry.pixels = _load(key)
+        key = thumbnails.key_of(scene, self.device)
+        found = thumbnails.load(key)
+        if found is not None:
+            opaque = np.full((*found.shape[:2], 1), 255, np.uint8)
+            entry.pixels = np.concatenate([found, opaque], axis=-1)
         entry.key = key
-
-
-def shown_scene(scene: Scene) -> Scene:
-    """The scene as its small picture shows it: with few samples, and grids that fill at once."""
-    small = small_scene(scene, *SIZE)
-    updates = {"renderer": small.renderer.model_copy(update={"samples": SAMPLES})}
-    return small.model_copy(update=updates)
 
 
 def kind_of(scene: Scene) -> str:
@@ -150,55 +128,13 @@ def kind_of(scene: Scene) -> str:
     return "cut" if "cut_plane" in kinds or scene.cut_planes else "surface"
 
 
-def words_of(text: str) -> tuple[str, str]:
-    """The title and the description that a scene file begins with: its first lines of comment.
-
-    How long the picture takes at its full size is left out.
-    """
-    lines = []
-    for line in text.splitlines():
-        if not line.startswith("#"):
-            break
-        lines.append(line.lstrip("#").strip())
-    about = " ".join(lines[1:]).replace("`", "")
-    return (lines[0] if lines else "", _TAKES.sub("", about).strip())
-
-
 def _read_words(entry: Entry) -> None:
     with suppress(ClfractalError):
-        title, entry.about = words_of(read_text(entry.path))
+        title, entry.about = thumbnails.words_of(read_text(entry.path))
         entry.title = title or entry.title
 
 
 def _read_scene(entry: Entry) -> None:
     scene = load_scene(entry.path)
     entry.kind = kind_of(scene)
-    entry.scene = shown_scene(scene)
-
-
-def _place(key: str) -> Path:
-    return cache.folder() / "thumbnails" / f"{key}.png"
-
-
-def _load(key: str) -> Pixels | None:
-    path = _place(key)
-    try:
-        found = read_png_pixels(path)
-    except ClfractalError:
-        return None
-    if found.shape != (SIZE[1], SIZE[0], 3):
-        return None
-    with suppress(OSError):
-        os.utime(path)  # the time of last use decides what goes first
-    opaque = np.full((*found.shape[:2], 1), 255, np.uint8)
-    return np.concatenate([found, opaque], axis=-1)
-
-
-def _store(key: str, pixels: Pixels) -> None:
-    path = _place(key)
-    with suppress(OSError, ClfractalError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_png_pixels(path, np.ascontiguousarray(pixels[..., :3]))
-        kept = sorted(path.parent.glob("*.png"), key=lambda each: each.stat().st_mtime)
-        for each in kept[: max(len(kept) - MOST_KEPT, 0)]:
-            each.unlink(missing_ok=True)
+    entry.scene = thumbnails.shown_scene(scene)

@@ -27,6 +27,7 @@ from clfractal.work.local import LocalExecutor
 from clfractal.work.look import Look
 from clfractal.work.prepare import prepare
 from clfractal.work.probing import checked_pixel, probed
+from clfractal.work.quality import with_quality
 from clfractal.work.refine import Refinement, refined
 from clfractal.work.run import ProgressCallback, run
 from clfractal.work.settle import is_settled, settled
@@ -114,6 +115,7 @@ class Engine:
         samples: int | None = None,
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
+        quality: str | None = None,
     ) -> Job:
         """The job of a scene's picture: see `prepare.prepare`; what it leaves to be measured is measured first.
 
@@ -122,6 +124,8 @@ class Engine:
             DeviceError, KernelBuildError: the quick look that this takes failed.
         """
         loaded = as_scene(scene)
+        if quality is not None:
+            loaded = with_quality(loaded, quality)
         decide = partial(
             prepare,
             device=self.device,
@@ -144,6 +148,7 @@ class Engine:
         samples: int | None = None,
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
+        quality: str | None = None,
         token: CancelToken | None = None,
     ) -> Film:
         """Renders a scene into memory; arguments, result and errors as for `clfractal.render`.
@@ -155,7 +160,14 @@ class Engine:
         arguments.function("progress", progress)
         _check_token(token)
         with self._alone():
-            job = self.prepare(scene, precision=precision, samples=samples, region=region, channels=channels)
+            job = self.prepare(
+                scene,
+                precision=precision,
+                samples=samples,
+                region=region,
+                channels=channels,
+                quality=quality,
+            )
             if job.stays_apart:
                 assert job.scene.stereo is not None
                 raise SceneError(
@@ -174,6 +186,7 @@ class Engine:
         precision: str | None = None,
         samples: int | None = None,
         channels: Sequence[str] | None = None,
+        quality: str | None = None,
         token: CancelToken | None = None,
     ) -> tuple[Film, Film]:
         """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
@@ -188,7 +201,9 @@ class Engine:
                 # The other modes may need only parts of a pair.
                 stereo = loaded.stereo.model_copy(update={"mode": "pair"})
                 loaded = loaded.model_copy(update={"stereo": stereo})
-            job = self.prepare(loaded, precision=precision, samples=samples, channels=channels)
+            job = self.prepare(
+                loaded, precision=precision, samples=samples, channels=channels, quality=quality
+            )
             films = JobFilms(job)
             state = run(job, films.films, self.executor, progress=progress, token=token)
             eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start)))
@@ -208,6 +223,7 @@ class Engine:
         samples: int | None = None,
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
+        quality: str | None = None,
         token: CancelToken | None = None,
     ) -> Refinement:
         """Films of a scene from coarse to finished: every 8th, 4th and 2nd pixel, then all with more and more samples.
@@ -224,7 +240,12 @@ class Engine:
         def films() -> Generator[Film]:
             with self._alone():
                 job = self.prepare(
-                    scene, precision=precision, samples=samples, region=region, channels=channels
+                    scene,
+                    precision=precision,
+                    samples=samples,
+                    region=region,
+                    channels=channels,
+                    quality=quality,
                 )
                 yield from refined(job, self.executor, token)
 

@@ -26,8 +26,9 @@ from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.background import Thumbnail
 from clfractal.viewer.panels import gallery
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.shelf import SIZE, Entry, Shelf, kind_of, shown_scene, words_of
+from clfractal.viewer.shelf import Entry, Shelf, kind_of
 from clfractal.work.local import LocalExecutor
+from clfractal.work.thumbnails import SIZE, shown_scene, words_of
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, headless, make_ui
 
@@ -161,7 +162,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 @given(data=st.data())
 def test_a_damaged_picture_is_ignored(kept: bytes, data: st.DataObject) -> None:
     """Whatever byte is another, or wherever the file ends: no picture, or (in a comment) the right one."""
-    from clfractal.viewer import shelf as module
+    from clfractal.work import thumbnails as module
 
     place = data.draw(st.integers(0, len(kept) - 1))
     if data.draw(st.booleans()):
@@ -171,26 +172,26 @@ def test_a_damaged_picture_is_ignored(kept: bytes, data: st.DataObject) -> None:
     path = module._place("key")
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(damaged)
-    found = module._load("key")
-    assert found is None or np.array_equal(found, pixels())
+    found = module.load("key")
+    assert found is None or np.array_equal(found, pixels()[..., :3])
 
 
 def test_a_picture_of_another_size_is_ignored() -> None:
     from clfractal.files.png import write_png_pixels
-    from clfractal.viewer import shelf as module
+    from clfractal.work import thumbnails as module
 
     path = module._place("key")
     path.parent.mkdir(parents=True)
     write_png_pixels(path, np.zeros((3, 5, 3), np.uint8))
-    assert module._load("key") is None
+    assert module.load("key") is None
 
 
 def test_the_oldest_pictures_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    from clfractal.viewer import shelf as module
+    from clfractal.work import thumbnails as module
 
     monkeypatch.setattr(module, "MOST_KEPT", 2)
     for number in range(4):
-        module._store(f"{number}", pixels(number))
+        module.store(f"{number}", pixels(number))
         stamp = 1_000_000 + number
         os.utime(module._place(f"{number}"), (stamp, stamp))
     assert sorted(path.stem for path in module._place("0").parent.glob("*.png")) == ["2", "3"]
@@ -199,14 +200,14 @@ def test_the_oldest_pictures_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_a_cache_folder_pictures_are_only_not_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from clfractal.viewer import shelf as module
+    from clfractal.work import thumbnails as module
 
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "gone"))
     assert not list(cache.folder().iterdir())
     cache.folder().rmdir()
     cache.folder().touch()
-    module._store("key", pixels())
-    assert module._load("key") is None
+    module.store("key", pixels())
+    assert module.load("key") is None
 
 
 # The panel
@@ -353,7 +354,7 @@ def test_the_gallery_fits_into_every_window(
 
 
 def test_the_picture_of_a_scene_is_the_scene_at_its_size(device: Device) -> None:
-    from clfractal.viewer.shelf import SAMPLES
+    from clfractal.work.thumbnails import SAMPLES
 
     small = shown_scene(load_scene(SCENE))
     task = Thumbnail(lambda: small, SIZE, SAMPLES)

@@ -12,7 +12,8 @@ from clfractal import resources
 from clfractal.viewer.panels import cards, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.shelf import SAMPLES, SIZE, Entry, Shelf
+from clfractal.viewer.shelf import Entry, Shelf
+from clfractal.work.thumbnails import SAMPLES, SIZE
 
 KINDS = {"all": "All", "surface": "Surfaces", "volume": "Volumes", "cut": "Cut planes", "stereo": "Stereo"}
 """What the gallery can be narrowed to, and its words."""

@@ -1,4 +1,4 @@
-"""Looks now and then whether files have changed on the disk: the scene's own and the formula files that it names."""
+"""Looks now and then whether files have changed on the disk, such as a scene's own and the formula files that it names."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Watched:
         self._states = {path: self._states[path] if path in self._states else _state(path) for path in paths}
 
     def accept(self) -> None:
-        """Takes the files as they are: what has changed up to now is not told (the window has written them)."""
+        """Takes the files as they are: what has changed up to now is not told (the program itself has written them)."""
         self._states = {path: _state(path) or before for path, before in self._states.items()}
 
     def changed(self) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from clfractal.viewer.watching import INTERVAL, Watched
+from clfractal.files.watching import INTERVAL, Watched
 
 
 class Clock:

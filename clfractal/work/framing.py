@@ -1,0 +1,281 @@
+"""A first scene of a formula: how far to iterate it, from where to see all of it, and colours, all found by small looks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.errors import SceneError, Where
+from clfractal.optics.view import scene_view
+from clfractal.pictures.film import Film
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.palettes import PALETTES
+from clfractal.work.engine import Engine
+from clfractal.work.look import points_of_depth
+
+Floats = npt.NDArray[np.float64]
+
+FOV = 40.0
+"""Vertical angle of view, degrees."""
+SIZE = (1280, 720)
+"""Pixels of the finished picture."""
+
+# Pixels of a look, which has the proportions of the picture.
+_LOOK = (192, 108)
+# From where the set is looked at: azimuth and elevation, degrees.
+_PLACES = ((35, 25), (-40, 20), (10, 35), (75, 15), (150, 30), (-100, 30), (25, 60))
+# Part of the picture's height or width that the set fills.
+_FILLED = 0.86
+# Points of the outline that may lie outside, on each side: fine needles do not count.
+_STRAY = 0.004
+# Applications that are tried; the largest angle between the normals of neighbouring pixels that still is a form and not
+# noise (the median, degrees); and the least part of the picture that the set has to cover: what is less is dust.
+_COUNTS = (3, 4, 5, 6, 7, 8, 10, 12)
+_ROUGHEST, _LEAST_COVERED = 18.0, 0.015
+# Lightness that the lightest parts get.
+_BRIGHT = 0.75
+_NORMALS = ("A", "Z", "N.X", "N.Y", "N.Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Framing:
+    """What was found, scene units and degrees, in numbers that are short to write.
+
+    Attributes:
+        iterations: applications of the formula.
+        target: the middle of what is seen.
+        azimuth, elevation, distance: of the camera, as `camera.orbit`.
+        lights: directions of a warm light and of a cool one, from behind the camera and from the side.
+        palette: a name.
+        scale, offset: of the palette, over the values that a trap at the origin has.
+        exposure: stops.
+    """
+
+    iterations: int
+    target: tuple[float, float, float]
+    azimuth: float
+    elevation: float
+    distance: float
+    lights: tuple[tuple[float, float, float], tuple[float, float, float]]
+    palette: str
+    scale: float
+    offset: float
+    exposure: float
+
+    def sections(self) -> dict[str, Any]:
+        """The camera, lights, colours and exposure as plain sections of a scene."""
+        warm, cool = (list(direction) for direction in self.lights)
+        return {
+            "image": {"width": SIZE[0], "height": SIZE[1]},
+            "camera": {
+                "orbit": {"azimuth": self.azimuth, "elevation": self.elevation, "distance": self.distance},
+                "target": list(self.target),
+                "fov": FOV,
+            },
+            "lights": [
+                {"direction": warm, "color": "#ffe2c4", "intensity": 1.6},
+                {"direction": cool, "color": "#8fb4ff", "intensity": 0.6, "shadow": False},
+            ],
+            "material": {"ambient": 0.12, "diffuse": 0.9, "specular": 0.25, "shininess": 40},
+            "coloring": {
+                "by": "trap",
+                "palette": self.palette,
+                "scale": self.scale,
+                "offset": self.offset,
+                "repeat": False,
+            },
+            "renderer": {"samples": 16, "ambient_occlusion": {"rays": 4}},
+            "background": {"top": "#2a3344", "bottom": "#0c0e13"},
+            "output": {"exposure": self.exposure},
+        }
+
+
+def framed(formula: Mapping[str, Any], folder: Path, engine: Engine, *, name: str = "") -> Framing:
+    """Looks at a formula and chooses how it is shown.
+
+    Args:
+        formula: a scene's `formula` section without `iterations`.
+        folder: where formula files are looked for.
+        name: chooses the palette: equal names get equal ones.
+
+    Raises:
+        SceneError, FormulaError, FileError: the formula is wrong, or nothing of it is seen.
+        DeviceError, KernelBuildError: a look failed.
+    """
+    finder = _Finder(formula, folder, engine)
+    iterations = finder.iterations()
+    best: tuple[float, dict[str, Any], Floats] | None = None
+    for camera, points in finder.cameras(iterations):
+        score = finder.interest(iterations, camera)
+        if best is None or score > best[0]:
+            best = (score, camera, points)
+    if best is None:
+        raise SceneError("nothing of it is seen within its bounds", Where("formula"))
+    camera = best[1]
+    orbit = camera["orbit"]
+    palettes = [each for each, it in PALETTES.items() if not it.periodic]
+    scale, offset = finder.trap_range(iterations, camera)
+    found = Framing(
+        iterations,
+        tuple(camera["target"]),
+        orbit["azimuth"],
+        orbit["elevation"],
+        orbit["distance"],
+        _lights(finder.scene(iterations, camera)),
+        palettes[sum(map(ord, name)) % len(palettes)],
+        scale,
+        offset,
+        0.0,
+    )
+    return finder.exposed(found)
+
+
+class _Finder:
+    """Looks at one formula."""
+
+    def __init__(self, formula: Mapping[str, Any], folder: Path, engine: Engine) -> None:
+        self.formula, self.folder, self.engine = formula, folder, engine
+        start = load_scene({"version": 1, "formula": dict(formula), "camera": {}}, folder=folder)
+        self.center, self.radius = start.bounds
+
+    def scene(self, iterations: int, camera: Mapping[str, Any], **sections: Any) -> Scene:
+        """A scene of the size of a look."""
+        data = {
+            "version": 1,
+            "formula": {**self.formula, "iterations": iterations},
+            "camera": dict(camera),
+            **sections,
+            "image": {"width": _LOOK[0], "height": _LOOK[1]},
+        }
+        return load_scene(data, folder=self.folder)
+
+    def look(self, scene: Scene, *channels: str) -> Film:
+        return self.engine.render(scene, samples=1, channels=channels)
+
+    def iterations(self) -> int:
+        """The most applications of those that are tried that leave a form: neither noise nor dust."""
+        camera = self._around(*_PLACES[0])
+        found = _COUNTS[0]
+        for count in _COUNTS:
+            film = self.look(self.scene(count, camera), *_NORMALS)
+            if (film["A"] > 0.5).mean() < _LEAST_COVERED or _roughness(film) > _ROUGHEST:
+                break
+            found = count
+        return found
+
+    def cameras(self, iterations: int) -> Iterator[tuple[dict[str, Any], Floats]]:
+        """Cameras from several sides, each with the points that it sees, shape (n, 3)."""
+        for azimuth, elevation in _PLACES:
+            camera = self._around(azimuth, elevation)
+            # Once more from nearby, where the outline is known better.
+            for _ in range(2):
+                scene = self.scene(iterations, camera)
+                film = self.look(scene, "Z")
+                points = points_of_depth(scene_view(scene), film["Z"], film.display)
+                if len(points) < 20:
+                    break
+                camera = _filled(camera, scene, points)
+            else:
+                yield camera, points
+
+    def interest(self, iterations: int, camera: Mapping[str, Any]) -> float:
+        """How much there is to see: light and shade, and how much of the picture the set covers."""
+        scene = self.scene(iterations, camera)
+        warm = {"direction": list(_lights(scene)[0])}
+        film = self.look(self.scene(iterations, camera, lights=[warm]), "R", "G", "B", "A")
+        covered = film["A"] > 0.5
+        if covered.mean() < 0.02:
+            return 0.0
+        light = film.to_rgb8().astype(float).mean(axis=-1)
+        inner = np.abs(np.diff(light, axis=1))[covered[:, 1:] & covered[:, :-1]]
+        part = min(1.0, float(covered.mean()) / 0.4)
+        return float(light[covered].std() + inner.mean()) * math.sqrt(part)
+
+    def trap_range(self, iterations: int, camera: Mapping[str, Any]) -> tuple[float, float]:
+        """Scale and offset of a palette that goes over the values that are seen."""
+        widest = 2 * self.radius
+        flat = {
+            "lights": [{"color": [1, 1, 1]}],
+            "material": {"ambient": 1, "diffuse": 0, "specular": 0},
+            "coloring": {"by": "trap", "palette": ["#000", "#fff"], "scale": 1 / widest, "repeat": False},
+        }
+        film = self.look(self.scene(iterations, camera, **flat), "R", "A")
+        values = film["R"][film["A"] > 0.5] * widest
+        low, high = np.percentile(values, (3, 97))
+        scale = 1 / max(high - low, 1e-3 * widest)
+        return _short(scale), _short(-low * scale)
+
+    def exposed(self, found: Framing) -> Framing:
+        """With the exposure that makes the lightest parts light."""
+        camera = found.sections()["camera"]
+        sections = {
+            name: section
+            for name, section in found.sections().items()
+            if name not in ("camera", "image", "renderer")
+        }
+        film = self.look(self.scene(found.iterations, camera, **sections), "R", "G", "B", "A")
+        light = np.asarray(film, np.float64)[film["A"] > 0.5] @ np.array([0.2126, 0.7152, 0.0722])
+        lightest = float(np.percentile(light, 97)) if len(light) else 0.0
+        stops = math.log2(_BRIGHT / lightest) if lightest > 0 else 0.0
+        return replace(found, exposure=round(min(max(stops, -1.5), 2.0), 1))
+
+    def _around(self, azimuth: float, elevation: float) -> dict[str, Any]:
+        """A camera that sees all of the bounds."""
+        distance = self.radius / math.sin(math.radians(FOV) / 2) * 1.02
+        orbit = {"azimuth": azimuth, "elevation": elevation, "distance": distance}
+        return {"orbit": orbit, "target": list(self.center), "fov": FOV}
+
+
+def _filled(camera: Mapping[str, Any], scene: Scene, points: Floats) -> dict[str, Any]:
+    """The camera, without a turn, where points of shape (n, 3) fill the picture."""
+    view = scene_view(scene)
+    middle = np.array(camera["target"], float)
+    distance = float(camera["orbit"]["distance"])
+    high = math.tan(math.radians(FOV) / 2)
+    wide = high * _LOOK[0] / _LOOK[1]
+    stray = (100 * _STRAY, 100 - 100 * _STRAY)
+    for _ in range(12):
+        away = points - middle
+        depth = np.maximum(distance + away @ view.axis, 0.02 * distance)
+        ends = [np.percentile((away @ side) / depth, stray) for side in (view.side, view.up)]
+        shift = [distance * float(end.mean()) for end in ends]
+        middle = middle + shift[0] * view.side + shift[1] * view.up
+        share = max(float(np.ptp(end)) / 2 / most for end, most in zip(ends, (wide, high), strict=True))
+        distance *= share / _FILLED
+    fine = 0.005 * distance
+    target = [_rounded(float(x), fine) for x in middle]
+    return {**camera, "target": target, "orbit": {**camera["orbit"], "distance": _rounded(distance, fine)}}
+
+
+def _roughness(film: Film) -> float:
+    """The median angle between the normals of pixels beside each other, degrees, where both show the set."""
+    normals = np.stack([film["N.X"], film["N.Y"], film["N.Z"]], axis=-1).astype(np.float64)
+    hit = film["A"] > 0.5
+    cosines = np.sum(normals[:, 1:] * normals[:, :-1], axis=-1)[hit[:, 1:] & hit[:, :-1]]
+    median = float(np.median(cosines)) if len(cosines) else 1.0
+    return math.degrees(math.acos(min(max(median, -1.0), 1.0)))
+
+
+def _lights(scene: Scene) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Directions of light from the upper left behind the camera, and from its right."""
+    view = scene_view(scene)
+    warm = 0.75 * view.axis + 0.8 * view.side - 0.9 * view.up
+    cool = 0.3 * view.axis - view.side - 0.1 * view.up
+    (a, b, c), (d, e, f) = ([round(float(x), 2) + 0.0 for x in each] for each in (warm, cool))
+    return (a, b, c), (d, e, f)
+
+
+def _rounded(value: float, fine: float) -> float:
+    """The value without digits below `fine`."""
+    return round(value, max(0, 1 - math.floor(math.log10(fine)))) + 0.0
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}") + 0.0

@@ -1,0 +1,70 @@
+"""Presets of quality: samples, noise and detail together."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias, get_args
+
+from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.scene.model import Scene
+
+Quality: TypeAlias = Literal["draft", "good", "final", "print"]
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """Values of a renderer's settings: `renderer.samples`, `noise` and, for surfaces, `detail`."""
+
+    samples: int
+    noise: float | None
+    detail: float
+
+
+PRESETS: Mapping[Quality, Preset] = {
+    "draft": Preset(samples=1, noise=None, detail=2.0),
+    "good": Preset(samples=16, noise=0.02, detail=1.0),
+    "final": Preset(samples=128, noise=0.01, detail=1.0),
+    "print": Preset(samples=512, noise=0.004, detail=0.7),
+}
+
+
+def with_quality(scene: Scene, quality: str, *, kept: Collection[str] = ()) -> Scene:
+    """The scene with a preset's settings in the place of its own, also of views that have their own renderer.
+
+    Args:
+        quality: `draft`, `good`, `final` or `print`.
+        kept: dotted paths of settings that stay, such as `renderer.samples`, or `renderer` for all of them.
+
+    Raises:
+        SceneError: there is no such preset.
+    """
+    if quality not in PRESETS:
+        raise SceneError(unknown_name("quality", str(quality), get_args(Quality)), Where(path="quality"))
+    preset = PRESETS[quality]  # type: ignore[index]
+    updates: dict[str, Any] = {"renderer": _preset(scene.renderer, preset, "renderer", kept)}
+    if scene.layout is not None:
+        views = [
+            view
+            if view.renderer is None
+            else view.model_copy(
+                update={"renderer": _preset(view.renderer, preset, f"layout.views.{number}.renderer", kept)}
+            )
+            for number, view in enumerate(scene.layout.views)
+        ]
+        updates["layout"] = scene.layout.model_copy(update={"views": views})
+    return scene.model_copy(update=updates)
+
+
+def _preset(renderer: Any, preset: Preset, path: str, kept: Collection[str]) -> Any:
+    if path in kept:
+        return renderer
+    values = {"samples": preset.samples, "noise": preset.noise, "detail": preset.detail}
+    fields = type(renderer).model_fields
+    chosen = {
+        name: value for name, value in values.items() if name in fields and f"{path}.{name}" not in kept
+    }
+    # (A least number of samples belongs to another number of them.)
+    if "samples" in chosen and f"{path}.min_samples" not in kept:
+        chosen["min_samples"] = None
+    return renderer.model_copy(update=chosen)
