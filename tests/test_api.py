@@ -44,6 +44,7 @@ FUNCTIONS = {
     "escape": ["formula", "points", "iterations", "bailout"],
     "load_scene": ["source", "overrides", "folder"],
     "mesh": ["source", "device", "progress", "level"],
+    "probe": ["scene", "x", "y"],
     "render": ["scene", "device", "progress", "samples", "region"],
     "render_pair": ["scene", "device", "progress", "samples"],
     "variations": ["scene", "count", "strength", "seed"],
