@@ -10,6 +10,7 @@ import typer
 import clfractal
 from clfractal.commands import list_facts, list_grids, list_pictures, list_scenes, list_window
 from clfractal.commands.options import app
+from clfractal.commands.progress import Patience
 from clfractal.commands.shell import Shell
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_INTERRUPTED
 
@@ -60,7 +61,8 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
     if work == STATUS_INTERRUPTED:  # Typer's status for Ctrl-C
         raise KeyboardInterrupt
     if callable(work):
-        work()
+        with Patience(shell):
+            work()
     return 0
 
 

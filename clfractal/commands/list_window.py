@@ -97,4 +97,5 @@ def view(
         share,
     )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
+    shell.patient = False  # the window shows what takes long
     return lambda: work(options, shell)

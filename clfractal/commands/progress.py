@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import threading
 import time
+from types import TracebackType
 from typing import TYPE_CHECKING
 
 from clfractal.commands.shell import Shell
+from clfractal.device.activity import Activity, current
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -16,6 +19,49 @@ BAR_AFTER_SECONDS = 0.5
 """Quick renders show no bar: loading the library that draws it takes longer than the render."""
 BAR_EVERY_SECONDS = 0.1
 LINE_EVERY_SECONDS = 2.0
+
+
+SILENT_SECONDS = 2.0
+"""After so long without a sign of life the user is told what the program is doing."""
+_LONGEST_SILENCE = 60.0
+_LOOK_SECONDS = 0.25
+
+
+class Patience:
+    """Says what the program is doing (compiling, filling a grid, writing files) whenever nothing was shown for two seconds.
+
+    On a terminal it is a line that the next output replaces, otherwise a line each time, and each time twice as late.
+    """
+
+    def __init__(self, shell: Shell) -> None:
+        self._shell = shell
+        self._ended = threading.Event()
+
+    def __enter__(self) -> None:
+        self._shell.alive()
+        threading.Thread(target=self._watch, name="clfractal-patience", daemon=True).start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ended.set()
+        self._shell.clear_status()
+
+    def _watch(self) -> None:
+        shell, silence = self._shell, SILENT_SECONDS
+        last: Activity | None = None
+        while not self._ended.wait(_LOOK_SECONDS):
+            activity, now = current(), time.monotonic()
+            if activity is not last:
+                last, silence = activity, SILENT_SECONDS
+            if activity is None or shell.quiet or not shell.patient or now - shell.told < silence:
+                continue
+            line = f"{activity.what}, {now - activity.began:.0f} s"
+            if shell.terminal:
+                shell.stalled(line)
+            else:
+                shell.say(line)
+                silence = min(2 * silence, _LONGEST_SILENCE)
 
 
 class Reporter:
@@ -31,6 +77,7 @@ class Reporter:
 
     def __call__(self, state: Progress) -> None:
         now = time.monotonic()
+        self._shell.alive()
         if self._shell.quiet or now < self._next or state.tiles_done >= state.tiles:
             return
         self._next = now + self._every
@@ -43,6 +90,7 @@ class Reporter:
     def close(self) -> None:
         """Removes the bar."""
         if self._bar is not None:
+            self._shell.stalled = self._shell.status
             self._bar.stop()
             self._bar = None
 
@@ -56,10 +104,18 @@ class Reporter:
 
     def _draw(self, state: Progress) -> None:
         if self._bar is None:
+            self._shell.clear_status()
             self._bar = _new_bar(self._shell, self._tiles)
+            self._shell.stalled = self._stalled
         task = self._bar.task_ids[0]
-        self._bar.update(task, completed=state.tiles_done, rate=rate(state), left=_left(state))
+        self._bar.update(task, completed=state.tiles_done, rate=rate(state), left=_left(state), stalled="")
         self._bar.refresh()
+
+    def _stalled(self, line: str) -> None:
+        bar = self._bar
+        if bar is not None:
+            bar.update(bar.task_ids[0], stalled=line)
+            bar.refresh()
 
 
 def rate(state: Progress) -> str:
@@ -88,12 +144,13 @@ def _new_bar(shell: Shell, tiles: int) -> Bar:
         TaskProgressColumn(),
         TextColumn("{task.fields[rate]}"),
         TextColumn("{task.fields[left]}"),
+        TextColumn("{task.fields[stalled]}"),
         console=Console(file=shell.errors),
         auto_refresh=False,
         transient=True,
         redirect_stdout=False,
         redirect_stderr=False,
     )
-    bar.add_task("rendering", total=tiles, rate="", left="")
+    bar.add_task("rendering", total=tiles, rate="", left="", stalled="")
     bar.start()
     return bar

@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import threading
+import time
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -25,7 +27,7 @@ from clfractal.errors import (
 from clfractal.files.system import read_at
 
 OUTPUT = "standard output"
-
+_CLEAR = "\r\x1b[2K"  # of a terminal: to the line's beginning, and nothing on it
 _NOISE_SHOWN = 20_000  # bytes
 
 
@@ -46,6 +48,14 @@ class Shell:
         self._kept: BinaryIO | None = None
         self.names: dict[str, str] = {}
         """What messages call a file, by its path."""
+        self._status = False
+        self._writing = threading.Lock()
+        self.told = time.monotonic()
+        """When the user last saw a sign of life."""
+        self.stalled: Callable[[str], None] = self.status
+        """Shows, on a terminal, what takes long; something else while there is a progress bar."""
+        self.patient = True
+        """Whether a command that takes long says what it is doing."""
         self.state: Callable[[], str] = lambda: "clfractal: interrupted"
         """The message for an interrupt."""
 
@@ -80,6 +90,25 @@ class Shell:
                 shown(message, category, *rest, **more)
 
         warnings.showwarning = show
+
+    def alive(self) -> None:
+        """There is progress, which the user sees or will soon see."""
+        self.told = time.monotonic()
+
+    def status(self, line: str) -> None:
+        """A line on a terminal that the next output replaces."""
+        with self._writing, suppress(OSError, ValueError):
+            if not self._interrupted:
+                self._errors.write(_CLEAR + line)
+                self._errors.flush()
+                self._status = True
+
+    def clear_status(self) -> None:
+        """Takes that line away."""
+        if self._status:
+            with self._writing, suppress(OSError, ValueError):
+                self._errors.write(_CLEAR)
+                self._status = False
 
     def say(self, line: str) -> None:
         """One line for the user, on standard error; nothing if it is closed, or with `--quiet`."""
@@ -190,9 +219,17 @@ class Shell:
     def _write(self, line: str) -> None:
         for path, name in self.names.items():
             line = line.replace(path, name)
-        with suppress(OSError, ValueError):  # closed by whoever started us
-            self._errors.write(line + "\n")
-            self._errors.flush()
+        # (Whoever holds the lock may hang: last words do not wait for that.)
+        held = self._writing.acquire(timeout=0.1)
+        try:
+            with suppress(OSError, ValueError):  # closed by whoever started us
+                self._errors.write((_CLEAR if self._status else "") + line + "\n")
+                self._errors.flush()
+                self._status = False
+        finally:
+            if held:
+                self._writing.release()
+        self.alive()
 
 
 def _noise_file() -> int:

@@ -59,6 +59,7 @@ class StageProgress:
     def say(self, stage: str, part: float) -> None:
         """Print the finished fraction of the stage, 0 to 1, unless a line was printed a moment ago."""
         now = time.monotonic()
+        self._shell.alive()
         if now >= self._next and part < 1:
             self._next = now + LINE_EVERY_SECONDS
             self._shell.say(f"{stage}: {part:4.0%}")

@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 import numpy as np
 import pyopencl as cl
 
+from clfractal.device import activity
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
 from clfractal.device.watched import Watched
@@ -138,18 +139,19 @@ def in_launches(
             else:
                 flying.append(part)
 
-    try:
-        fill()
-        while flying:
-            milliseconds = wait(flying[0].event, device, doing, token)
-            part = flying.popleft()
-            pace.learn(part.amount, milliseconds)
-            # Before the caller reads what is finished: the device must not wait for that.
+    with activity.doing(doing):
+        try:
             fill()
-            yield part.about, milliseconds
-    finally:
-        if flying:
-            _end(flying, device, doing, watched)
+            while flying:
+                milliseconds = wait(flying[0].event, device, doing, token)
+                part = flying.popleft()
+                pace.learn(part.amount, milliseconds)
+                # Before the caller reads what is finished: the device must not wait for that.
+                fill()
+                yield part.about, milliseconds
+        finally:
+            if flying:
+                _end(flying, device, doing, watched)
 
 
 def _end(flying: Iterable[Part[T]], device: Device, doing: str, watched: Sequence[Watched]) -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pyopencl as cl
 
-from clfractal.device import cache, compiler, isolate
+from clfractal.device import activity, cache, compiler, isolate
 from clfractal.device.buildlog import build_error
 from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
@@ -126,7 +126,8 @@ def _built(
     remark.daemon = True
     remark.start()
     try:
-        program, binary = _compile(device, text, flags, warm, isolated=isolated, stopped=stopped)
+        with activity.doing(f"compiling for {device.info.name}"):
+            program, binary = _compile(device, text, flags, warm, isolated=isolated, stopped=stopped)
     finally:
         remark.cancel()
     if binary:

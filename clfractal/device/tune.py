@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from clfractal.device import cache, isolate
+from clfractal.device import activity, cache, isolate
 from clfractal.device.select import Device, has_float64, is_rusticl, vectorises_across_work_items
 from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
@@ -93,13 +93,14 @@ def promising(device: Device) -> tuple[tuple[int, ...], ...]:
 
 def _try(device: Device, precision: Precision, lanes: int) -> LaneReport:
     try:
-        answer = isolate.run(
-            PROBE,
-            device,
-            {"lanes": lanes, "precision": precision},
-            doing=f"trying {lanes} lanes",
-            timeout_s=PROBE_TIMEOUT_S,
-        )
+        with activity.doing(f"measuring {device.info.name}"):
+            answer = isolate.run(
+                PROBE,
+                device,
+                {"lanes": lanes, "precision": precision},
+                doing=f"trying {lanes} lanes",
+                timeout_s=PROBE_TIMEOUT_S,
+            )
     except ClfractalError as error:
         return LaneReport(lanes, error.message)
     return LaneReport(lanes, str(answer["fault"]))

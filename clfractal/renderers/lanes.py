@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 import pyopencl as cl
 
-from clfractal.device import cache, isolate, program, select, tune
+from clfractal.device import activity, cache, isolate, program, select, tune
 from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
@@ -181,7 +181,10 @@ def _measured(
     on_start(f"measuring {device.info.name}, once")
     try:
         request = {"lanes": lanes, "precision": precision}
-        answer = isolate.run(JOB, device, request, doing=f"marching with {lanes} lanes", timeout_s=_TIMEOUT_S)
+        with activity.doing(f"measuring {device.info.name}"):
+            answer = isolate.run(
+                JOB, device, request, doing=f"marching with {lanes} lanes", timeout_s=_TIMEOUT_S
+            )
         report = MarchReport(lanes=lanes, fault="", **answer)
     except ClfractalError as error:
         report = MarchReport(lanes, 0.0, 0.0, error.message)

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from clfractal.device.activity import doing
 from clfractal.pictures.outputs import output_files, save_outputs, save_views
 from clfractal.pictures.tiled import Picture
 from clfractal.work.job import Job
@@ -24,6 +25,13 @@ def save_job(
     Raises:
         FileError: a file cannot be written.
     """
+    with doing(f"writing {', '.join(str(path) for path in paths)}"):
+        _save(job, stores, paths, header)
+
+
+def _save(
+    job: Job, stores: Sequence[Picture], paths: Sequence[str | Path], header: Mapping[str, Any]
+) -> None:
     output = job.scene.output
     save = partial(save_outputs, half=output.half_channels, bits=output.png_bits, quality=output.quality)
     if not job.stays_apart:

@@ -1,0 +1,123 @@
+"""Whoever waits is told what the program is doing, after two seconds without a sign of life."""
+
+from __future__ import annotations
+
+import io
+import time
+
+import pytest
+
+from clfractal.commands import progress
+from clfractal.commands.progress import Patience, Reporter
+from clfractal.commands.shell import Shell
+from clfractal.device import activity
+from clfractal.work.run import Progress
+
+
+class Terminal(io.StringIO):
+    """Standard error, as a terminal or not."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__()
+        self.terminal = terminal
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+
+@pytest.fixture(autouse=True)
+def _hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "SILENT_SECONDS", 0.2)
+    monkeypatch.setattr(progress, "_LOOK_SECONDS", 0.02)
+
+
+def shell_on(monkeypatch: pytest.MonkeyPatch, *, terminal: bool = False) -> tuple[Shell, Terminal]:
+    errors = Terminal(terminal=terminal)
+    monkeypatch.setattr("sys.stderr", errors)
+    return Shell(owns_process=False), errors
+
+
+def wait_for(errors: Terminal, text: str) -> str:
+    """What was written by the time that a text appears in it."""
+    end = time.monotonic() + 20
+    while text not in errors.getvalue():
+        assert time.monotonic() < end, errors.getvalue()
+        time.sleep(0.01)
+    return errors.getvalue()
+
+
+def test_lines_tell_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The innermost, whole lines, seldomer as it goes on."""
+    shell, errors = shell_on(monkeypatch)
+    with Patience(shell), activity.doing("rendering"), activity.doing("filling the grid"):
+        wait_for(errors, "filling the grid, 0 s\n")
+        time.sleep(0.5)
+    lines = errors.getvalue().splitlines()
+    assert 1 <= len(lines) <= 3
+    assert all(line.startswith("filling the grid, ") and line.endswith(" s") for line in lines)
+    time.sleep(0.3)
+    assert errors.getvalue().splitlines() == lines  # nothing is told afterwards
+
+
+def test_progress_is_a_sign_of_life(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "SILENT_SECONDS", 1.0)
+    shell, errors = shell_on(monkeypatch)
+    reporter, state = Reporter(shell, 10), Progress(10)
+    with Patience(shell), activity.doing("rendering"):
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            reporter(state)
+            time.sleep(0.01)
+    assert errors.getvalue() == ""
+
+
+def test_nobody_is_told_of_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With `--quiet`, where a window shows it, and if nothing is under way."""
+    for quiet, patient, what in ((True, True, "rendering"), (False, False, "rendering"), (False, True, "")):
+        shell, errors = shell_on(monkeypatch)
+        shell.quiet, shell.patient = quiet, patient
+        with Patience(shell):
+            if what:
+                with activity.doing(what):
+                    time.sleep(0.4)
+            else:
+                time.sleep(0.4)
+        assert errors.getvalue() == ""
+
+
+def test_a_terminal_shows_one_line_that_goes_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    shell, errors = shell_on(monkeypatch, terminal=True)
+    clear = "\r\x1b[2K"
+    with Patience(shell), activity.doing("compiling for a device"):
+        told = wait_for(errors, "compiling for a device, 0 s")
+        assert told.startswith(clear)
+        assert "\n" not in told
+        shell.say("a remark")
+    assert f"{clear}a remark\n" in errors.getvalue()
+    lines = errors.getvalue().split("\n")
+    assert lines[-1] in ("", clear) or lines[-1].endswith(clear)
+
+
+def test_a_bar_shows_it_beside_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "BAR_AFTER_SECONDS", 0.0)
+    shell, errors = shell_on(monkeypatch, terminal=True)
+    with Patience(shell), activity.doing("rendering"):
+        reporter = Reporter(shell, 10)
+        reporter(Progress(10, tiles_done=3))
+        wait_for(errors, "rendering, ")
+        assert shell.stalled != shell.status
+        reporter.close()
+        assert shell.stalled == shell.status
+
+
+def test_what_began_last_is_told() -> None:
+    assert activity.current() is None
+    with activity.doing("one"):
+        with activity.doing("two"):
+            found = activity.current()
+            assert found is not None
+            assert found.what == "two"
+        found = activity.current()
+        assert found is not None
+        assert found.what == "one"
+    assert activity.current() is None
