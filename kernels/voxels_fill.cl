@@ -71,6 +71,7 @@ INLINE void packet_values(ulong place, int first, real *values, __global const s
 __kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks, int first, __global const uchar *known,
                           float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (orbit_cancelled(orbit)) return;
     const size_t brick = (size_t)first + get_global_id(1);
     const int item = (int)get_global_id(0) * ITEM_VOXELS;
     const ulong place = bricks[brick];

@@ -59,6 +59,7 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
     mask alive = less_equal(square, (real)(orbit->distance_square));
     mask near = alive & ~alive;
     for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
+        if (n % ORBIT_LOOK == ORBIT_LOOK - 1 && orbit_cancelled(orbit)) break;
         if (n == orbit->iterations) near |= alive & settled(square, orbit);
 #if HAS_DERIVATIVE
         near |= alive & doubtful(square, (reach * growth) * (reach * growth));
@@ -158,7 +159,7 @@ __kernel void classify_nodes(__global uchar *classes, __global const ulong *node
                           int cells, __global const scalar *axes, __constant const struct Lattice *lattice,
                           __constant const struct Orbit *orbit, __constant const scalar *k) {
     const size_t item = (size_t)first + get_global_id(1);
-    if (item >= count) return;
+    if (item >= count || orbit_cancelled(orbit)) return;
     // Of a voxel's sub-points the middle lies in the middle: the mean of the first and the last.
     __global const scalar *along_y = axes + lattice->sub_points * lattice->padded[0];
     __global const scalar *along_z = along_y + lattice->sub_points * lattice->padded[1];

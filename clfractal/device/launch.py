@@ -84,6 +84,18 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
         DeviceError: the launch failed.
         Stopped: the token was set.
     """
+    wait_for_copy(event, device, doing, token)
+    with device.failures(doing):
+        return float(event.profile.end - event.profile.start) * 1e-6
+
+
+def wait_for_copy(event: cl.Event, device: Device, doing: str, token: CancelToken | None = None) -> None:
+    """As `wait`, for a copy: a blocking one may wait for a kernel, and then nothing can interrupt it.
+
+    Raises:
+        DeviceError: the copy failed.
+        Stopped: the token was set.
+    """
     start = time.perf_counter()
     with device.failures(doing):
         while True:
@@ -97,7 +109,6 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
             # Short launches are looked at often, long ones are not kept from their cores.
             pause = (time.perf_counter() - start) / 32
             time.sleep(min(max(pause, POLL_SECONDS / 16), POLL_SECONDS))
-        return float(event.profile.end - event.profile.start) * 1e-6
 
 
 def in_launches(

@@ -12,7 +12,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.cancel import CancelToken
-from clfractal.device.launch import Pace, Part, in_launches
+from clfractal.device.launch import Pace, Part, in_launches, wait_for_copy
 from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
@@ -126,7 +126,7 @@ def _run(
     built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
     kernel = built.kernel(kernel_name)
     orbit = Watched(device, records.orbit_record(chain, iterations, precision, bailout).reshape(1))
-    constants = _upload(device, np.array(formula.constants, precision))
+    constants, sent = _upload(device, np.array(formula.constants, precision))
     planes, place = len(result), 0
 
     def enqueue(size: float) -> Part[_Launch] | None:
@@ -140,14 +140,17 @@ def _run(
         with device.failures("evaluating points"):
             buffer = device.buffer(planes * count * result.itemsize, "results")
             # A kernel keeps no reference to its arguments: they must outlive the launch.
-            arguments: list[Any] = [_upload(device, padded), buffer, np.int32(count), orbit.buffer, constants]
+            given, coming = _upload(device, padded)
+            arguments: list[Any] = [given, buffer, np.int32(count), orbit.buffer, constants]
             kernel.set_args(*arguments)
             event = cl.enqueue_nd_range_kernel(
                 device.queue, kernel, (count // lanes,), (GROUP_POINTS // lanes,)
             )
             device.queue.flush()
         place += len(part)
-        return Part(event, float(len(part)), _Launch(place - len(part), len(part), count, arguments))
+        return Part(
+            event, float(len(part)), _Launch(place - len(part), len(part), count, arguments, (sent, coming))
+        )
 
     # What a point takes is not known yet: a group of points for each core, of any number of applications.
     pace = Pace(float(GROUP_POINTS * max(device.info.compute_units, 1)), least=float(GROUP_POINTS))
@@ -156,21 +159,25 @@ def _run(
         for launch, _ in launches:
             out = np.empty((planes, launch.padded), result.dtype)
             with device.failures("evaluating points"):
-                cl.enqueue_copy(device.transfers, out, launch.arguments[1])
+                copied = cl.enqueue_copy(device.transfers, out, launch.arguments[1], is_blocking=False)
+                device.transfers.flush()
+            wait_for_copy(copied, device, "evaluating points", token)
             result[:, launch.first : launch.first + launch.count] = out[:, : launch.count]
 
 
 @dataclass(frozen=True, slots=True)
 class _Launch:
-    """Points of a launch: the first, how many, how many with those that fill up the last group; and its arguments."""
+    """Points of a launch: the first, how many, how many with those that fill up the last group; arguments, their copies."""
 
     first: int
     count: int
     padded: int
     arguments: list[Any]
+    sent: tuple[cl.Event, ...]
 
 
-def _upload(device: Device, array: npt.NDArray[np.generic]) -> cl.Buffer:
+def _upload(device: Device, array: npt.NDArray[np.generic]) -> tuple[cl.Buffer, cl.Event]:
     buffer = device.buffer(array.nbytes, "points", read_only=True)
-    cl.enqueue_copy(device.queue, buffer, np.ascontiguousarray(array).view(np.uint8).reshape(-1))
-    return buffer
+    # Not waited for: the queue is in order, and the launch that is under way may take long. The event keeps the array.
+    data = np.ascontiguousarray(array).view(np.uint8).reshape(-1)
+    return buffer, cl.enqueue_copy(device.queue, buffer, data, is_blocking=False)

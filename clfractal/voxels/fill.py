@@ -16,6 +16,7 @@ from clfractal.device.launch import run_in_parts
 from clfractal.device.orbit import orbit_record
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
+from clfractal.device.watched import Watched
 from clfractal.formulas.opencl import write_formula
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
@@ -193,10 +194,12 @@ class _Filler:
         records: list[npt.NDArray[Any]] = [
             self.lattice.axes(precision, self.sub_points),
             self.lattice.record(precision, self.sub_points, NODE_SAFETY * chain.step_scale).reshape(1),
-            orbit_record(chain, iterations, precision).reshape(1),
             np.array(self.formula.constants, precision),
         ]
-        self.constants = [upload(self.device, record) for record in records]
+        # Watched, because one launch of long orbits may take seconds.
+        self.orbit = Watched(self.device, orbit_record(chain, iterations, precision).reshape(1))
+        axes, box, constants = (upload(self.device, record) for record in records)
+        self.constants = [axes, box, self.orbit.buffer, constants]
         packets = 512 / self.lanes * self.sub_points**3
         units = max(self.device.info.compute_units, 1)
         bricks = 0.05 * units * SLOW_APPLICATIONS / (packets * max(iterations, 1))
@@ -231,6 +234,7 @@ class _Filler:
             group=classify_nodes.group,
             first_part=8 * self.first_part,
             token=self.token,
+            watched=[self.orbit],
         )
         self.stats = replace(self.stats, octree_ms=self.stats.octree_ms + milliseconds)
         return flags
@@ -286,6 +290,7 @@ class _Filler:
             first_part=self.first_part,
             done=lambda done: self._tell("fill", done, len(places)),
             token=self.token,
+            watched=[self.orbit],
         )
         points = (8 * len(places) - self.decided) * OCTANT**3 * self.sub_points**3
         self.stats = replace(self.stats, evaluated_voxels=points, fill_ms=milliseconds)
