@@ -8,6 +8,7 @@ import pty
 import subprocess
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 import typer
 
 import clfractal
+from clfractal.commands import progress
 from clfractal.commands.app import app
 from clfractal.commands.progress import Reporter
 from clfractal.commands.shell import Shell
@@ -75,6 +77,24 @@ def test_what_a_picture_tells_of_itself(here: Path, shell: InProcess) -> None:
     np.testing.assert_allclose(np.array([0, 0, 1, 1]) @ to_camera, [0, 1, 3, 1], atol=1e-6)
     projected = np.array([0, 0, 0, 1]) @ to_ndc
     np.testing.assert_allclose(projected[:2] / projected[3], [0.5, 0.5], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (None, "time left unknown"),
+        (0.4, "0:00 left"),
+        (59.2, "0:59 left"),
+        (59.6, "1:00 left"),
+        (61, "1:01 left"),
+        (3599, "59:59 left"),
+        (3600, "1:00:00 left"),
+        (360_061, "100:01:01 left"),
+    ],
+)
+def test_the_time_that_is_left(seconds: float | None, told: str) -> None:
+    state: Any = SimpleNamespace(remaining=seconds)
+    assert progress._left(state) == told
 
 
 def test_no_switch_is_on_unless_it_is_given() -> None:
