@@ -15,7 +15,8 @@ from clfractal.formulas.reference import escape
 
 REQUIRED = [
     *("hast", "mandelbulb", "mandelbox", "quaternion_julia", "tetrabrot", "burning_ship", "menger_sponge"),
-    *("sierpinski_tetrahedron", "kaleidoscopic_ifs", "bulbox"),
+    *("sierpinski_tetrahedron", "kaleidoscopic_ifs", "bulbox", "kaliset", "amazing_surf", "amazing_box_vary"),
+    *("pseudo_kleinian", "riemann_sphere", "cosine_mandelbulb", "benesi_pine_tree", "aexion", "box_fold_bulb"),
 ]
 # Parameter values far from the defaults, at which the bounds must hold too.
 RANGES: list[tuple[str, Mapping[str, float]]] = [
@@ -32,6 +33,14 @@ RANGES: list[tuple[str, Mapping[str, float]]] = [
     *((n, {"scale": 2}) for n in ("menger_sponge", "sierpinski_tetrahedron", "octahedral_ifs")),
     ("vicsek_cross", {"scale": 2.4}),
     *(("kaleidoscopic_ifs", {"scale": s, "turn_before": 1.1, "offset_x": 2}) for s in (1.3, 3)),
+    *(("cosine_mandelbulb", {"power": p, "z_sign": 1}) for p in (2, 5)),
+    *(("amazing_surf", {"scale": s, "turn": 0.5, "cylinder": c}) for s, c in ((-1.5, 0), (2, 1))),
+    *(("amazing_box_vary", {"scale": s, "vary": v}) for s, v in ((2, -0.2), (-1.7, 0.3), (-2, -0.1))),
+    *(("kalibox", {"scale": s, "move_x": -2}) for s in (1.3, 3)),
+    *(("riemann_sphere", {"rate": r, "offset": o}) for r, o in ((3, 1), (0.5, 0))),
+    *(("aexion", {"plus": p}) for p in (-1, 0.5)),
+    *(("box_fold_bulb", {"fold": f, "fixed_radius": r}) for f, r in ((2, 3), (0.3, 1))),
+    ("box_fold_quaternion", {"fold": 2, "offset": 1}),
     *(("polyhedral_ifs", {"order": o, "scale": 1.5, "face": 0.7, "edge": -0.4}) for o in (3, 4, 5)),
 ]
 CASES: list[tuple[str, Mapping[str, float]]] = [*((name, {}) for name in catalog.names()), *RANGES]
@@ -39,7 +48,7 @@ CASES: list[tuple[str, Mapping[str, float]]] = [*((name, {}) for name in catalog
 
 def test_the_library_holds_what_it_should() -> None:
     assert set(REQUIRED) <= set(catalog.names())
-    assert len(catalog.names()) >= 14
+    assert len(catalog.names()) >= 32
 
 
 @pytest.mark.parametrize("name", catalog.names())
