@@ -59,8 +59,8 @@ THESIS_FIGURES = {
     "figure16": "figure 16",
 }
 
-# A wall from edge to edge: nothing is seen past it.
-FILLED = ("stereo_hall",)
+# Walls from edge to edge: nothing is seen past them.
+FILLED = ("stereo_hall", "mandelbox_inside")
 
 # By module: all tests of one scene come together, and in one process, which renders it once.
 each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem, scope="module")

@@ -16,7 +16,14 @@ from clfractal.formulas.reference import escape
 REQUIRED = [
     *("hast", "mandelbulb", "mandelbox", "quaternion_julia", "tetrabrot", "burning_ship", "menger_sponge"),
     *("sierpinski_tetrahedron", "kaleidoscopic_ifs", "bulbox", "kaliset", "amazing_surf", "amazing_box_vary"),
-    *("pseudo_kleinian", "riemann_sphere", "cosine_mandelbulb", "benesi_pine_tree", "aexion", "box_fold_bulb"),
+    *(
+        "pseudo_kleinian",
+        "riemann_sphere",
+        "cosine_mandelbulb",
+        "benesi_pine_tree",
+        "aexion",
+        "box_fold_bulb",
+    ),
 ]
 # Parameter values far from the defaults, at which the bounds must hold too.
 RANGES: list[tuple[str, Mapping[str, float]]] = [
