@@ -18,7 +18,8 @@ from typing import Any, Literal
 import pyopencl as cl
 
 from clfractal.arguments import plain, shown
-from clfractal.device import cache
+from clfractal.device import bundled, cache
+from clfractal.device.advice import install_hint
 from clfractal.device.cache_folder import drivers_problem, set_drivers_folder
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
@@ -35,11 +36,6 @@ Kind = Literal["cpu", "gpu", "accelerator"]
 
 Properties = Sequence[tuple[Any, Any]]
 """Of a context, beside its platform: pairs of `cl.context_properties`, or their numbers, and values."""
-
-_INSTALL_HINT = (
-    "no OpenCL device; install a driver for the CPU with `pip install pocl-binary-distribution`, "
-    "or your GPU's OpenCL driver"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +198,7 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
         raise DeviceError(message, Where(path="device"), status=STATUS_BAD_INPUT)
     found = _found()
     if not found:
-        raise drivers_problem() or DeviceError(_INSTALL_HINT)
+        raise drivers_problem() or DeviceError(install_hint())
     spec = (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
     fitting = _fitting(found, spec)
     if not fitting:
@@ -332,6 +328,7 @@ def _find() -> list[Device]:
     """Once for a process: the devices whose contexts are shared by all who ask for no context of their own."""
     found: list[Device] = []
     seen: set[int] = set()
+    bundled.offer()
     set_drivers_folder()
     try:
         platforms = cl.get_platforms()
@@ -421,7 +418,7 @@ def _nothing_fits(found: list[Device], spec: str) -> DeviceError:
     there = "; ".join(f"{device.info.index} {device.info.name} ({device.info.platform})" for device in found)
     if not spec:
         return DeviceError(
-            f"{_INSTALL_HINT}; only a simulator was found: {there}", status=STATUS_DEVICE_FAILED
+            f"{install_hint()}; only a simulator was found: {there}", status=STATUS_DEVICE_FAILED
         )
     if re.fullmatch(r"\d+:\d+", spec) or spec.casefold() in ("cpu", "gpu", "accelerator"):
         return DeviceError(f"no device {spec!r}; available: {there}", status=STATUS_BAD_INPUT)

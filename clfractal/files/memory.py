@@ -26,14 +26,18 @@ def available() -> int:
 
 def peak() -> int:
     """The largest number of bytes that this process has held at one time."""
-    if sys.platform == "win32":
-        import psutil
+    if sys.platform != "win32":
+        try:
+            import resource
+        except ImportError:  # a Python without it
+            pass
+        else:
+            most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            return most if sys.platform == "darwin" else 1024 * most
+    import psutil
 
-        return int(psutil.Process().memory_info().peak_wset)
-    import resource
-
-    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return most if sys.platform == "darwin" else 1024 * most
+    info = psutil.Process().memory_info()
+    return int(getattr(info, "peak_wset", info.rss))
 
 
 def shown(size: int) -> str:

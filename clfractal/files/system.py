@@ -27,7 +27,7 @@ RENAMES_OPEN_FILES = os.name != "nt"
 
 # A virus scanner or an indexer holds a new file open for a moment, and Windows then replaces nothing.
 _PATIENCE_S, _PAUSE_S = 1.0, 0.02
-_LOCKED_BYTE = 1 << 60
+_LOCKED_BYTE = 1 << 42
 
 
 class HeldError(Exception):

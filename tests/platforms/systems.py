@@ -1,7 +1,7 @@
 """The systems that `pip install` has to work on, and what is recorded of them: `python -m tests.platforms.systems`.
 
-For each system `locks/NAME.txt` has the versions that its dependencies resolve to, all extras included, with wheels
-alone (but for `BUILT`). They are made with uv, which can resolve for another system than its own; without a network the test reads them.
+For each system `locks/NAME.txt` has the versions that its dependencies resolve to, all extras included, with wheels alone
+(but for `BUILT`). They are made with uv, which can resolve for another system than its own; the test needs no network.
 """
 
 from __future__ import annotations

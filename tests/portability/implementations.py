@@ -10,9 +10,11 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+from tests.portability import trixie
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKPLACE = ROOT / "build" / "portability"
@@ -23,6 +25,10 @@ _DEBIAN_OCLGRIND = Path("/usr/lib/oclgrind/liboclgrind-rt-icd.so")
 
 class MissingError(Exception):
     """An implementation is not there and could not be installed."""
+
+
+class NotAllowedError(MissingError):
+    """This user or machine may not have it, which is no fault of the program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +44,15 @@ class Implementation:
     """What CLFRACTAL_DEVICE has to be, since the wheel's own driver is always there as well."""
     library: Callable[[], str]
     simulator: bool = False
+    root: Callable[[], Path] | None = None
+    """Makes the system in a folder that it runs in (`trixie.py`)."""
+    variables: tuple[tuple[str, str], ...] = ()
+
+    def command(self, module: Sequence[str], environment: Mapping[str, str]) -> list[str]:
+        """The command for `python -m MODULE...` on it."""
+        if self.root is None:
+            return [sys.executable, "-m", *module]
+        return trixie.command(trixie.folder(WORKPLACE), ROOT, module, environment)
 
     def environment(self, base: Mapping[str, str]) -> dict[str, str]:
         """Environment variables for a process that shall run on this implementation.
@@ -48,11 +63,13 @@ class Implementation:
         vendors = WORKPLACE / "icd" / self.name
         shutil.rmtree(vendors, ignore_errors=True)
         vendors.mkdir(parents=True)
+        if self.root is not None:
+            self.root()
         library = self.library()
-        result = dict(base)
+        result = {**base, **dict(self.variables)}
         if library:
             (vendors / f"{self.name}.icd").write_text(library + "\n")
-            folder = str(Path(library).parent) if "/" in library else ""
+            folder = str(Path(library).parent) if "/" in library and self.root is None else ""
             paths = [folder, base.get("LD_LIBRARY_PATH", "")]
             result["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, paths))
         result["OCL_ICD_VENDORS"] = str(vendors)
@@ -97,10 +114,35 @@ def _oclgrind() -> str:
     return str(found[0]) if found else str(_DEBIAN_OCLGRIND)
 
 
+def _trixie() -> Path:
+    root = trixie.folder(WORKPLACE)
+    try:
+        trixie.prepare(root)
+    except trixie.RefusedError as error:
+        raise NotAllowedError(str(error)) from error
+    return root
+
+
+def _of_trixie(icd: str) -> Callable[[], str]:
+    def library() -> str:
+        return (trixie.folder(WORKPLACE) / "etc/OpenCL/vendors" / icd).read_text(encoding="utf-8").strip()
+
+    return library
+
+
 IMPLEMENTATIONS = (
     Implementation("pocl-wheel", "pthread", _wheel),
     Implementation("pocl-debian", "debian", _debian_pocl),
     Implementation("intel", "Intel(R) OpenCL", _intel),
+    Implementation("pocl-trixie", "Portable", _of_trixie("pocl.icd"), root=_trixie),
+    # Of the devices that Mesa has, the processor.
+    Implementation(
+        "rusticl",
+        "llvmpipe",
+        _of_trixie("rusticl.icd"),
+        root=_trixie,
+        variables=(("RUSTICL_ENABLE", "llvmpipe"), ("RUSTICL_FEATURES", "fp64")),
+    ),
     Implementation("oclgrind", "oclgrind", _oclgrind, simulator=True),
 )
 

@@ -46,6 +46,8 @@ _SCENES: dict[str, str] = {
     "steps": "{name: mandelbulb, iterations: 5}",
     "cloud": "{name: mandelbulb, iterations: 5}",
     "plane": "{name: hast, iterations: 60}",
+    "inside": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
+    "coverage": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
 }
 _RENDERERS = {
     "still": "{samples: 2, points: {}, normal: least_squares, ambient_occlusion: {rays: 2}, bounces: 1,"
@@ -53,6 +55,9 @@ _RENDERERS = {
     "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
     "cloud": "{type: volume, resolution: 12, value: iterations, normals: exact,"
     " transfer: {opacity: [{at: 1, opacity: 0}, {at: 5, opacity: 0.1}]}}",
+    "inside": "{type: volume, resolution: 24, value: inside, normals: least_squares}",
+    "coverage": "{type: volume, resolution: 24, value: coverage, shadows: true,"
+    " transfer: {opacity: [{at: 0.05, opacity: 0}, {at: 1, opacity: 0.6}]}}",
     "plane": "{type: cut_plane, plane: {normal: [0.2, 0.3, 1], width: 3, height: 3}, samples: 2}",
 }
 _MORE = {
@@ -62,7 +67,7 @@ _MORE = {
 }
 _LENSES = {"still": ", f_number: 0.5"}
 # Each adds something that the others do not have; the rest are more formulas.
-_BRIEF = ("trigonometric", "mandelbox", "still", "steps", "cloud", "plane")
+_BRIEF = ("trigonometric", "mandelbox", "still", "steps", "cloud", "inside", "coverage", "plane")
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)
