@@ -22,6 +22,7 @@ def main() -> None:
 
     The process ends at once: a driver's clean-up is skipped, because it may take long, hang or crash.
     """
+    _fill_descriptors()
     from clfractal.commands import interrupt
 
     shell: Shell | None = None
@@ -44,6 +45,18 @@ def main() -> None:
         last_words()
         os._exit(INTERRUPTED)
     os._exit(status)
+
+
+def _fill_descriptors() -> None:
+    """Opens the standard streams that whoever started the program has closed.
+
+    The next files that are opened would get their numbers, and what is written to a stream would go into them.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
 
 
 def run(arguments: Sequence[str], shell: Shell) -> int:

@@ -73,6 +73,13 @@ class FormulaError(ClfractalError):
 class FileError(ClfractalError):
     """A file cannot be read or written."""
 
+    def inside(self, file: str) -> str:
+        """What it says, for a message about another place that names this file: with its line and field, if it has them."""
+        named = self.where.file or file
+        if self.where.line is None and self.where.path is None:
+            return f"{named} {self.message}"
+        return f"{replace(self.where, file=named).prefix()}{self.message}"
+
 
 class CacheWarning(UserWarning):
     """The cache cannot be where it should be; the work is done all the same."""

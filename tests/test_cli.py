@@ -239,7 +239,7 @@ def test_plain_lines_come_at_most_every_two_seconds(
         reporter(state)
     lines = capsys.readouterr().err.splitlines()
     assert 4 <= len(lines) <= 5
-    assert all("Mrays/s" in line and "left" in line for line in lines)
+    assert all("rays/s" in line and "left" in line for line in lines)
 
 
 def test_a_bar_on_a_terminal(here: Path) -> None:
@@ -261,7 +261,7 @@ def test_a_bar_on_a_terminal(here: Path) -> None:
         pass
     os.close(ours)
     assert running.wait() == 0
-    assert b"Mrays/s" in told
+    assert b"rays/s" in told
     assert b" left" in told
     assert b"a.png: " in told.splitlines()[-1]
 

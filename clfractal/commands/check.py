@@ -40,7 +40,10 @@ def check_scene(
         lines.append(summary)
     if scene.stereo is not None and scene.stereo.fit is None:
         lines = [*_eyes(scene), *lines]
-    shell.print("".join(f"# {line}\n" for line in lines) + dump_scene(scene))
+    text = dump_scene(scene)
+    if not shell.can_print(text):
+        text = dump_scene(scene, only_ascii=True)  # the output stays a scene
+    shell.print("".join(f"# {line}\n" for line in lines) + text)
     if warning:
         shell.say(f"{source}: {warning}")
 

@@ -120,7 +120,14 @@ class Reporter:
 
 def rate(state: Progress) -> str:
     """Camera rays per second in words."""
-    return f"{state.rays_per_second / 1e6:.2f} Mrays/s"
+    return shown_rate(state.rays_per_second)
+
+
+def shown_rate(rays: float) -> str:
+    """Rays per second in a unit that shows at least two digits: `1.20 Mrays/s`, `4.5 krays/s`, `12 rays/s`."""
+    if rays >= 1e5:
+        return f"{rays / 1e6:.2f} Mrays/s"
+    return f"{rays / 1e3:.1f} krays/s" if rays >= 1e3 else f"{rays:.0f} rays/s"
 
 
 def _left(state: Progress) -> str:

@@ -93,6 +93,7 @@ def render_files(order: Order, shell: Shell) -> None:
         state,
         wall_ms=1e3 * (written - start),
         write_ms=1e3 * (written - rendered),
+        looks_built_ms=engine.looks_built_ms,
         comfort=comfort,
         remarks=remarks,
     )

@@ -14,6 +14,7 @@ import time
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from io import TextIOWrapper
 from typing import Any, BinaryIO, TextIO
 
 from clfractal.errors import (
@@ -42,7 +43,12 @@ class Shell:
         self.verbose = False
         self.quiet = False
         self._owns_process = owns_process
-        self._errors: TextIO = sys.stderr
+        # A stream that was closed by whoever started the program is None.
+        self._errors: TextIO = sys.stderr or open(os.devnull, "w")  # noqa: SIM115 (until the process ends)
+        if owns_process:
+            for stream in (sys.stdout, sys.stderr):
+                if isinstance(stream, TextIOWrapper):
+                    stream.reconfigure(errors="backslashreplace")  # rather than fail at a name's letter
         self._noise: int | None = None
         self._interrupted = False
         self._kept: BinaryIO | None = None
@@ -115,12 +121,22 @@ class Shell:
         if not self.quiet:
             self._write(line)
 
+    def can_print(self, text: str) -> bool:
+        """Whether standard output has all the characters of a text; those that it lacks are printed as escapes."""
+        try:
+            text.encode(getattr(sys.stdout, "encoding", None) or "utf-8")
+        except UnicodeEncodeError:
+            return False
+        return True
+
     def print(self, text: str) -> None:
         """A command's result, on standard output.
 
         Raises:
-            FileError: it cannot be written (a full disk).
+            FileError: it cannot be written (a full disk, a closed stream).
         """
+        if sys.stdout is None:
+            raise FileError("cannot be written: it is closed", Where(OUTPUT))
 
         def write() -> None:
             sys.stdout.write(text if text.endswith("\n") else text + "\n")

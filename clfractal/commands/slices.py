@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from clfractal.commands.order import PARTIAL, naming_options
 from clfractal.commands.pipes import piped, refuse_stream
+from clfractal.commands.progress import shown_rate
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where
@@ -95,7 +96,7 @@ def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     shell.state = lambda: "clfractal: interrupted"
     seconds = time.perf_counter() - begun
     first, last = files[0][0], files[-1][0]
-    shell.say(f"{first} to {last.name}: {seconds:.2f} s, {rays / 1e6 / seconds:.2f} Mrays/s")
+    shell.say(f"{first} to {last.name}: {seconds:.2f} s, {shown_rate(rays / seconds)}")
 
 
 def slice_scene(scene: Scene, stack: Stack, number: int) -> Scene:

@@ -34,6 +34,7 @@ class Unfinished:
         self, job: Job, header: Mapping[str, Any], output: Path, shell: Shell, *, resume: bool
     ) -> None:
         self.paths = partial_paths(job, output)
+        self.output = output
         self.first = output.with_name(output.name + PARTIAL)
         self.films: list[JournalFilm] = []
         try:
@@ -73,6 +74,8 @@ class Unfinished:
         """What to say of an interrupt."""
         done = sum(int(film.done.sum()) for film in self.films)
         tiles = sum(film.grid.count for film in self.films)
+        if not done:  # journals without a tile do not stay
+            return f"{self.output}: interrupted before a tile was done"
         return f"{self.first}: interrupted with {done} of {tiles} tiles done; --resume continues"
 
     def _leave(self) -> None:

@@ -26,6 +26,7 @@ MAX_NUMBER_LENGTH = 40
 
 _Parser = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _INT = re.compile(r"[-+]?[0-9]+")
+_OTHER_BASES = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NON_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 _WORDS: Mapping[str, bool | None] = {
@@ -40,7 +41,8 @@ def read_document(
 ) -> Document:
     """Parses one YAML document.
 
-    Numbers, booleans and null follow YAML 1.2's core schema (`1e-3` is a number, `yes` and `1:30` are words).
+    Numbers, booleans and null follow YAML 1.2's core schema: `1e-3`, `0x10` and `0o10` are numbers, `yes` and `1:30`
+    are words.
 
     Raises:
         error: not YAML, not one document, a duplicate key, a tag, a number that is not finite, an alias that
@@ -66,15 +68,19 @@ def read_value(text: str, file: str) -> Node:
     return node_from_plain(root.plain(), file)
 
 
-def write_document(value: Any) -> str:
-    """YAML text of plain data that `read_document` reads back as equal data (whole floats as int)."""
+def write_document(value: Any, *, only_ascii: bool = False) -> str:
+    """YAML text of plain data that `read_document` reads back as equal data (whole floats as int).
+
+    Args:
+        only_ascii: write other characters as escapes.
+    """
     return str(
         yaml.dump(
             _short(value),
             Dumper=_Dumper,
             sort_keys=False,
             default_flow_style=None,
-            allow_unicode=True,
+            allow_unicode=not only_ascii,
             width=100,
         )
     )
@@ -104,7 +110,7 @@ def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 
 
 _Dumper.add_representer(str, _represent_text)
-for _pattern in (_INT, _FLOAT, _NON_FINITE):
+for _pattern in (_INT, _OTHER_BASES, _FLOAT, _NON_FINITE):
     _Dumper.add_implicit_resolver(
         "tag:yaml.org,2002:float", re.compile(f"(?:{_pattern.pattern})$"), list("-+.0123456789")
     )
@@ -256,12 +262,13 @@ class _Builder:
             return _WORDS[text]
         if _NON_FINITE.fullmatch(text):
             self.fail_at(f"must be a finite number, got {text}", event)
-        whole = _INT.fullmatch(text) is not None
+        other = _OTHER_BASES.fullmatch(text) is not None
+        whole = other or _INT.fullmatch(text) is not None
         if not whole and not _FLOAT.fullmatch(text):
             return text
         if len(text) > MAX_NUMBER_LENGTH:
             self.fail_at(f"a number of more than {MAX_NUMBER_LENGTH} characters", event)
-        number = int(text) if whole else float(text)
+        number = (int(text, 0) if other else int(text)) if whole else float(text)
         if not math.isfinite(number):
             self.fail_at(f"must be a finite number, got {text}", event)
         return number

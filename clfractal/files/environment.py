@@ -76,6 +76,10 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
         raise file_error(path, message, "")
     if width > MAX_WIDTH:
         raise file_error(path, f"is too large: {width:,} pixels wide, at most {MAX_WIDTH:,}", "")
+    whole = header.values().get("displayWindow")
+    if whole != window and isinstance(whole, tuple) and len(whole) == 4:
+        shown = f"{width} x {height} of {whole[2] - whole[0] + 1} x {whole[3] - whole[1] + 1} pixels"
+        raise file_error(path, f"holds only a part of its picture, or more than it: {shown}", "")
     if not set("RGB") <= set(header.channels) and "Y" not in header.channels:
         found = ", ".join(header.channels[:10])
         raise file_error(path, f"must have the channels R, G and B, or Y; it has {found[:200]}", "")

@@ -139,7 +139,10 @@ class _Parser:
             problem = (error.msg or "invalid syntax").split(".")[0]
             if "integer string" in problem or "Exceeds the limit" in problem:
                 problem = "a number with too many digits"
-            self.fail(f"cannot be read: {problem[:1].lower()}{problem[1:80]}", column)
+            # In `{d: max(a, 1)}` the comma ends the value, so that the expression is cut short.
+            hint = "; inside {} or [] of YAML an expression with a comma needs quotes"
+            hint = hint if "never closed" in problem and "," not in self.text else ""
+            self.fail(f"cannot be read: {problem[:1].lower()}{problem[1:80]}{hint}", column)
         except (RecursionError, MemoryError):
             self.fail(f"nested more than {MAX_DEPTH} levels deep", 1)
         except ValueError:

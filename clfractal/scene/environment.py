@@ -64,7 +64,7 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
     try:
         return EnvironmentMap(read_environment(path))
     except FileError as error:
-        raise FileError(f"{path} {error.message}", where, details=error.details) from error
+        raise FileError(error.inside(str(path)), where, details=error.details) from error
 
 
 @cache

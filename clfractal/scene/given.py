@@ -59,7 +59,7 @@ def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
     try:
         volume = read_volume(path)
     except FileError as error:
-        raise FileError(f"{path} {error.message}", _WHERE, details=error.details) from error
+        raise FileError(error.inside(str(path)), _WHERE, details=error.details) from error
     values, directions = volume.values, volume.directions
     # Which axis of space each axis of the array follows most closely, and whether it runs against it.
     order = _order(directions)

@@ -82,6 +82,6 @@ def _text(found: Path, shown: str, where: Where, path: tuple[str, ...], folder: 
     try:
         text = read_text_file(found, name=shown)
     except FileError as error:
-        raise FileError(f"{error.where.file} {error.message}", where) from error
+        raise FileError(error.inside(shown), where) from error
     root = read_document(text, shown, error=FormulaError).root
     return _without_files(root, (*path, "inline"), folder) if len(path) < _DEEPEST else root

@@ -91,11 +91,11 @@ def load_coloring(text: SceneText, *, overrides: Sequence[str] = ()) -> Coloring
     return scene.coloring
 
 
-def dump_scene(scene: Scene) -> str:
-    """The resolved scene as YAML text; it loads back to an equal scene."""
+def dump_scene(scene: Scene, *, only_ascii: bool = False) -> str:
+    """The resolved scene as YAML text; it loads back to an equal scene. `only_ascii`: other characters as escapes."""
     if not isinstance(scene, Scene):
         arguments.refuse("scene", "must be a Scene", arguments.plain(scene))
-    return write_document(scene.resolved())
+    return write_document(scene.resolved(), only_ascii=only_ascii)
 
 
 def schema() -> dict[str, Any]:

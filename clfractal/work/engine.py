@@ -71,6 +71,8 @@ class Engine:
         self._looking.kept = self.executor.kept
         self._busy = threading.Lock()
         self._closed = False
+        self.looks_built_ms = 0.0
+        """Building programs for the quick looks of the last `prepare`, milliseconds."""
 
     def __enter__(self) -> Self:
         return self
@@ -123,6 +125,7 @@ class Engine:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
             DeviceError, KernelBuildError: the quick look that this takes failed.
         """
+        built_before = self.device.loaded.building.milliseconds
         loaded = as_scene(scene)
         if quality is not None:
             loaded = with_quality(loaded, quality)
@@ -137,7 +140,10 @@ class Engine:
         )
         # Made first, so that mistakes are reported before anything is rendered.
         job = decide(loaded)
-        return job if is_settled(loaded) else decide(settled(loaded, self.look))
+        if not is_settled(loaded):
+            job = decide(settled(loaded, self.look))
+        self.looks_built_ms = self.device.loaded.building.milliseconds - built_before
+        return job
 
     def render(
         self,
@@ -176,7 +182,7 @@ class Engine:
                 )
             films = JobFilms(job)
             state = run(job, films.films, self.executor, progress=progress, token=token)
-            return films.picture(Took(state, 1e3 * (time.perf_counter() - start)))
+            return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
 
     def render_pair(
         self,
@@ -206,7 +212,7 @@ class Engine:
             )
             films = JobFilms(job)
             state = run(job, films.films, self.executor, progress=progress, token=token)
-            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start)))
+            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
             return eyes["left"], eyes["right"]
 
     def probe(self, scene: SceneLike, x: int, y: int, *, precision: str | None = None) -> Probe:
@@ -247,7 +253,7 @@ class Engine:
                     channels=channels,
                     quality=quality,
                 )
-                yield from refined(job, self.executor, token)
+                yield from refined(job, self.executor, token, looks_built_ms=self.looks_built_ms)
 
         return Refinement(films())
 

@@ -20,10 +20,11 @@ from clfractal.work.stats import statistics
 
 @dataclass(frozen=True, slots=True)
 class Took:
-    """What a render took: its counts, and the time of the whole call in ms."""
+    """What a render took: its counts, the time of the whole call, and of building programs for looks before it, in ms."""
 
     state: Progress
     wall_ms: float
+    looks_built_ms: float = 0.0
 
 
 class JobFilms:
@@ -76,7 +77,14 @@ class JobFilms:
     def _statistics(self, took: Took) -> dict[str, Any]:
         comfort = comfort_of_films(self.job, self.films)
         remarks = remarks_of(self.job, took.state, self.films, comfort)
-        return statistics(self.job, took.state, wall_ms=took.wall_ms, comfort=comfort, remarks=remarks)
+        return statistics(
+            self.job,
+            took.state,
+            wall_ms=took.wall_ms,
+            looks_built_ms=took.looks_built_ms,
+            comfort=comfort,
+            remarks=remarks,
+        )
 
     def _header_of(self, number: int) -> dict[str, Any]:
         return self.job.view_header(number, self.header)

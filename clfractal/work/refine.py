@@ -48,8 +48,13 @@ class Refinement(Iterator[Film]):
                 handle.update(film)
 
 
-def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None) -> Generator[Film]:
+def refined(
+    job: Job, executor: LocalExecutor, token: CancelToken | None = None, *, looks_built_ms: float = 0.0
+) -> Generator[Film]:
     """The passes of a job, each as a film of the whole picture. The last one has the same bits as `run`.
+
+    Args:
+        looks_built_ms: for the films' statistics, see `Took`.
 
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
@@ -68,7 +73,7 @@ def refined(job: Job, executor: LocalExecutor, token: CancelToken | None = None)
         return replace(state, **asdict(total), views=[replace(each) for each in of_views])
 
     def shown(films: JobFilms, state: Progress, stage: str) -> Film:
-        film = films.picture(Took(state, 1e3 * (time.perf_counter() - start)))
+        film = films.picture(Took(state, 1e3 * (time.perf_counter() - start), looks_built_ms))
         film.tell("seconds", seconds)
         film.stage = stage
         return film

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -52,7 +53,7 @@ def without(variables: dict[str, str], temporary: Path) -> dict[str, str]:
     return plain | {"TMPDIR": str(temporary), "TEMP": str(temporary), **variables}
 
 
-def run(variables: dict[str, str], temporary: Path) -> dict[str, object]:
+def run(variables: dict[str, str], temporary: Path) -> dict[str, Any]:
     ended = subprocess.run(
         [sys.executable, "-c", PROGRAM],
         env=without(variables, temporary),
@@ -61,7 +62,7 @@ def run(variables: dict[str, str], temporary: Path) -> dict[str, object]:
         timeout=120,
     )
     assert ended.returncode == 0, ended.stderr
-    found: dict[str, object] = json.loads(ended.stdout)
+    found: dict[str, Any] = json.loads(ended.stdout)
     return found
 
 
@@ -78,7 +79,7 @@ def test_homes_that_cannot_be_used(tmp_path: Path, home: str) -> None:
     assert found["folder"] == str(folder)
     assert found["pocl"] == str(folder / "pocl")
     assert found["kept"] == {"a": 1}
-    (told,) = found["told"]  # type: ignore[misc]
+    (told,) = found["told"]
     assert f"using {str(folder)!r}" in told
     assert "CLFRACTAL_CACHE names another" in told
 

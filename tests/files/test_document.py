@@ -149,7 +149,24 @@ PLAIN = st.recursive(
     | st.floats(allow_nan=False, allow_infinity=False)
     | st.text()
     | st.sampled_from(
-        ["1e-3", ".5", "1.", "+1", "010", ".inf", ".NaN", "yes", "~", "", "0x10", "1:30", "- a", "#"]
+        [
+            "1e-3",
+            ".5",
+            "1.",
+            "+1",
+            "010",
+            ".inf",
+            ".NaN",
+            "yes",
+            "~",
+            "",
+            "0x10",
+            "0o7",
+            "0b1",
+            "1:30",
+            "- a",
+            "#",
+        ]
     ),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
     max_leaves=20,
@@ -164,6 +181,21 @@ def test_what_is_written_is_read_back(value: Any) -> None:
 def test_whole_floats_are_written_short() -> None:
     assert write_document({"a": [0.0, -3.0, 0.5, 1e-7]}) == "a: [0, -3, 0.5, 1.0e-07]\n"
     assert math.copysign(1, read_document(write_document(-0.0)).plain()) == -1
+
+
+def test_numbers_of_other_bases() -> None:
+    """YAML 1.2.2, section 10.3.2: no sign, small letters before the digits; `010` is ten, `0b1` a word."""
+    text = "[0x10, 0xfF, 0o10, 010, 0b1, -0x10, 0X10, 0o8, 0x, '0x10']"
+    assert read_document(text).plain() == [16, 255, 8, 10, "0b1", "-0x10", "0X10", "0o8", "0x", "0x10"]
+    with pytest.raises(SceneError, match="a number of more than 40 characters"):
+        read_document("0x" + "f" * 40)
+
+
+def test_only_ascii() -> None:
+    value = {"title": "Gr\u00fcn \u2013 \u0144", "plain": "a"}
+    text = write_document(value, only_ascii=True)
+    assert text.isascii()
+    assert read_document(text).plain() == value
 
 
 class TestFiles:

@@ -125,6 +125,19 @@ def test_the_shape(tmp_path: Path, shape: tuple[int, int]) -> None:
     assert refusal(path) == f"must be twice as wide as high, as latitude-longitude maps are, got {size}"
 
 
+@pytest.mark.parametrize("region", [(0, 0, 8, 4), (4, 2, 16, 8)])
+def test_a_part_of_a_map_is_none(tmp_path: Path, region: tuple[int, int, int, int]) -> None:
+    """A render with --region is twice as wide as high by chance, or reaches over its picture."""
+    width, height = region[2:]
+    band = planes(np.ones((height, width, 3), np.float32))
+    path = tmp_path / "part.exr"
+    write_exr(path, [band], display=(16, 8), region=region, channels="RGB", half="")
+    assert (
+        refusal(path)
+        == f"holds only a part of its picture, or more than it: {width} x {height} of 16 x 8 pixels"
+    )
+
+
 def test_the_size(tmp_path: Path) -> None:
     """Found in the header: nothing is read of a picture that promises too much."""
     path = write(tmp_path / "a.exr", planes(SMALL), compression=OpenEXR.PIZ_COMPRESSION)
