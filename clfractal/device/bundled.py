@@ -18,7 +18,7 @@ def offer(
     """Names Intel's CPU runtime to the loader, on Windows: its own way is an entry in the registry by an administrator.
 
     The loader in pyopencl's wheel reads OCL_ICD_FILENAMES, but not in a process with an administrator's rights. What the
-    driver loads lies beside it, and is looked for along the PATH. Child processes inherit both; calling it twice is harmless.
+    driver loads lies beside it, and is looked for along the PATH. Child processes inherit both; a second call does nothing.
     """
     if system != "win32":
         return
