@@ -16,6 +16,7 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog
 from clfractal.formulas.backends import DualBackend, NumpyBackend, constant_dual, seeded
 from clfractal.formulas.chain import Chain
+from clfractal.formulas.language import Parameter
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
 from clfractal.renderers import points
@@ -63,8 +64,17 @@ def values_of(name: str) -> list[dict[str, float]]:
     found = catalog.load(name).parameters
     rows = [{p.name: p.default for p in found}]
     for wanted in (0.0, 1.0, 3.0):
-        rows.append({p.name: min(max(wanted, p.minimum or 0.0), p.maximum or wanted) for p in found})
+        rows.append({p.name: nearest(p, wanted) for p in found})
     return rows
+
+
+def nearest(parameter: Parameter, wanted: float) -> float:
+    """The value nearest to the wanted one that a parameter may have."""
+    if parameter.choices is not None:
+        return min(parameter.choices, key=lambda choice: abs(choice - wanted))
+    low = parameter.minimum if parameter.minimum is not None else 0.0
+    high = parameter.maximum if parameter.maximum is not None else wanted
+    return min(max(wanted, low), high)
 
 
 def spec_of(name: str, parameters: dict[str, float], *, live: bool) -> dict[str, Any]:
@@ -108,7 +118,8 @@ def oracle(chain: Chain, at: Floats, base: Any, steps: int = STEPS) -> Floats:
     backend = DualBackend(base)
     state, point = start_at(chain, seeded(list(at.T)), backend)
     found = []
-    first = int(chain.add == "point")
+    # With the constant inside its map, iteration starts at 0.
+    first = int(chain.add == "point" and chain.first.start is not None)
     for n in range(steps + first + 1):
         duals = [constant_dual(z, 3) for z in state]
         rows = [[np.broadcast_to(v, len(at)) for v in (d.value, *d.partials)] for d in duals]
