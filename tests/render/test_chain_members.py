@@ -56,11 +56,14 @@ def program() -> Any:
 
 
 def launched(kernel: str, name: str, chain: Chain, at: Floats, planes: int) -> Floats:
+    """A kernel's planes; those of counts are whole numbers."""
     formula: FormulaText = write_formula(chain)
     orbit = orbit_bytes(chain, ITERATIONS, "float64", None)
     constants = np.array(formula.constants, "float64")
     number = list(CHAINS).index(name)
-    out = launch(device(), program(), f"{kernel}_f{number}", at, planes, "float64", 1, orbit, constants)
+    kind = "int32" if kernel == "escape_counts" else "float64"
+    name_of = f"{kernel}_f{number}"
+    out = launch(device(), program(), name_of, at, planes, "float64", 1, orbit, constants, kind=kind)
     return out.astype(np.float64)
 
 
