@@ -14,6 +14,7 @@ _CHAINS = (4, 8, 12)  # enough independent ones hide the latency of an FMA (4 cy
 _WIDTHS = (1, 8, 16)
 _STEPS, _STEPS_SIMULATED = 2000, 4
 _LAUNCHES = 4
+_NAMES = {f"w{width}c{chains}": (width, chains) for width in _WIDTHS for chains in _CHAINS}
 
 # The multiplier is below 1 and unknown to the compiler, so that no chain overflows, fades out or folds away.
 _KERNEL = """
@@ -40,17 +41,21 @@ def fma_peak(device: Device, precision: Precision) -> float:
     """
     if precision == "float64" and not has_float64(device.info):
         raise DeviceError(f"{device.info.name} has no float64", status=STATUS_BAD_INPUT)
-    names = {f"w{width}c{chains}": (width, chains) for width in _WIDTHS for chains in _CHAINS}
     steps = _STEPS_SIMULATED if is_simulator(device.info) else _STEPS
+    program = build(device, program_text(precision, steps), flags=math_flags(precision))
+    return max(
+        _rate(program, precision, name, width * chains * steps) for name, (width, chains) in _NAMES.items()
+    )
+
+
+def program_text(precision: Precision, steps: int = _STEPS) -> str:
+    """A kernel for each width and number of chains."""
     texts = [
         _text(precision, width, chains, steps).replace("void chains", f"void {name}")
-        for name, (width, chains) in names.items()
+        for name, (width, chains) in _NAMES.items()
     ]
     enable = "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n" if precision == "float64" else ""
-    program = build(device, enable + "\n".join(texts), flags=math_flags(precision))
-    return max(
-        _rate(program, precision, name, width * chains * steps) for name, (width, chains) in names.items()
-    )
+    return enable + "\n".join(texts)
 
 
 def _text(precision: Precision, width: int, chains: int, steps: int) -> str:

@@ -11,7 +11,7 @@ import pyopencl as cl
 
 from clfractal.device.program import Program, build, math_flags
 from clfractal.device.select import Device, by_key, is_simulator
-from clfractal.device.source import flatten
+from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 
 _WIDTH, _ROWS, _LIMIT = 512, 256, 40
@@ -34,11 +34,7 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     device = by_key(*request["device"])
     precision: Precision = request["precision"]
     lanes = int(request["lanes"])
-    flat = flatten(
-        "probe_entry.cl",
-        generated={"probe_entry.cl": _HEADERS},
-        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
-    )
+    flat = program_text(lanes, precision)
     program = build(device, flat.text, flags=math_flags(precision), sources=flat.sources, isolated=False)
     fault = _built_ins_fault(program, precision, lanes) or _mixed_lanes_fault(program, precision, lanes)
     width, rows = (_WIDTH_SIMULATED, _ROWS_SIMULATED) if is_simulator(device.info) else (_WIDTH, _ROWS)
@@ -51,6 +47,12 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     if differing > _COUNTS_MAY_DIFFER:
         fault = fault or f"{differing:.0%} of the points of packets side by side are wrong"
     return {"fault": fault}
+
+
+def program_text(lanes: int, precision: Precision) -> FlatText:
+    """The whole text of the program that tries a lane count."""
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
+    return flatten("probe_entry.cl", generated={"probe_entry.cl": _HEADERS}, defines=defines)
 
 
 def _built_ins_fault(program: Program, precision: Precision, lanes: int) -> str:

@@ -30,7 +30,7 @@ def verify(device: Device, structs: Iterable[Struct], precision: Precision, *, i
     key = cache.key_of(device.info.key, precision, [struct.c_text(precision) for struct in checked])
     if key in cache.recall(_SECTION):
         return
-    text = _text(checked, precision)
+    text = program_text(checked, precision)
     program = build(device, text, flags=math_flags(precision), isolated=isolated)
     expected = np.concatenate([_layout(struct, precision) for struct in checked])
     found = np.empty_like(expected)
@@ -55,7 +55,8 @@ def _layout(struct: Struct, precision: Precision) -> np.typing.NDArray[np.uint32
     return np.array([dtype.itemsize, *(fields[name][1] for name in dtype.names or ())], np.uint32)
 
 
-def _text(structs: tuple[Struct, ...], precision: Precision) -> str:
+def program_text(structs: Iterable[Struct], precision: Precision) -> str:
+    """A kernel that writes size and offsets of each struct."""
     lines = ["#pragma OPENCL EXTENSION cl_khr_fp64 : enable"] if precision == "float64" else []
     lines += [struct.c_text(precision) for struct in structs]
     lines += ["__kernel void layout(__global uint *out) {", "    int next = 0;"]

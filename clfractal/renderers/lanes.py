@@ -16,12 +16,12 @@ import pyopencl as cl
 
 from clfractal.device import activity, cache, isolate, program, select, tune
 from clfractal.device.select import Device
-from clfractal.device.source import flatten
+from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
 from clfractal.formulas.catalog import load_chain
 from clfractal.formulas.language import Chain
-from clfractal.formulas.opencl import write_formula
+from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.renderers.records import MARCH, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
 from clfractal.scene.surface import SurfaceRenderer
 
@@ -208,6 +208,22 @@ def march_job(request: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def program_text(formula: FormulaText, lanes: int, precision: Precision) -> FlatText:
+    """The whole text of the program that marches for a measurement."""
+    defines = {
+        "LANES": lanes,
+        "REAL_IS_DOUBLE": int(precision == "float64"),
+        "SEARCH_DISTANCE": 0,
+        "SEARCH_STEPS": 1,
+        "SEARCH": 0,
+        "POINTS": 1,
+        "POLISH": 0,
+        "HAS_LENS": 0,
+    }
+    generated = {"structs.h": struct_text(), "formula.h": formula.text}
+    return flatten("march_probe.cl", generated=generated, defines=defines)
+
+
 def march(
     device: Device, precision: Precision, lanes: int, rule: Rule, side: int
 ) -> tuple[float, np.ndarray[Any, np.dtype[np.float32]]]:
@@ -223,20 +239,7 @@ def march(
     example = _EXAMPLES[rule]
     chain = load_chain(example.formula, example.parameters)
     formula = write_formula(chain)
-    flat = flatten(
-        "march_probe.cl",
-        generated={"structs.h": struct_text(), "formula.h": formula.text},
-        defines={
-            "LANES": lanes,
-            "REAL_IS_DOUBLE": int(precision == "float64"),
-            "SEARCH_DISTANCE": 0,
-            "SEARCH_STEPS": 1,
-            "SEARCH": 0,
-            "POINTS": 1,
-            "POLISH": 0,
-            "HAS_LENS": 0,
-        },
-    )
+    flat = program_text(formula, lanes, precision)
     flags = program.math_flags(precision)
     built = program.build(device, flat.text, flags=flags, sources=flat.sources, isolated=False)
     met = np.empty((side, side, 2), np.float32)

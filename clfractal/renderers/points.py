@@ -14,11 +14,11 @@ from clfractal.device import program
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import Pace, Part, in_launches, wait_for_copy
 from clfractal.device.select import Device
-from clfractal.device.source import flatten
+from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.device.watched import Watched
 from clfractal.formulas.language import Chain
-from clfractal.formulas.opencl import write_formula
+from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.renderers import records
 
 Floats = npt.NDArray[np.float64]
@@ -97,6 +97,13 @@ def distances(
     return Distances(step, full, normal.astype(np.float64), smooth, inside)
 
 
+def program_text(formula: FormulaText, lanes: int, precision: Precision) -> FlatText:
+    """The whole text of the program for a formula's points."""
+    generated = {"formula.h": formula.text, "structs.h": records.struct_text()}
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
+    return flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
+
+
 def _checked(points: npt.ArrayLike) -> Floats:
     array = np.asarray(points, np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
@@ -120,9 +127,7 @@ def _run(
 ) -> None:
     """Runs one of the kernels of `points.cl`; its planes go into `result`, shape (planes, n)."""
     formula = write_formula(chain)
-    generated = {"formula.h": formula.text, "structs.h": records.struct_text()}
-    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
-    text = flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
+    text = program_text(formula, lanes, precision)
     built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
     kernel = built.kernel(kernel_name)
     orbit = Watched(device, records.orbit_record(chain, iterations, precision, bailout).reshape(1))

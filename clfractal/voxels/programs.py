@@ -14,7 +14,7 @@ from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device
-from clfractal.device.source import flatten
+from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText
@@ -92,11 +92,7 @@ def build_all(
             on_compile(line)
 
     def build(recipe: Recipe) -> Built:
-        structs = EXTENT.c_text() if recipe.formula is None else ORBIT.c_text() + LATTICE.c_text()
-        generated = {"structs.h": structs}
-        if recipe.formula is not None:
-            generated["formula.h"] = recipe.formula
-        text = flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
+        text = program_text(recipe)
         warm = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
         flags = program.math_flags(recipe.precision)
         built = program.build(
@@ -118,6 +114,15 @@ def build_all(
         except BaseException:  # an interrupt too: the other programs are not waited for
             failed.set()
             raise
+
+
+def program_text(recipe: Recipe) -> FlatText:
+    """The whole text of a program."""
+    structs = EXTENT.c_text() if recipe.formula is None else ORBIT.c_text() + LATTICE.c_text()
+    generated = {"structs.h": structs}
+    if recipe.formula is not None:
+        generated["formula.h"] = recipe.formula
+    return flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
 
 
 def nodes_recipe(chain: Chain, formula: FormulaText, lanes: int, precision: Precision) -> Recipe:

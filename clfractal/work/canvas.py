@@ -13,7 +13,7 @@ import pyopencl as cl
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.select import Device
-from clfractal.device.source import flatten
+from clfractal.device.source import FlatText, flatten
 from clfractal.pictures.tiled import Bands, Floats
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 from clfractal.renderers.plan import PlannedView
@@ -49,6 +49,11 @@ class Part:
         return self.region.pixels
 
 
+def program_text() -> FlatText:
+    """The whole text of the program."""
+    return flatten("canvas.cl", defines={"TILE": TILE, "CHANNELS": len(CHANNELS)})
+
+
 class CanvasKernels:
     """The kernels that write to canvases, on one device.
 
@@ -58,7 +63,7 @@ class CanvasKernels:
 
     def __init__(self, device: Device) -> None:
         self.device = device
-        text = flatten("canvas.cl", defines={"TILE": TILE, "CHANNELS": len(CHANNELS)})
+        text = program_text()
         flags = program.math_flags("float32")
         buffers = (Argument("buffer", 4096),) * 4
         whole = Argument("scalar", dtype="int32")

@@ -13,7 +13,7 @@ import pyopencl as cl
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.select import Device
-from clfractal.device.source import flatten
+from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Struct
 from clfractal.device.watched import Watched
 from clfractal.files import srgb, tone
@@ -169,6 +169,20 @@ def _joined(stereo: Stereo) -> Stereo:
     return stereo.model_copy(update={"mode": "split"}) if stereo.mode in APART else stereo
 
 
+def program_text(*, to_image: bool) -> FlatText:
+    """The whole text of the program that writes to an image or to a buffer."""
+    defines: dict[str, object] = {f"MODE_{name}": number for number, name in enumerate(MODES)}
+    defines |= {
+        "TO_IMAGE": int(to_image),
+        "TABLE_SHIFT": srgb.TABLE_SHIFT,
+        "TABLE_LOWEST": srgb.TABLE_LOWEST,
+        "TABLE_ONE": srgb.TABLE_ONE,
+    }
+    defines |= _tone_defines()
+    structs = SHOW.c_text("float32") + SHOWN_VIEW.c_text("float32")
+    return flatten("show.cl", generated={"show_structs.h": structs}, defines=defines)
+
+
 class Shower:
     """The kernel that shows canvases, on one device, with a queue of its own: it does not wait for a picture's launches.
 
@@ -181,16 +195,7 @@ class Shower:
 
     def __init__(self, device: Device, *, to_image: bool = False) -> None:
         self.device, self.to_image = device, to_image
-        defines: dict[str, object] = {f"MODE_{name}": number for number, name in enumerate(MODES)}
-        defines |= {
-            "TO_IMAGE": int(to_image),
-            "TABLE_SHIFT": srgb.TABLE_SHIFT,
-            "TABLE_LOWEST": srgb.TABLE_LOWEST,
-            "TABLE_ONE": srgb.TABLE_ONE,
-        }
-        defines |= _tone_defines()
-        structs = SHOW.c_text("float32") + SHOWN_VIEW.c_text("float32")
-        text = flatten("show.cl", generated={"show_structs.h": structs}, defines=defines)
+        text = program_text(to_image=to_image)
         warm = Warm("show", GROUP, GROUP, (Argument("buffer", 4096),) * 6)
         built = program.build(
             device,

@@ -5,17 +5,13 @@ from __future__ import annotations
 import os
 import pkgutil
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 import clfractal
 from clfractal.device import bundled
 from clfractal.device.advice import install_hint
-from clfractal.device.source import flatten
 from clfractal.files.document import read_document
 from tests.shell import SCENE
 
@@ -145,17 +141,3 @@ def test_intels_driver_is_named_to_the_loader_on_windows(tmp_path: Path) -> None
     untouched: dict[str, str] = {}
     bundled.offer(untouched, str(tmp_path), "linux")
     assert not untouched
-
-
-@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C preprocessor")
-@pytest.mark.parametrize("entry", ["surface.cl", "volume.cl", "cut_plane.cl", "voxels_fill.cl", "points.cl"])
-def test_no_double_where_numbers_are_float32(entry: str) -> None:
-    """Apple's GPUs have no float64, and their compiler refuses the word."""
-    generated = {"structs.h": "", "formula.h": ""}
-    text = flatten(entry, generated=generated, defines={"LANES": 1, "REAL_IS_DOUBLE": 0}).text
-    # Nothing is known there of x86's instructions.
-    plain = subprocess.run(
-        ["cc", "-E", "-P", "-undef", "-x", "c", "-"], input=text, capture_output=True, text=True, check=True
-    ).stdout
-    assert "float" in plain
-    assert not re.findall(r"\bdouble\d*\b", plain)

@@ -18,6 +18,8 @@ from tests.portability import trixie
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKPLACE = ROOT / "build" / "portability"
+# Where other systems in a folder see the program that is installed here.
+_PROGRAM = WORKPLACE / "program"
 
 _DEBIAN_ICD = Path("/etc/OpenCL/vendors/pocl.icd")
 _DEBIAN_OCLGRIND = Path("/usr/lib/oclgrind/liboclgrind-rt-icd.so")
@@ -52,7 +54,7 @@ class Implementation:
         """The command for `python -m MODULE...` on it."""
         if self.root is None:
             return [sys.executable, "-m", *module]
-        return trixie.command(trixie.folder(WORKPLACE), ROOT, module, environment)
+        return trixie.command(trixie.folder(WORKPLACE), _PROGRAM, ROOT, module, environment)
 
     def environment(self, base: Mapping[str, str]) -> dict[str, str]:
         """Environment variables for a process that shall run on this implementation.
@@ -117,7 +119,7 @@ def _oclgrind() -> str:
 def _trixie() -> Path:
     root = trixie.folder(WORKPLACE)
     try:
-        trixie.prepare(root)
+        trixie.prepare(root, _PROGRAM)
     except trixie.RefusedError as error:
         raise NotAllowedError(str(error)) from error
     return root

@@ -22,6 +22,7 @@ from clfractal.pictures.film import Film
 from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.plan import PlannedView, make_plan
 from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.work.job import Identity, Job
 from clfractal.work.local import LocalExecutor
@@ -90,16 +91,10 @@ def picture(
     device: Device, name: str, precision: Precision, size: tuple[int, int], lanes: int | None = None
 ) -> npt.NDArray[np.float32]:
     """All channels of a picture, shape (channels, height, width); with the best lane count if none is given."""
-    lanes = lanes or best_lanes(device, precision)
-    # The formula's bounds say where the camera has to be for the picture to be filled.
-    far = (0.0, -99.0, 0.0)
-    bounds = load_scene(_scene_text(name, far, (0.0, 0.0, 0.0), far, size)).chain
-    x, y, z = (float(value) for value in bounds.center)
-    radius = float(bounds.radius)
-    position = (x + 0.7 * radius, y - 2.1 * radius, z + 0.7 * radius)
-    lamp = (x + radius, y - radius, z + 0.5 * radius)
-    scene = load_scene(_scene_text(name, position, (x, y, z), lamp, size))
-    plan = make_plan(scene, precision=precision, lanes=lanes, channels=CHANNELS)
+    scene = scene_of(name, size)
+    plan = make_plan(
+        scene, precision=precision, lanes=lanes or best_lanes(device, precision), channels=CHANNELS
+    )
     film = Film(plan.channels, size, plan.region)
     job = Job(scene, (PlannedView(scene, plan),), Identity(0), plan.channels, device.info, "")
     run(job, [film], LocalExecutor(device))
@@ -107,6 +102,18 @@ def picture(
         # A binary search down to the last digit takes a step more or less where that digit differs.
         film["steps"][:] = 0
     return np.stack([film[channel] for channel in CHANNELS])
+
+
+def scene_of(name: str, size: tuple[int, int]) -> Scene:
+    """The scene of a picture."""
+    # The formula's bounds say where the camera has to be for the picture to be filled.
+    far = (0.0, -99.0, 0.0)
+    bounds = load_scene(_scene_text(name, far, (0.0, 0.0, 0.0), far, size)).chain
+    x, y, z = (float(value) for value in bounds.center)
+    radius = float(bounds.radius)
+    position = (x + 0.7 * radius, y - 2.1 * radius, z + 0.7 * radius)
+    lamp = (x + radius, y - radius, z + 0.5 * radius)
+    return load_scene(_scene_text(name, position, (x, y, z), lamp, size))
 
 
 def _scene_text(

@@ -5,6 +5,7 @@ Only root can make and enter it. Nothing stays mounted: each process runs in a m
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shlex
 import shutil
@@ -35,7 +36,8 @@ _PACKAGES = (
     ),
     *("pytest", "pytest-timeout", "pytest-xdist", "hypothesis", "mpmath", "psutil", "packaging"),
 )
-_SITE = "opt/packages"
+# Another list of packages, another folder: the system outlives the checkout that made it.
+_SITE = f"opt/packages-{hashlib.sha256(' '.join(_PACKAGES).encode()).hexdigest()[:8]}"
 
 
 class RefusedError(Exception):
@@ -47,8 +49,12 @@ def folder(workplace: Path) -> Path:
     return Path(os.environ.get("CLFRACTAL_TRIXIE") or workplace / RELEASE).resolve()
 
 
-def prepare(root: Path) -> None:
+def prepare(root: Path, program: Path) -> None:
     """Makes what is not there yet: some 50 s for the system, 20 s for Python's packages, 1.8 GB.
+
+    Args:
+        root: of the Debian, which many checkouts may share, at the same time too.
+        program: a folder of the checkout, for a copy of the installed program.
 
     Raises:
         RefusedError: no root, no apt, no permission to mount, or something cannot be fetched.
@@ -75,7 +81,7 @@ def prepare(root: Path) -> None:
         command += ["--platform=manylinux2014_x86_64", f"--python-version={PYTHON}", "--only-binary=:all:"]
         _run([*command, *_PACKAGES])
         beside.rename(site)
-    package = root / "opt" / "program" / "clfractal"
+    package = program / "clfractal"
     shutil.rmtree(package, ignore_errors=True)
     shutil.copytree(Path(clfractal.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("kernels", "scenes"):  # in a checkout they stand beside the package
@@ -84,7 +90,9 @@ def prepare(root: Path) -> None:
             shutil.copytree(beside, package / name)
 
 
-def command(root: Path, checkout: Path, module: Sequence[str], environment: Mapping[str, str]) -> list[str]:
+def command(
+    root: Path, program: Path, checkout: Path, module: Sequence[str], environment: Mapping[str, str]
+) -> list[str]:
     """The command that runs `python3 -m MODULE...` inside; the checkout is seen there at the same path."""
     place = shlex.quote(f"{root}{checkout}")
     mounts = " && ".join(
@@ -104,7 +112,7 @@ def command(root: Path, checkout: Path, module: Sequence[str], environment: Mapp
         "HOME": "/root",
         "LANG": "C.UTF-8",
         # The tests come last: the program is the installed one.
-        "PYTHONPATH": f"/opt/program:/{_SITE}:{checkout}",
+        "PYTHONPATH": f"{program}:/{_SITE}:{checkout}",
         "PYTHONDONTWRITEBYTECODE": "1",
     }
     inside = ["env", "-i", *(f"{name}={value}" for name, value in passed.items())]

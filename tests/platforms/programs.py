@@ -1,0 +1,90 @@
+"""The texts of all programs that there are, without a device: what a compiler alone can be asked about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+from clfractal.device import peak, probe, struct_layout
+from clfractal.device.source import FlatText, SourceMap
+from clfractal.device.structs import Precision
+from clfractal.formulas import catalog
+from clfractal.formulas.opencl import write_formula
+from clfractal.renderers import cut_plane, lanes, points, records, surface, volume
+from clfractal.renderers.plan import make_plan
+from clfractal.scene.volume import VolumeRenderer
+from clfractal.voxels import programs
+from clfractal.work import canvas, show
+from tests.portability.pictures import CHANNELS, cases, scene_of
+
+Named = tuple[str, FlatText]
+
+
+PICTURES = tuple(dict.fromkeys(name for name, _ in cases("full")))
+"""The pictures that all implementations render: every renderer with all that it can do, and some formulas."""
+EVERY_KIND = ("still", "steps", "cloud", "plane")
+"""Those that differ in more than the formula."""
+
+
+def every_text(count: int, precision: Precision, pictures: Sequence[str] = PICTURES) -> Iterator[Named]:
+    """Names and texts, with packets of `count` lanes."""
+    yield from of_pictures(count, precision, pictures)
+    yield from of_grids(count, precision)
+    yield "probe", probe.program_text(count, precision)
+    for name in ("mandelbulb", "hast"):  # by a scalar rule, and by the Jacobian
+        yield f"march {name}", lanes.program_text(write_formula(catalog.load_chain(name)), count, precision)
+    if count == 1:  # these know no packets
+        yield "structs", FlatText(struct_layout.program_text(records.STRUCTS, precision), SourceMap())
+        yield "peak", FlatText(peak.program_text(precision), SourceMap())
+    if count == 1 and precision == "float32":
+        yield "canvas", canvas.program_text()
+        for to_image in (False, True):
+            yield f"show {to_image=}", show.program_text(to_image=to_image)
+
+
+def of_pictures(count: int, precision: Precision, pictures: Sequence[str]) -> Iterator[Named]:
+    """The programs of renderers."""
+    for name in pictures:
+        scene = scene_of(name, (16, 16))
+        plan = make_plan(scene, precision=precision, lanes=count, channels=CHANNELS)
+        if scene.renderer.type == "volume":
+            for values, pools in (("byte", 1), ("float", 3)):
+                grid: Any = SimpleNamespace(kind=values, values=(None,) * pools)
+                yield f"{name} of {values}s in {pools}", volume.program_text(scene, plan, grid)
+        elif scene.renderer.type == "cut_plane":
+            yield name, cut_plane.program_text(scene, plan)
+        else:
+            yield name, surface.program_text(scene, plan)
+
+
+def of_grids(count: int, precision: Precision) -> Iterator[Named]:
+    """All that fills and stores voxels."""
+    chain = catalog.load_chain("hast")
+    formula = write_formula(chain)
+    recipes = [programs.nodes_recipe(chain, formula, count, precision)]
+    for value in programs.FILL_KINDS:
+        renderer = VolumeRenderer.model_validate({"type": "volume", "value": value})
+        recipes.append(programs.fill_recipe(chain, formula, renderer, count, precision))
+    for normals in programs.NORMALS[1:]:
+        renderer = VolumeRenderer.model_validate({"type": "volume", "normals": normals})
+        recipes.append(programs.normals_recipe(chain, formula, renderer, count, precision))
+    if count == 1 and precision == "float32":  # these know neither packets nor the formula
+        recipes += [
+            programs.classify_recipe("bits", "byte"),
+            programs.classify_recipe("bricks", "float"),
+            programs.store_recipe("bits", "byte", "byte", 0),
+            programs.store_recipe("bits", "byte", "byte", 1),
+            programs.store_recipe("bricks", "float", "float", 2),
+            programs.store_recipe("slab", "float", "float", 1),
+            programs.blocks_recipe("byte"),
+            programs.blocks_recipe("float"),
+        ]
+    for recipe in recipes:
+        yield f"{recipe.kernel} {recipe.defines}", programs.program_text(recipe)
+
+
+def of_formulas() -> Iterator[Named]:
+    """The library's formulas, each in the smallest program with counts, distances and gradients."""
+    for name in catalog.names():
+        yield name, points.program_text(write_formula(catalog.load_chain(name)), 1, "float32")
