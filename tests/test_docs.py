@@ -2,8 +2,9 @@
 
 By the word behind the fence: `sh` is run by a shell, with `clfractal` the program under test and `scenes/`
 in the current folder; `python` is run, the blocks of a page one after another; `yaml` with `version:` is
-loaded as a scene, with `map:` as a formula. What is not meant to be executed here (installing, measuring) is
-`console`.
+loaded as a scene, with `map:` as a formula. A `yaml` block whose first line is a comment with a file's name, such as
+`# pollen.yaml`, is a file that the reader writes: the `sh` blocks below it find it, and test it. What is not meant to be
+executed here (installing, measuring) is `console`.
 """
 
 from __future__ import annotations
@@ -25,12 +26,25 @@ from tests.shell import environment
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILE_NAME = re.compile(r"# ([\w/]+\.yaml)\n")
 KNOWN = {"sh", "python", "yaml", "console", "text", "json", "c", ""}
 
 
 def blocks(page: Path, language: str) -> list[str]:
     """The page's blocks of code in a language."""
     return [text for word, text in FENCE.findall(page.read_text(encoding="utf-8")) if word == language]
+
+
+def steps(page: Path) -> list[tuple[str, str]]:
+    """What a reader of the page writes and runs, in order: (name of a file, its text), or ("", shell code)."""
+    found = []
+    for word, text in FENCE.findall(page.read_text(encoding="utf-8")):
+        named = FILE_NAME.match(text)
+        if word == "sh":
+            found.append(("", text))
+        elif word == "yaml" and named is not None:
+            found.append((named.group(1), text))
+    return found
 
 
 def name(page: Path) -> str:
@@ -60,7 +74,11 @@ def test_every_block_says_what_it_is(page: Path) -> None:
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "sh")], ids=name)
 def test_shell_code(page: Path, desk: Path) -> None:
-    for text in blocks(page, "sh"):
+    for file, text in steps(page):
+        if file:
+            (desk / file).parent.mkdir(exist_ok=True)
+            (desk / file).write_text(text, encoding="utf-8")
+            continue
         ended = subprocess.run(
             ["sh", "-eu", "-c", text], cwd=desk, env=shell_environment(desk), capture_output=True, text=True
         )
@@ -79,7 +97,9 @@ def test_python_code(page: Path, desk: Path) -> None:
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "yaml")], ids=name)
 def test_scenes_and_formulas(page: Path, desk: Path) -> None:
     for text in blocks(page, "yaml"):
-        if "version:" in text:
+        if FILE_NAME.match(text):
+            assert blocks(page, "sh"), "a file that no command uses"
+        elif "version:" in text:
             assert clfractal.load_scene(text + "\n").version == 1
         else:
             (desk / "formula.yaml").write_text(text)
