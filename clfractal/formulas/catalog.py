@@ -113,14 +113,17 @@ def resolve(spec: Mapping[str, Any], base_folder: Path | None = None, where: Whe
         FormulaError: anything wrong in the section or in a formula.
         FileError: a file that cannot be read, or lies outside the folder.
     """
-    return _Resolver(base_folder).chain(spec, where or Where())
+    return _Resolver(base_folder, base_folder).chain(spec, where or Where())
 
 
 class _Resolver:
-    """Resolves one section; files are read relative to one folder."""
+    """Resolves one section: files are read relative to one folder, formulas of one's own are found by name beside another.
 
-    def __init__(self, base_folder: Path | None) -> None:
-        self.base_folder = base_folder
+    The two differ for what a formula of one's own names: `beside` is the scene's folder.
+    """
+
+    def __init__(self, base_folder: Path | None, beside: Path | None) -> None:
+        self.base_folder, self.beside = base_folder, beside
 
     def chain(self, spec: Mapping[str, Any], where: Where) -> Chain:
         key = _source_key(spec, where, (*_OPTIONS, *_IGNORED))
@@ -143,12 +146,12 @@ class _Resolver:
     def _own(self, spec: Mapping[str, Any], where: Where) -> tuple[_Resolver, Mapping[str, Any]] | None:
         """For the name of a formula of one's own: the section with its file, and what reads that folder's files."""
         name = spec.get("name")
-        path = find_own(name, self.base_folder, inside(where, "name")) if isinstance(name, str) else None
+        path = find_own(name, self.beside, inside(where, "name")) if isinstance(name, str) else None
         if path is None:
             return None
         real = path.resolve()
         section = {key: value for key, value in spec.items() if key != "name"}
-        return _Resolver(real.parent), {"file": real.name, **section}
+        return _Resolver(real.parent, self.beside), {"file": real.name, **section}
 
     def _data(
         self, key: str, spec: Mapping[str, Any], where: Where

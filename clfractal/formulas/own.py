@@ -28,17 +28,21 @@ def own_files(beside: Path | None) -> Mapping[str, Path]:
     `beside` is the folder of the scene, whose folder `formulas` is looked into; None: that of the variable alone.
 
     Raises:
-        FileError: a folder of the variable is not there.
+        FileError: a folder of the variable is not there, or a folder cannot be read.
     """
     found: dict[str, Path] = {}
-    folders = [beside / FOLDER] if beside is not None and (beside / FOLDER).is_dir() else []
+    folders = [beside / FOLDER] if beside is not None and os.path.isdir(beside / FOLDER) else []
     for text in filter(None, os.environ.get(FOLDERS_VARIABLE, "").split(os.pathsep)):
-        if not Path(text).is_dir():
+        if not os.path.isdir(text):
             raise FileError(f"there is no folder {text!r}", Where(FOLDERS_VARIABLE))
         folders.append(Path(text))
     for each in folders:
-        for path in sorted(each.iterdir()):
-            if path.suffix in _ENDINGS and path.is_file():
+        try:
+            inside = sorted(os.listdir(each))
+        except OSError as error:
+            raise FileError(f"cannot be read: {error.strerror}", Where(str(each))) from error
+        for path in map(each.joinpath, inside):
+            if path.suffix in _ENDINGS and os.path.isfile(path):
                 found.setdefault(path.stem, path)
     return {name: found[name] for name in sorted(found.keys() - set(library_names()))}
 
@@ -50,7 +54,7 @@ def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
 
     Raises:
         FormulaError: there is none of that name, with the nearest name over all.
-        FileError: a folder of the variable is not there, or the file leads out of the scene's folder.
+        FileError: a folder of the variable is not there, a folder cannot be read, or the file leads out of the scene's folder.
     """
     library = library_names()
     if name in library:
@@ -58,8 +62,7 @@ def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
     try:
         files = own_files(beside)
     except FileError as error:
-        message = f"{FOLDERS_VARIABLE}: {error.message}; {unknown_name('formula', name, library)}"
-        raise FileError(message, where) from error
+        raise FileError(f"{error}; {unknown_name('formula', name, library)}", where) from error
     if name not in files:
         raise FormulaError(unknown_name("formula", name, (*library, *files)), where)
     path = files[name]

@@ -28,14 +28,19 @@ def inlined(document: Document, folder: Path) -> Document:
     if formula is None:
         return document
     try:
-        changed = _without_files(formula, ("formula",), folder)
+        changed = _without_files(formula, ("formula",), folder, folder)
     except ClfractalError as error:
         raise document.locate(error) from error
     return document if changed is formula else document.replaced(("formula",), changed)
 
 
-def _without_files(node: Node, path: tuple[str, ...], folder: Path) -> Node:
-    """A mapping that has one of `file` and `chain`, with texts in the place of files; any other node as it is."""
+def _without_files(node: Node, path: tuple[str, ...], folder: Path, beside: Path) -> Node:
+    """A mapping that has one of `file`, `name` and `chain`, with texts in the place of files; any other node as it is.
+
+    Args:
+        folder: where files are looked for: that of the scene, or of the formula of one's own that names them.
+        beside: the scene's folder, in which formulas of one's own are looked for by name.
+    """
     given = {word: node.child(word) for word in _SOURCES}
     sources = [word for word, child in given.items() if child is not None and child.value is not None]
     source = node.child(sources[0]) if len(sources) == 1 else None
@@ -43,7 +48,7 @@ def _without_files(node: Node, path: tuple[str, ...], folder: Path) -> Node:
         return node
     if isinstance(source.value, str) and source.value and sources[0] in ("file", "name"):
         given_as = sources[0]
-        text = _read(source, path, folder) if given_as == "file" else _read_own(source, path, folder)
+        text = (_read if given_as == "file" else _read_own)(source, path, folder, beside)
         if text is None:
             return node
         inner = {"inline" if key == given_as else key: child for key, child in node.value.items()}
@@ -52,7 +57,8 @@ def _without_files(node: Node, path: tuple[str, ...], folder: Path) -> Node:
         return replace(node, value=inner, keys=keys)
     if sources == ["chain"] and isinstance(source.value, list) and len(source.value) <= MAX_LINKS:
         links = [
-            _without_files(link, (*path, "chain", str(i)), folder) for i, link in enumerate(source.value)
+            _without_files(link, (*path, "chain", str(i)), folder, beside)
+            for i, link in enumerate(source.value)
         ]
         if all(new is old for new, old in zip(links, source.value, strict=True)):
             return node
@@ -60,28 +66,30 @@ def _without_files(node: Node, path: tuple[str, ...], folder: Path) -> Node:
     return node
 
 
-def _read(file: Node, path: tuple[str, ...], folder: Path) -> Node:
+def _read(file: Node, path: tuple[str, ...], folder: Path, beside: Path) -> Node | None:
     """The text of a formula file as a node, files that it names read too."""
     from clfractal.formulas.catalog import safe_path
 
     where = Where(path=".".join((*path, "file")))
     found = safe_path(file.value, folder, where)
-    return _text(found, str(folder / file.value), where, path, folder)
+    return _text(found, str(folder / file.value), where, path, folder, beside)
 
 
-def _read_own(name: Node, path: tuple[str, ...], folder: Path) -> Node | None:
+def _read_own(name: Node, path: tuple[str, ...], folder: Path, beside: Path) -> Node | None:
     """The same for a name of a formula of one's own; None for a name of the library."""
     from clfractal.formulas.own import find_own
 
     where = Where(path=".".join((*path, "name")))
-    found = find_own(name.value, folder, where)
-    return None if found is None else _text(found, str(found), where, path, found.resolve().parent)
+    found = find_own(name.value, beside, where)
+    return None if found is None else _text(found, str(found), where, path, found.resolve().parent, beside)
 
 
-def _text(found: Path, shown: str, where: Where, path: tuple[str, ...], folder: Path) -> Node:
+def _text(
+    found: Path, shown: str, where: Where, path: tuple[str, ...], folder: Path, beside: Path
+) -> Node:
     try:
         text = read_text_file(found, name=shown)
     except FileError as error:
         raise FileError(error.inside(shown), where) from error
     root = read_document(text, shown, error=FormulaError).root
-    return _without_files(root, (*path, "inline"), folder) if len(path) < _DEEPEST else root
+    return _without_files(root, (*path, "inline"), folder, beside) if len(path) < _DEEPEST else root

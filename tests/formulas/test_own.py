@@ -85,6 +85,17 @@ def test_members_of_chains_and_files_of_formulas(place: Path) -> None:
     assert load_scene(path).chain.links[1].bound.formula.title == "Ball"
 
 
+def test_a_chain_of_ones_own_names_the_formulas_beside_it(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In `formulas` beside the scene as on the shelf; also for those who have no scene."""
+    folder = place / "scenes" / "formulas"
+    (folder / "round.yaml").write_text(BALL)
+    (folder / "both.yaml").write_text("chain: [{name: round, count: 2}, {name: hast}]\n")
+    assert [link.bound.formula.title for link in scene_of(place, "both").chain.links][0] == "Ball"
+    monkeypatch.chdir(folder.parent)
+    assert catalog.load_chain("both").links[0].bound.formula.title == "Ball"
+    assert "round x 2" in tell_formula("both")
+
+
 def test_python_and_the_list_know_them(place: Path) -> None:
     (place / "shelf" / "round.yaml").write_text(BALL)
     (place / "elsewhere" / "formulas").mkdir()
@@ -132,4 +143,19 @@ def test_what_cannot_be_used_is_told(place: Path, monkeypatch: pytest.MonkeyPatc
     with pytest.raises(ClfractalError, match="there is no folder"):
         list_formulas()
     # The library needs no other folder.
+    assert scene_of(place, "hast").formula.name == "hast"
+
+
+def test_a_folder_that_cannot_be_read_is_named(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those who may read every file see this error only in a test."""
+
+    def refused(path: Path) -> list[str]:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr("clfractal.formulas.own.os.listdir", refused)
+    with pytest.raises(ClfractalError) as caught:
+        scene_of(place, "mandelbx")
+    folder = place / "scenes" / "formulas"
+    assert f"formula.name: {folder}: cannot be read: Permission denied; unknown" in str(caught.value)
+    assert "did you mean 'mandelbox'?" in str(caught.value)
     assert scene_of(place, "hast").formula.name == "hast"
