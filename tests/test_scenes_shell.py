@@ -13,12 +13,14 @@ import pytest
 import clfractal
 from clfractal.commands import scenes as scenes_command
 from clfractal.commands import watch
+from clfractal.commands.new import scene_text
 from clfractal.errors import SceneError
 from clfractal.files.png import read_png_pixels
 from clfractal.files.watching import Watched
 from clfractal.scene.load import load_scene
 from clfractal.work import thumbnails
 from clfractal.work.engine import Engine
+from clfractal.work.framing import Framing
 from clfractal.work.quality import PRESETS, with_quality
 from tests.shell import SCENE, InProcess
 
@@ -127,7 +129,17 @@ def test_what_new_refuses(clf: InProcess) -> None:
     Path("f.yaml").write_text("variables: [x, y, z]\nmap: [x +, y, z]\n")
     assert clf("new", "x", "--formula", "f.yaml").is_one_line(2, "f.yaml:")
     assert clf("new", "none/x").is_one_line(2, "none")
+    for name in ("", ".", "..", "/"):
+        assert clf("new", name).is_one_line(2, "NAME: must name a file")
     assert sorted(path.name for path in Path().iterdir()) == ["f.yaml", "scene.yaml"]
+
+
+def test_commands_in_a_new_scene_can_be_copied() -> None:
+    found = Framing(5, (0, 0, 0), 30, 20, 3, ((1, 1, -1), (-1, 0, 0)), "viridis", 1, 0, 0)
+    for file, shown in (("first.yaml", "first.yaml"), ("my scene.yaml", '"my scene.yaml"')):
+        text = scene_text(file, {"name": "mandelbulb"}, found)
+        for command in ("render", "watch", "view"):
+            assert f"`clfractal {command} {shown}`" in text
 
 
 # --- watch ---
@@ -216,7 +228,15 @@ def test_what_watch_refuses_at_once(clf: InProcess) -> None:
     assert clf("watch", "scene.yaml", "--set", "camera.fow=3").is_one_line(2, "--set camera.fow: unknown key")
     assert clf("watch", "scene.yaml", "--quality", "god").is_one_line(2, "--quality: unknown quality 'god'")
     assert clf("watch", "scene.yaml", "--device", "abacus").is_one_line(2, "abacus")
+    # What no change of the scene can mend: waiting for one would be in vain.
+    for output, message in (
+        ("scene.yaml", "scene.yaml: unknown extension"),
+        ("none/out.png", "there is no folder 'none'"),
+    ):
+        assert clf("watch", "scene.yaml", "-o", output).is_one_line(2, message)
     assert [path.name for path in Path().iterdir()] == ["scene.yaml"]
+    Path("scene.yaml").rename("scene.png")
+    assert clf("watch", "scene.png").is_one_line(2, "scene.png: would be overwritten")
 
 
 # --- quality ---
@@ -255,6 +275,8 @@ def test_presets_of_other_renderers_and_of_views() -> None:
     assert kept.renderer.samples == 1
     assert kept.renderer.noise == 0.02
     assert kept.layout == plane.layout
+    for section in ("layout", "layout.views", "layout.views.0"):
+        assert with_quality(plane, "good", kept=[section]).layout == plane.layout
 
 
 def test_explicit_options_win(clf: InProcess) -> None:

@@ -26,6 +26,7 @@ _ORDER = (
     "vary",
     "slices",
     "check",
+    "probe",
     "formulas",
     "devices",
     "bench",

@@ -10,9 +10,12 @@ import typer
 from clfractal.commands.options import (
     DeviceOption,
     Overrides,
+    Precision,
     Quality,
     Quiet,
+    Samples,
     Scene,
+    Size,
     Verbose,
     Work,
     app,
@@ -33,14 +36,8 @@ def render(
         ),
     ] = None,
     device: DeviceOption = None,
-    precision: Annotated[
-        str | None,
-        typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
-    ] = None,
-    size: Annotated[
-        str | None,
-        typer.Option("--size", metavar="WxH", help="Size in pixels; the camera stays where it is."),
-    ] = None,
+    precision: Precision = None,
+    size: Size = None,
     overrides: Overrides = None,
     region: Annotated[
         str | None,
@@ -50,7 +47,7 @@ def render(
             help="Render only this part of the picture; pixels from the top left.",
         ),
     ] = None,
-    samples: Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")] = None,
+    samples: Samples = None,
     quality: Quality = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the work kept in OUTPUT.partial.")
@@ -104,10 +101,7 @@ def slices(
         int, typer.Option("--start", metavar="N", help="Number of the first slice to render.")
     ] = 1,
     device: DeviceOption = None,
-    precision: Annotated[
-        str | None,
-        typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
-    ] = None,
+    precision: Precision = None,
     size: Annotated[
         str | None, typer.Option("--size", metavar="WxH", help="Size in pixels; the plane stays where it is.")
     ] = None,

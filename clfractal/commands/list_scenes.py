@@ -13,7 +13,9 @@ from clfractal.commands.options import (
     Precision,
     Quality,
     Quiet,
+    Samples,
     Scene,
+    Size,
     Verbose,
     Work,
     app,
@@ -87,11 +89,8 @@ def watch(
             "-o", "--output", help="A picture file; repeatable.  [default: the scene's name with .png]"
         ),
     ] = None,
-    size: Annotated[
-        str | None,
-        typer.Option("--size", metavar="WxH", help="Size in pixels; the camera stays where it is."),
-    ] = None,
-    samples: Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")] = None,
+    size: Size = None,
+    samples: Samples = None,
     quality: Quality = None,
     device: DeviceOption = None,
     precision: Precision = None,

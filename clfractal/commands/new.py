@@ -69,6 +69,8 @@ def new_scene(name: str, formula: str | None, device: str | None, shell: Shell) 
     """
     shell.mute_drivers()
     path = Path(name)
+    if path.name in ("", ".."):
+        raise FileError("must name a file", Where("NAME"))
     if path.suffix.lower() not in EXTENSIONS:
         path = path.with_name(f"{path.name}.yaml")
     check_output(path, EXTENSIONS)
@@ -112,7 +114,7 @@ def scene_text(file: str, formula: Mapping[str, Any], found: Framing) -> str:
     title = Path(file).stem.replace("_", " ").replace("-", " ")
     return _TEXT.format(
         title=title[:1].upper() + title[1:],
-        file=file,
+        file=f'"{file}"' if " " in file else file,
         formula_name=source if kind == "name" else "NAME",
         formula=flow_text({**formula, "iterations": found.iterations}),
         lights=lights,

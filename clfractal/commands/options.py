@@ -51,6 +51,11 @@ Precision = Annotated[
     str | None,
     typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
 ]
+Size = Annotated[
+    str | None,
+    typer.Option("--size", metavar="WxH", help="Size in pixels; the camera stays where it is."),
+]
+Samples = Annotated[int | None, typer.Option("--samples", help="Rays per pixel, in total.")]
 Quality = Annotated[
     str | None,
     typer.Option(

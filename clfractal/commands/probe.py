@@ -42,7 +42,8 @@ def probe_pixel(order: Order, pixel: str, shell: Shell, *, as_json: bool) -> Non
             f"must lie inside the picture of {region.width} x {region.height} pixels, got {x},{y}",
             Where("X,Y"),
         )
-    found = probed(job, x, y, engine.look)
+    with speaking_of(order.scene):
+        found = probed(job, x, y, engine.look)
     shell.print(json.dumps(found.plain(), indent=2) if as_json else _text(found))
 
 

@@ -15,7 +15,8 @@ from clfractal.commands.pipes import INPUT, STREAM, refuse_stream
 from clfractal.commands.render import checked_outputs, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Stopped, Where, speaking_of
-from clfractal.files.inputs import noting
+from clfractal.files.atomic import check_output
+from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.files.watching import Watched
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import APART
@@ -43,6 +44,10 @@ def watch_scene(order: Order, shell: Shell) -> None:
         refuse_stream(path, "each picture replaces the one before; name a file")
     if not order.outputs:
         order = replace(order, outputs=(Path(Path(order.scene).with_suffix(".png").name),))
+    # What no change of the scene can mend.
+    for path in order.outputs:
+        check_output(path)
+    refuse_overwriting(order.outputs, [order.scene])
     shell.mute_drivers()
     watched = Watched([Path(order.scene)], interval=_INTERVAL)
     try:

@@ -54,7 +54,8 @@ def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
 
     Raises:
         FormulaError: there is none of that name, with the nearest name over all.
-        FileError: a folder of the variable is not there, a folder cannot be read, or the file leads out of the scene's folder.
+        FileError: a folder of the variable is not there, a folder cannot be read, or the file leads out of the scene's
+            folder.
     """
     library = library_names()
     if name in library:

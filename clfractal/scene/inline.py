@@ -84,9 +84,7 @@ def _read_own(name: Node, path: tuple[str, ...], folder: Path, beside: Path) -> 
     return None if found is None else _text(found, str(found), where, path, found.resolve().parent, beside)
 
 
-def _text(
-    found: Path, shown: str, where: Where, path: tuple[str, ...], folder: Path, beside: Path
-) -> Node:
+def _text(found: Path, shown: str, where: Where, path: tuple[str, ...], folder: Path, beside: Path) -> Node:
     try:
         text = read_text_file(found, name=shown)
     except FileError as error:

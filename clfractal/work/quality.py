@@ -34,7 +34,8 @@ def with_quality(scene: Scene, quality: str, *, kept: Collection[str] = ()) -> S
 
     Args:
         quality: `draft`, `good`, `final` or `print`.
-        kept: dotted paths of settings that stay, such as `renderer.samples`, or `renderer` for all of them.
+        kept: dotted paths of settings that stay, such as `renderer.samples`, or `renderer` for all of them; `layout` keeps
+            those of its views.
 
     Raises:
         SceneError: there is no such preset.
@@ -57,14 +58,20 @@ def with_quality(scene: Scene, quality: str, *, kept: Collection[str] = ()) -> S
 
 
 def _preset(renderer: Any, preset: Preset, path: str, kept: Collection[str]) -> Any:
-    if path in kept:
-        return renderer
     values = {"samples": preset.samples, "noise": preset.noise, "detail": preset.detail}
     fields = type(renderer).model_fields
     chosen = {
-        name: value for name, value in values.items() if name in fields and f"{path}.{name}" not in kept
+        name: value
+        for name, value in values.items()
+        if name in fields and not _is_kept(f"{path}.{name}", kept)
     }
     # (A least number of samples belongs to another number of them.)
-    if "samples" in chosen and f"{path}.min_samples" not in kept:
+    if "samples" in chosen and not _is_kept(f"{path}.min_samples", kept):
         chosen["min_samples"] = None
     return renderer.model_copy(update=chosen)
+
+
+def _is_kept(path: str, kept: Collection[str]) -> bool:
+    """Whether a setting is kept, or a section that it lies in."""
+    parts = path.split(".")
+    return any(".".join(parts[:count]) in kept for count in range(1, len(parts) + 1))

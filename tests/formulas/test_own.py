@@ -85,12 +85,14 @@ def test_members_of_chains_and_files_of_formulas(place: Path) -> None:
     assert load_scene(path).chain.links[1].bound.formula.title == "Ball"
 
 
-def test_a_chain_of_ones_own_names_the_formulas_beside_it(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chain_of_ones_own_names_the_formulas_beside_it(
+    place: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In `formulas` beside the scene as on the shelf; also for those who have no scene."""
     folder = place / "scenes" / "formulas"
     (folder / "round.yaml").write_text(BALL)
     (folder / "both.yaml").write_text("chain: [{name: round, count: 2}, {name: hast}]\n")
-    assert [link.bound.formula.title for link in scene_of(place, "both").chain.links][0] == "Ball"
+    assert scene_of(place, "both").chain.links[0].bound.formula.title == "Ball"
     monkeypatch.chdir(folder.parent)
     assert catalog.load_chain("both").links[0].bound.formula.title == "Ball"
     assert "round x 2" in tell_formula("both")

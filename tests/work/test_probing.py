@@ -190,3 +190,6 @@ def test_the_shell(shell: InProcess) -> None:
 )
 def test_pixels_that_are_not_there(pixel: str, message: str, shell: InProcess) -> None:
     assert shell("probe", "scene.yaml", pixel).is_one_line(2, message)
+    layout = "layout={columns: 2, gap: 4, views: [{}, {}]}"
+    between = "scene.yaml: the pixel 20,18 lies between the views of the layout"
+    assert shell("probe", "scene.yaml", "20,18", "--set", layout).is_one_line(2, between)
