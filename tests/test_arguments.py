@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -168,6 +169,29 @@ def test_a_copy_of_a_section_is_checked() -> None:
 
     assert isinstance(plane, CutPlaneRenderer)
     refused(lambda: moved(plane.plane, normal=1e9), "center", clfractal.SceneError)
+
+
+def test_a_section_that_is_made_by_hand_is_checked() -> None:
+    """With the errors of a file; sections and classes of sections may stand for their mappings."""
+    from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
+
+    least: dict[str, Any] = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}}
+    for change, message in (
+        ({"camera": {"fov": 400}}, "camera.fov: must be below 180, got 400"),
+        ({"kamera": {}}, "unknown key 'kamera'; did you mean 'camera'?"),
+        ({"camera": {"projection": "fisheye"}}, "camera.projection: unknown projection 'fisheye'"),
+        ({"formula": {}}, "formula: needs one of name, file, inline or chain"),
+    ):
+        refused(lambda change=change: clfractal.Scene(**{**least, **change}), message, clfractal.SceneError)  # type: ignore[misc]
+    refused(clfractal.Scene, "version: is missing")
+    refused(lambda: PerspectiveCamera(fov=400), "fov: must be below 180, got 400")
+    made = clfractal.Scene(
+        **{**least, "camera": OrthographicCamera(height=2), "image": Image(width=np.int64(8))}
+    )
+    assert made == clfractal.load_scene(
+        {**least, "camera": {"projection": "orthographic", "height": 2}, "image": {"width": 8}}
+    )
+    assert list(inspect.signature(clfractal.Scene).parameters)[:3] == ["version", "formula", "camera"]
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import numpy as np
 from clfractal.commands.pipes import piped
 from clfractal.commands.shell import Shell
 from clfractal.commands.voxelize import GridOrder, load_order, speaking_of_order, talk_of
+from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
@@ -46,7 +47,8 @@ def _make_mesh(order: GridOrder, shell: Shell, level: float | None, close: bool)
     read = read_bytes(Path(order.source), prefix=8)
     is_volume = read.startswith((MAGIC, _NPY))
     mesh = (_of_file if is_volume else _of_scene)(order, shell, level, close)
-    write_mesh(order.output, mesh)
+    with doing(f"writing {order.output}"):
+        write_mesh(order.output, mesh)
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
     shell.say(
@@ -80,7 +82,7 @@ def _of_file(order: GridOrder, shell: Shell, level: float | None, close: bool) -
     for option, value in (("--set", order.overrides), ("--resolution", order.resolution)):
         if value:
             raise SceneError("applies to scenes only; the source is a volume", Where(option))
-    with noting() as files:
+    with noting() as files, doing(f"reading {order.source}"):
         volume = read_volume(order.source)
     refuse_overwriting([order.output], files)
     from clfractal.work import meshes

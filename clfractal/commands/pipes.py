@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 from clfractal.commands.shell import OUTPUT, Shell
+from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.files.atomic import file_error
 from clfractal.files.regular import MAX_BYTES
@@ -88,7 +89,8 @@ def piped(shell: Shell, source: str, outputs: Sequence[tuple[Path, str]]) -> Ite
         if source == STREAM:
             scene = folder / "scene"
             shell.names[str(scene)] = INPUT
-            _spool(scene)
+            with doing(f"reading {INPUT}"):
+                _spool(scene)
             yield Piped(str(scene), Path(), tuple(used), streamed)
         else:
             yield Piped(source, None, tuple(used), streamed)

@@ -103,6 +103,7 @@ class Shell:
 
     def status(self, line: str) -> None:
         """A line on a terminal that the next output replaces."""
+        line = self._named(line)
         with self._writing, suppress(OSError, ValueError):
             if not self._interrupted:
                 self._errors.write(_CLEAR + line)
@@ -232,9 +233,13 @@ class Shell:
             return tail.decode("utf-8", "replace")
         return ""
 
-    def _write(self, line: str) -> None:
+    def _named(self, line: str) -> str:
         for path, name in self.names.items():
             line = line.replace(path, name)
+        return line
+
+    def _write(self, line: str) -> None:
+        line = self._named(line)
         # (Whoever holds the lock may hang: last words do not wait for that.)
         held = self._writing.acquire(timeout=0.1)
         try:

@@ -15,6 +15,7 @@ from clfractal.commands.order import naming_options
 from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.progress import LINE_EVERY_SECONDS
 from clfractal.commands.shell import Shell
+from clfractal.device.activity import doing
 from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
@@ -102,7 +103,8 @@ def _voxelize(order: GridOrder, shell: Shell, compress: bool) -> None:
             grids.refuse_resolution(order.resolution)
         else:
             volume, _ = grids.filled(scene, coloring, order.device, talk_of(order, shell))
-    write_volume(order.output, volume, compress=compress)
+    with doing(f"writing {order.output}"):
+        write_volume(order.output, volume, compress=compress)
     shell.state = lambda: "clfractal: interrupted"
     size = memory.shown(order.output.stat().st_size)
     sides = " x ".join(map(str, volume.values.shape[::-1]))

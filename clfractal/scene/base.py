@@ -4,13 +4,23 @@ The models name their types without `from __future__ import annotations`, and ar
 keep the import of the schema short.
 """
 
-from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Self, TypeAlias
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, ValidationError, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from clfractal.arguments import plain
+from clfractal.errors import SceneError, Where
 from clfractal.scene.hex_color import AS_TEXT
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -28,14 +38,43 @@ Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False), AS_TEXT]
 Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False), AS_TEXT]
 
 
+class _Kind(type(BaseModel)):  # type: ignore[misc]
+    """The class of sections: whoever makes one by calling it gets our own errors.
+
+    Not `__init__`: with one of its own, pydantic would call it for each section within a section too.
+    """
+
+    if not TYPE_CHECKING:
+
+        def __call__(cls, *arguments: Any, **values: Any) -> Any:
+            with _own_errors(cls):
+                return super().__call__(*arguments, **values)
+
+
+@contextmanager
+def _own_errors(cls: Any) -> Iterator[None]:
+    """Raises SceneError, with a path, where a section is refused."""
+    try:
+        yield
+    except ValidationError as error:
+        # Loaded for mistakes only.
+        from clfractal.files.marks import Document, node_from_plain
+        from clfractal.scene.messages import first_error
+
+        raise first_error(error, Document(node_from_plain({}, None)), cls) from None
+
+
 # Names of sections that are no part of the Python API.
 _FOR_OURSELVES = frozenset({"checked", "note_files", "placed", "tag"})
 
 
-class Section(BaseModel):
+class Section(BaseModel, metaclass=_Kind):
     """A mapping of the scene: unknown keys are errors, values are not converted, and it is immutable.
 
     `tag` is the word that chooses the class where several share a place.
+
+    Raises:
+        SceneError: a value is wrong, or a value of a section that exists is set; the path says which.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
@@ -65,14 +104,17 @@ class Section(BaseModel):
         Raises:
             SceneError: a value is wrong; the path says which.
         """
-        try:
+        with _own_errors(cls):
             return cls.model_validate(values)
-        except ValidationError as error:
-            # Loaded for mistakes only.
-            from clfractal.files.marks import Document, node_from_plain
-            from clfractal.scene.messages import first_error
 
-            raise first_error(error, Document(node_from_plain({}, None)), cls) from None
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Only what is derived may be set; values change in a copy."""
+        if not name.startswith("_"):
+            raise SceneError(
+                f"cannot be set; model_copy(update={{{name!r}: ...}}) gives a copy with another value",
+                Where(path=name),
+            )
+        super().__setattr__(name, value)
 
     @model_validator(mode="before")
     @classmethod
@@ -98,14 +140,35 @@ def problem(message: str, at: str = "") -> PydanticCustomError:
     return PydanticCustomError("clfractal", "{message}", {"message": message, "at": at})
 
 
-def chosen_by(key: str, default: str) -> Discriminator:
-    """Chooses a class of a union by the word under `key`; without the key it is `default`."""
+class _ByKey:
+    """For a union of sections: the word under a key chooses one of them, and without the key it is the default's."""
 
-    def choose(value: Any) -> str:
-        found = value.get(key, default) if isinstance(value, Mapping) else getattr(value, key, default)
+    def __init__(self, key: str, default: str) -> None:
+        self.key, self.default = key, default
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """As pydantic's unions of which a function chooses."""
+        return Discriminator(self._choose).__get_pydantic_core_schema__(source, handler)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        """One of the sections. All but the default need their word: else a mapping without it would be all of them."""
+        found: dict[str, Any] = handler(schema)
+        # Keys beside a reference hold too.
+        found["oneOf"] = [
+            section if word == self.default else {**section, "required": [self.key]}
+            for word, section in zip(schema["choices"], found["oneOf"], strict=True)
+        ]
+        return found
+
+    def _choose(self, value: Any) -> str:
+        given = isinstance(value, Mapping)
+        found = value.get(self.key, self.default) if given else getattr(value, self.key, self.default)
         return found if isinstance(found, str) else repr(found)
 
-    return Discriminator(choose)
+
+def chosen_by(key: str, default: str) -> _ByKey:
+    """Chooses a class of a union by the word under `key`; without the key it is `default`."""
+    return _ByKey(key, default)
 
 
 def chosen_by_word(word: str, other: str) -> Discriminator:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal import resources
+from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, unknown_name
 
 if TYPE_CHECKING:
@@ -62,7 +63,8 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
     where = Where(path="environment.file")
     path = safe_path(environment.file, folder, where)
     try:
-        return EnvironmentMap(read_environment(path))
+        with doing(f"reading {path}"):
+            return EnvironmentMap(read_environment(path))
     except FileError as error:
         raise FileError(error.inside(str(path)), where, details=error.details) from error
 

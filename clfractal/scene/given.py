@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.scene.base import Vector
 
@@ -51,11 +52,17 @@ def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
     Raises:
         FileError: at renderer.file, for a file out of the folder, or whatever is wrong with it.
     """
-    from clfractal.files.volume import read_volume
     from clfractal.formulas.catalog import safe_path
 
     assert renderer.file is not None
     path = safe_path(renderer.file, folder, _WHERE)
+    with doing(f"reading {path}"):
+        return _read(renderer, path)
+
+
+def _read(renderer: VolumeRenderer, path: Path) -> GivenGrid:
+    from clfractal.files.volume import read_volume
+
     try:
         volume = read_volume(path)
     except FileError as error:

@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from clfractal import arguments
+from clfractal.device.activity import doing
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.embedded import is_picture, read_scene_text
@@ -119,7 +120,7 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
     path = Path(source)
     if str(source) == "":
         raise FileError("a scene needs a file name")
-    with noting() as files:
+    with noting() as files, doing(f"reading {path}"):
         text = read_text(path)
     return SceneText(read_document(text, str(source)), path.parent, tuple(files))
 

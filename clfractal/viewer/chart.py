@@ -221,10 +221,7 @@ def _font(high: int) -> Any:
     file = _font_file()
     if file is not None:
         return ImageFont.truetype(str(file), high)
-    try:
-        return ImageFont.load_default(high)
-    except TypeError:  # before Pillow 10.1 it had one size
-        return ImageFont.load_default()
+    return ImageFont.load_default(high)
 
 
 def _write(picture: Pixels, text: str, box: Box, high: int, value: int = 255) -> None:

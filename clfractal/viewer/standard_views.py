@@ -6,8 +6,8 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import ValidationError
 
+from clfractal.errors import SceneError
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST, framing, least_distance, room
 from clfractal.viewer.pointer import Floats, Size
@@ -82,7 +82,7 @@ def to_orthographic(
         return OrthographicCamera(
             position=_plain(position), target=camera.target, up=camera.up, height=height
         )
-    except ValidationError:  # `up` was nearly along the view, and is so now
+    except SceneError:  # `up` was nearly along the view, and is so now
         return OrthographicCamera(
             position=_plain(position), target=camera.target, up=_plain(pose.up), height=height
         )
@@ -118,7 +118,7 @@ def to_perspective(
     lens["fov"] = float(np.clip(used, _LEAST_FOV, _MOST_FOV))
     try:
         return PerspectiveCamera(position=_plain(position), target=camera.target, up=camera.up, **lens)
-    except ValidationError:  # as above
+    except SceneError:  # as above
         return PerspectiveCamera(position=_plain(position), target=camera.target, up=_plain(pose.up), **lens)
 
 
