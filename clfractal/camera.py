@@ -71,7 +71,8 @@ def shift(scene: Scene, *, right: float = 0.0, up: float = 0.0, forward: float =
 def frame(scene: Scene) -> Scene:
     """The camera, without a turn, where the bounds of the set fill 90 % of the picture's smaller side.
 
-    The bounds' middle becomes the target. Bounds hold all of the set, and may be larger than it is.
+    The bounds' middle becomes the target. Bounds hold all of the set, and may be larger than it is. Of a volume with a box
+    of its own, or a grid from a file, the corners fill 90 % of the picture's width or height.
 
     Raises:
         FormulaError: the scene's formula has no bounds, because it is wrong.

@@ -38,7 +38,13 @@ Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False), AS_TEXT]
 Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False), AS_TEXT]
 
 
-class _Kind(type(BaseModel)):  # type: ignore[misc]
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)  # (pydantic has no public name for it)
+
+
+class _Kind(ModelMetaclass):
     """The class of sections: whoever makes one by calling it gets our own errors.
 
     Not `__init__`: with one of its own, pydantic would call it for each section within a section too.
@@ -46,8 +52,8 @@ class _Kind(type(BaseModel)):  # type: ignore[misc]
 
     if not TYPE_CHECKING:
 
-        def __call__(cls, *arguments: Any, **values: Any) -> Any:
-            with _own_errors(cls):
+        def __call__(self, *arguments: Any, **values: Any) -> Any:
+            with _own_errors(self):
                 return super().__call__(*arguments, **values)
 
 
@@ -95,17 +101,21 @@ class Section(BaseModel, metaclass=_Kind):
         if not update:
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in type(self).model_fields}
-        return self.checked({**values, **update})
+        return self.checked({**values, **update}, self._context())
+
+    def _context(self) -> dict[str, Any]:
+        """What the checks of a copy's values have to know."""
+        return {}
 
     @classmethod
-    def checked(cls, values: Mapping[str, Any]) -> Self:
-        """A section with these values.
+    def checked(cls, values: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> Self:
+        """A section with these values; `context` as for `Scene`'s checks.
 
         Raises:
             SceneError: a value is wrong; the path says which.
         """
         with _own_errors(cls):
-            return cls.model_validate(values)
+            return cls.model_validate(values, context=dict(context or {}))
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Only what is derived may be set; values change in a copy."""

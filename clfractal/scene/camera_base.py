@@ -16,7 +16,7 @@ from clfractal.scene.base import (
     minus,
     problem,
 )
-from clfractal.scene.stance import LARGEST, angles, axes, framing, orbited, rolled, shifted
+from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbited, rolled, shifted
 
 
 class Orbit(Section):
@@ -64,7 +64,7 @@ class CameraBase(Section):
     frame: Literal["all"] | None = Field(
         default=None,
         exclude=True,
-        description="all: target and distance are chosen so that the bounds fill 90 % of the picture",
+        description="all: target and distance are chosen so that the bounds, or a volume's own box, fill 90 % of it",
     )
     roll: Angle | None = Field(
         default=None,
@@ -91,20 +91,19 @@ class CameraBase(Section):
             self._take_shift()
         return self
 
-    def framed(self, center: Vector, radius: float, aspect: float) -> Self:
-        """The camera with its `frame` and `shift` done, for a ball that is to be seen.
+    def framed(self, shown: Extent, aspect: float) -> Self:
+        """The camera with its `frame` and `shift` done.
 
         Args:
-            center, radius: of the ball, scene units.
+            shown: what is to be seen.
             aspect: width of the picture divided by its height.
 
         Raises:
             SceneError: `shift` leads out of the range of coordinates.
         """
         fov = getattr(self, "fov", None)
-        axis = axes(self.position, self.target, self.up)[0]
-        position, height = framing(axis, center, radius, aspect, fov)
-        update = {"position": position, "target": center, "frame": None}
+        position, height = framing(axes(self.position, self.target, self.up), shown, aspect, fov)
+        update = {"position": position, "target": shown.center, "frame": None}
         return self.model_copy(update=update if height is None else {**update, "height": height})
 
     @property

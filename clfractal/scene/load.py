@@ -145,7 +145,7 @@ def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple
     if not isinstance(plain, dict):
         raise SceneError("must be a mapping with version, formula and camera", document.where(()))
     try:
-        return document, Scene.model_validate(plain).placed(folder)
+        return document, Scene.model_validate(plain, context={"folder": folder})
     except ValidationError as error:
         raise first_error(error, document, Scene) from error
 

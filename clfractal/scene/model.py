@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from clfractal.errors import ClfractalError
 from clfractal.files.inputs import noting
@@ -21,8 +21,10 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
+from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import VolumeRenderer
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
@@ -74,8 +76,12 @@ class Scene(Section):
         return type(other) is type(self) and all(getattr(self, key) == getattr(other, key) for key in fields)
 
     @model_validator(mode="after")
-    def _frame_cameras(self) -> Self:
-        """Cameras with `frame: all` get their places, those of views and bookmarks too."""
+    def _frame_cameras(self, info: ValidationInfo) -> Self:
+        """Cameras with `frame: all` get their places, those of views and bookmarks too.
+
+        What is shown may stand in a file: the context tells where that is looked for.
+        """
+        self._folder = (info.context or {}).get("folder", self._folder)
         views = self.layout.views if self.layout is not None else ()
         own = [view.camera for view in views if view.camera is not None]
         if all(camera.frame is None for camera in (self.camera, *own, *self.bookmarks.values())):
@@ -100,14 +106,33 @@ class Scene(Section):
     def _framed(self, camera: AnyCamera) -> AnyCamera:
         if camera.frame is None:
             return camera
-        center, radius = self.bounds
-        return camera.framed(center, radius, self.image.width / self.image.height)
+        return camera.framed(self.extent, self.image.width / self.image.height)
 
     @property
     def bounds(self) -> tuple[Vector, float]:
         """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
         own = self.renderer.bounds if isinstance(self.renderer, SurfaceRenderer) else None
         return (own.center, own.radius) if own else (self.chain.center, self.chain.radius)
+
+    @property
+    def extent(self) -> Extent:
+        """All that a picture can show of the object: the bounds, or the box of a volume that has its own.
+
+        Raises:
+            FormulaError, FileError, SceneError: what it follows from is wrong; the path says where.
+        """
+        renderer = self.renderer
+        if isinstance(renderer, VolumeRenderer):
+            given = self.given
+            if given is not None:
+                sides = [
+                    side * count for side, count in zip(given.spacing, given.values.shape[::-1], strict=True)
+                ]
+                x, y, z = (corner + side / 2 for corner, side in zip(given.corner, sides, strict=True))
+                return Extent.box((x, y, z), (sides[0], sides[1], sides[2]))
+            if renderer.box is not None:
+                return Extent.box(renderer.box.center, renderer.box.sides)
+        return Extent(*self.bounds)
 
     @property
     def folder(self) -> Path:
@@ -143,6 +168,9 @@ class Scene(Section):
             if name in _SECTIONS and _SECTIONS[name] not in (update or ())
         }
         return copied
+
+    def _context(self) -> dict[str, Any]:
+        return {"folder": self._folder}
 
     def _once(self, name: str, read: Callable[[], T]) -> T:
         """The data kept under a name; they are read first if there are none."""
@@ -189,8 +217,6 @@ class Scene(Section):
             FileError: its file is missing or wrong; the path says where.
             SceneError: the renderer's level is beyond its values.
         """
-        from clfractal.scene.volume import VolumeRenderer
-
         renderer = self.renderer
         if not isinstance(renderer, VolumeRenderer) or renderer.file is None:
             return None

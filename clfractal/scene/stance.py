@@ -4,6 +4,8 @@ Scene units and degrees. Plain arithmetic without NumPy, so that reading a scene
 """
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import product
 from math import atan2, degrees, hypot, inf, radians, tan
 
 from clfractal.scene.base import Vector, cross, dot, length, minus, unit
@@ -69,13 +71,29 @@ def shifted(
     return _sum((1.0, point), (forward, along[0]), (right, along[1]), (up, along[2]))
 
 
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """What is to be seen: a ball, or the box with these sides, along the axes, that the ball goes round; scene units."""
+
+    center: Vector
+    radius: float
+    sides: Vector | None = None
+
+    @classmethod
+    def box(cls, center: Vector, sides: Vector) -> "Extent":
+        """A box."""
+        return cls(center, length(sides) / 2, sides)
+
+
 def framing(
-    axis: Vector, center: Vector, radius: float, aspect: float, fov: float | None
+    along: tuple[Vector, Vector, Vector], shown: Extent, aspect: float, fov: float | None
 ) -> tuple[Vector, float | None]:
-    """Where a camera stands that shows a ball in 90 % of the picture's smaller side, with the ball's middle as its target.
+    """Where a camera stands that shows a ball in 90 % of the picture's smaller side, its middle being the target.
+
+    Of a box the corners are seen: 90 % of the picture's height or width, whatever it fills first.
 
     Args:
-        axis: the direction of view, a unit vector.
+        along: the camera's `axes`.
         aspect: width of the picture divided by its height.
         fov: vertical angle of view, degrees; None: an orthographic camera.
 
@@ -83,15 +101,24 @@ def framing(
         Its position, and the height of an orthographic camera's picture, or None. Where the ball is too large for the
         range of coordinates, the camera is as far away as it can be.
     """
+    radius, back = shown.radius, _sum((-1.0, along[0]))
     narrow = FILLED * min(1.0, aspect)
-    back = _sum((-1.0, axis))
-    if fov is None:
-        distance, height = _CLEAR * radius, min(max(2 * radius / narrow, 1e-12), LARGEST)
-    else:
-        # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
-        distance, height = radius * hypot(1.0, 1.0 / (narrow * tan(radians(fov) / 2))), None
-    distance = min(max(distance, least_distance(center)), room(center, back))
-    return _sum((1.0, center), (distance, back)), height
+    # Half of the picture's height at the depth of the middle that it needs, and at depth 1 that it has.
+    needed, slope = radius / narrow, 0.0 if fov is None else tan(radians(fov) / 2)
+    # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
+    distance = _CLEAR * radius if fov is None else radius * hypot(1.0, 1.0 / (narrow * slope))
+    if shown.sides is not None:
+        corners = [
+            tuple(dot((x / 2, y / 2, z / 2), each) for each in along)
+            for x, y, z in product(*((-side, side) for side in shown.sides))
+        ]
+        halves = [max(abs(up), abs(right) / aspect) / FILLED for _, right, up in corners]
+        needed = max(halves)
+        if fov is not None:
+            distance = max(half / slope - ahead for (ahead, _, _), half in zip(corners, halves, strict=True))
+    height = min(max(2 * needed, 1e-12), LARGEST) if fov is None else None
+    distance = min(max(distance, least_distance(shown.center)), room(shown.center, back))
+    return _sum((1.0, shown.center), (distance, back)), height
 
 
 def least_distance(target: Iterable[float]) -> float:

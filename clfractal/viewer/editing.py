@@ -83,7 +83,7 @@ def replaced(scene: Scene, sections: Mapping[str, Any]) -> Scene:
     """
     fields: dict[str, Any] = {name: getattr(scene, name) for name in Scene.model_fields}
     try:
-        checked = Scene.model_validate({**fields, **sections})
+        checked = Scene.model_validate({**fields, **sections}, context={"folder": scene.folder})
     except ValidationError as error:
         plain = {
             name: _plain(value) if not isinstance(value, FormulaSpec) else value.mapping()

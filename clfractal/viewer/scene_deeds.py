@@ -171,8 +171,8 @@ class SceneDeeds:
         self._camera(navigation.dolly(self.motion.target, factor))
 
     def _view(self, side: standard_views.Side) -> None:
-        center, radius = self.studio.scene.bounds
-        self._camera(standard_views.axis_view(self.motion.target, side, self.studio.viewport, center, radius))
+        studio = self.studio
+        self._camera(standard_views.axis_view(self.motion.target, side, studio.viewport, studio.scene.extent))
 
     def frame_all(self) -> None:
         """Shows the whole object."""
@@ -181,8 +181,8 @@ class SceneDeeds:
             section = dict(self.studio.value(aim.plane_path))
             self._edit({aim.plane_path: {"normal": section.get("normal", [0.0, 0.0, 1.0])}})
             return
-        center, radius = self.studio.scene.bounds
-        self._camera(standard_views.frame_all(self.motion.target, center, radius, self.studio.viewport))
+        studio = self.studio
+        self._camera(standard_views.frame_all(self.motion.target, studio.scene.extent, studio.viewport))
 
     def switch_projection(self) -> None:
         """Perspective to orthographic and back, with what is at the target's depth in the same size."""

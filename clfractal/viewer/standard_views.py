@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from clfractal.errors import SceneError
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
-from clfractal.scene.stance import LARGEST, framing, least_distance, room
+from clfractal.scene.stance import LARGEST, Extent, framing, least_distance, room
 from clfractal.viewer.pointer import Floats, Size
 from clfractal.viewer.pose import C, pose_of, stood
 
@@ -29,33 +29,30 @@ _LEAST_HEIGHT, _LEAST_FOV, _MOST_FOV = 1e-12, 1e-6, 179.9
 
 
 @np.errstate(all="ignore")
-def frame_all(camera: C, center: npt.ArrayLike, radius: float, size: Size) -> C:
-    """The camera, moved without a turn so that a ball fills 90 % of the picture's smaller side; its middle is the target.
+def frame_all(camera: C, shown: Extent, size: Size) -> C:
+    """The camera, moved without a turn so that it shows all of something, whose middle is the target; see `framing`.
 
-    Where the ball is too large for the range of coordinates, the camera is as far away as it can be.
+    Where that is too large for the range of coordinates, the camera is as far away as it can be.
     """
-    middle = _plain(np.asarray(center, float))
     fov = camera.fov if isinstance(camera, PerspectiveCamera) else None
-    axis = _plain(pose_of(camera).axis)
-    position, height = framing(axis, middle, radius, size[0] / size[1], fov)
-    return stood(camera, position, middle, **({} if height is None else {"height": height}))
+    pose = pose_of(camera)
+    along = (_plain(pose.axis), _plain(pose.side), _plain(pose.up))
+    position, height = framing(along, shown, size[0] / size[1], fov)
+    return stood(camera, position, shown.center, **({} if height is None else {"height": height}))
 
 
 @np.errstate(all="ignore")
-def axis_view(
-    camera: C, side: Side, size: Size, center: npt.ArrayLike | None = None, radius: float | None = None
-) -> C:
-    """The camera, looking at `center` from one of the six sides.
+def axis_view(camera: C, side: Side, size: Size, shown: Extent | None = None) -> C:
+    """The camera, looking from one of the six sides.
 
     Args:
-        center: the new target; None: the camera's own.
-        radius: of the ball that is framed (see `frame_all`); None: the target's distance stays.
+        shown: what it is to show (see `frame_all`); None: target and distance stay.
     """
     axis, up = (np.array(vector) for vector in SIDES[side])
-    middle = np.array(camera.target if center is None else center, float)
+    middle = np.array(camera.target if shown is None else shown.center, float)
     # The old `up` may lie along the new axis, so both change at once.
     turned = stood(camera, middle - pose_of(camera).distance * axis, middle, up)
-    return turned if radius is None else frame_all(turned, middle, radius, size)
+    return turned if shown is None else frame_all(turned, shown, size)
 
 
 @np.errstate(all="ignore")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clfractal import camera
-from clfractal.errors import SceneError
+from clfractal.errors import FileError, SceneError
+from clfractal.files.volume import Volume, write_volume
 from clfractal.optics.view import camera_view
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
@@ -126,6 +129,60 @@ def test_frame_shows_the_bounds_in_nine_tenths_of_the_smaller_side(
     assert found.camera.target == center
     direction = np.subtract(found.camera.target, found.camera.position) / distance
     np.testing.assert_allclose(direction, -np.array([3, -1, 7]) / np.sqrt(59), atol=1e-12)
+
+
+BOX = {"center": [0.5, -0.25, 1.0], "size": [3.0, 1.0, 0.5]}
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("size", [(96, 54), (40, 90)])
+def test_frame_shows_the_corners_of_a_volumes_own_box(projection: str, size: tuple[int, int]) -> None:
+    """All eight within 90 % of the picture, and one at its rim. Zooms are shown where the box is."""
+    plain = {
+        "version": 1,
+        "formula": {"name": "mandelbulb"},
+        "image": {"width": size[0], "height": size[1]},
+        "camera": {"projection": projection, "frame": "all", "position": [3, -1, 7], "roll": 20},
+        "renderer": {"type": "volume", "box": BOX, "zoom": [{"center": [0.6, -0.3, 1.0], "scale": 9.0}]},
+    }
+    found = load_scene(plain)
+    assert found.camera.target == (0.5, -0.25, 1.0)
+    assert _reach(found, np.array([0.5, -0.25, 1.0]), np.array([3.0, 1.0, 0.5])) == pytest.approx(0.9)
+    # Without a box of its own a volume shows the bounds.
+    bare = load_scene({**plain, "renderer": {"type": "volume"}})
+    assert bare.camera == load_scene({**plain, "renderer": {"type": "surface"}}).camera
+
+
+def test_frame_shows_a_grid_of_a_file(tmp_path: Path) -> None:
+    """Wherever the file says that it lies; the file is looked for beside the scene, also for copies."""
+    place = np.array([10.0, 20.0, 30.0])
+    write_volume(
+        tmp_path / "scan.nrrd", Volume(np.ones((4, 3, 2), np.uint8), place, np.diag([1.0, 2.0, 3.0]))
+    )
+    plain = {
+        "version": 1,
+        "formula": {"name": "mandelbulb"},
+        "image": {"width": 96, "height": 54},
+        "camera": {"frame": "all", "position": [3, -1, 7]},
+        "renderer": {"type": "volume", "file": "scan.nrrd"},
+    }
+    found = load_scene(plain, folder=tmp_path)
+    sides = np.array([2.0, 6.0, 12.0])
+    middle = place - np.array([0.5, 1.0, 1.5]) + sides / 2
+    assert _reach(found, middle, sides) == pytest.approx(0.9)
+    turned = camera.frame(camera.orbit(found, azimuth=100.0))
+    assert _reach(turned, middle, sides) == pytest.approx(0.9)
+    assert camera.frame(found).camera.position == pytest.approx(found.camera.position, rel=1e-12)
+    with pytest.raises(FileError, match=r"renderer\.file: .*scan\.nrrd"):
+        load_scene(plain, folder=tmp_path / "elsewhere")
+
+
+def _reach(scene: Scene, middle: npt.NDArray[np.float64], sides: npt.NDArray[np.float64]) -> float:
+    """How far from the picture's middle the farthest corner of a box is seen, as a part of half of a side."""
+    view = camera_view(scene.camera, scene.image.width, scene.image.height)
+    corners = middle + sides / 2 * np.array(list(product((-1, 1), repeat=3)))
+    seen = np.column_stack([corners, np.ones(8)]) @ view.world_to_ndc()
+    return float(np.abs(2 * seen[:, :2] / seen[:, 3:] - 1).max())
 
 
 def test_a_scene_that_was_read_has_a_position_and_no_other_words() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from clfractal.optics.view import View, camera_view, eye_view, middle_view
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
+from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Eye, Stereo
 from clfractal.viewer import navigation
 from clfractal.viewer.pose import Style, pose_of
@@ -355,6 +356,8 @@ def moved(draw: st.DrawFn, camera: AnyCamera) -> AnyCamera:
     """The camera after any move with any numbers."""
     a, b, c = draw(wild), draw(wild), draw(wild)
     point = draw(st.one_of(positions, st.tuples(wild, wild, wild)))
+    sides = draw(st.one_of(st.none(), st.tuples(wild, wild, wild)))
+    shown = Extent(point, abs(a)) if sides is None else Extent.box(point, sides)
     moves: dict[str, Callable[[], AnyCamera]] = {
         "orbit": lambda: navigation.orbit(camera, point, a, b, SIZE, draw(styles)),
         "vertical": lambda: navigation.orbit(camera, point, a, b, SIZE, vertical=Z),
@@ -364,8 +367,8 @@ def moved(draw: st.DrawFn, camera: AnyCamera) -> AnyCamera:
         "center_on": lambda: navigation.center_on(camera, point),
         "roll": lambda: navigation.roll(camera, a),
         "level": lambda: navigation.levelled(camera),
-        "frame": lambda: navigation.frame_all(camera, point, abs(a), SIZE),
-        "side": lambda: navigation.axis_view(camera, draw(st.sampled_from(list(SIDES))), SIZE, point, abs(a)),
+        "frame": lambda: navigation.frame_all(camera, shown, SIZE),
+        "side": lambda: navigation.axis_view(camera, draw(st.sampled_from(list(SIDES))), SIZE, shown),
         "orthographic": lambda: navigation.to_orthographic(camera, (point, abs(a))),
         "perspective": lambda: navigation.to_perspective(camera, draw(numbers(1e-6, 179))),
         "between": lambda: navigation.interpolated(camera, draw(any_cameras()), a),

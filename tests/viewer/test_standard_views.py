@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from clfractal.optics.view import camera_view
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
+from clfractal.scene.stance import Extent
 from clfractal.viewer import navigation
 from clfractal.viewer.pose import pose_of, rotation, turned_about
 from clfractal.viewer.standard_views import SIDES, Side
@@ -38,7 +39,7 @@ from tests.viewer.cameras import (
 def test_a_framed_ball_fills_nine_tenths_of_the_smaller_side(
     camera: AnyCamera, center: tuple[float, float, float], radius: float, size: tuple[int, int]
 ) -> None:
-    framed = navigation.frame_all(camera, center, radius, size)
+    framed = navigation.frame_all(camera, Extent(center, radius), size)
     view = camera_view(framed, *size)
     # Where rays touch the ball: on the cone from the eye, at a right angle to the radius.
     distance = pose_of(framed).distance
@@ -56,7 +57,7 @@ def test_a_framed_ball_fills_nine_tenths_of_the_smaller_side(
 @given(camera=cameras())
 @settings(max_examples=20)
 def test_the_six_views(side: Side, camera: AnyCamera) -> None:
-    moved = navigation.axis_view(camera, side, SIZE, (1.0, 2.0, 3.0), 2.0)
+    moved = navigation.axis_view(camera, side, SIZE, Extent((1.0, 2.0, 3.0), 2.0))
     axis, up = SIDES[side]
     pose = pose_of(moved)
     np.testing.assert_allclose(pose.axis, axis, atol=1e-12)
