@@ -89,6 +89,68 @@ def test_a_scene_without_a_volume_gets_one() -> None:
     np.testing.assert_array_equal(found.values, clfractal.voxelize(BALL, resolution=16).values)
 
 
+EMPTY = {"type": "volume", "resolution": 8, "box": {"center": [0.6, 0.6, 0.6], "size": 0.2}}
+BEYOND = {"type": "volume", "resolution": 8, "box": {"center": [5, 0, 0], "size": 2}}
+FULL = {"type": "volume", "resolution": 8, "box": {"size": 0.2}}
+
+
+@pytest.mark.parametrize(
+    ("renderer", "remark"),
+    [
+        (EMPTY, "the volume holds nothing of the set; a finer renderer.resolution or another renderer.box"),
+        (
+            BEYOND,
+            "the volume lies beyond the set; renderer.box must reach into its bounds, a ball of radius 1",
+        ),
+        (FULL, "all of the volume is inside the set; a larger renderer.box shows its surface"),
+        ({**FULL, "store": "float", "value": "coverage"}, "all of the volume is inside the set"),
+        ({**EMPTY, "value": "iterations"}, ""),
+        ({**FULL, "box": {"size": 1.8}}, ""),
+    ],
+    ids=str,
+)
+def test_grids_that_hold_little_are_told(
+    renderer: dict[str, Any], remark: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = clfractal.load_scene({**BALL, "renderer": renderer})
+    found = clfractal.voxelize(scene).remarks
+    assert len(found) == bool(remark)
+    assert all(line.startswith(remark) for line in found)
+    (tmp_path / "ball.yaml").write_text(clfractal.dump_scene(scene))
+    shell = InProcess(capsys)
+    ended = shell("voxelize", tmp_path / "ball.yaml", "-o", tmp_path / "a.nrrd")
+    assert ended.status == 0
+    assert [line for line in ended.err.splitlines() if f"ball.yaml: {remark}" in line] or not remark
+    assert ("inside the set" in ended.err or "the volume" in ended.err) == bool(remark)
+    pytest.importorskip("skimage")
+    if "inside" in remark:  # its faces are a surface
+        assert clfractal.mesh(scene).remarks == found
+        assert f"ball.yaml: {found[0]}" in shell("mesh", tmp_path / "ball.yaml", "-o", tmp_path / "a.ply").err
+    elif remark:
+        with pytest.raises(clfractal.SceneError, match="nothing of the set lies in the box"):
+            clfractal.mesh(scene)
+
+
+def test_a_grid_of_nothing_but_nan_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("skimage")
+    np.save(tmp_path / "lost.npy", np.full((4, 4, 4), np.nan, np.float32))
+    plain = {**BALL, "renderer": {"type": "volume", "file": "lost.npy"}}
+    scene = clfractal.load_scene(plain, folder=tmp_path)
+    remark = "the volume holds nothing but NaN; renderer.file has no value to show"
+    assert clfractal.voxelize(scene).remarks == (remark,)
+    (tmp_path / "lost.yaml").write_text(clfractal.dump_scene(scene))
+    shell = InProcess(capsys)
+    ended = shell("voxelize", tmp_path / "lost.yaml", "-o", tmp_path / "a.nrrd")
+    assert ended.status == 0
+    assert f"lost.yaml: {remark}" in ended.err
+    for source in ("lost.yaml", "lost.npy"):
+        ended = shell("mesh", tmp_path / source, "-o", tmp_path / "a.ply")
+        assert ended.status == 2
+        assert "has no surface" in ended.err
+        assert "it holds nothing but NaN" in ended.err
+    assert not (tmp_path / "a.ply").exists()
+
+
 def test_files_are_those_of_the_shell(
     ball: clfractal.Volume, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -55,6 +55,8 @@ def _make_mesh(order: GridOrder, shell: Shell, level: float | None, close: bool)
         f"{order.output}: {len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles, {size},"
         f" {time.perf_counter() - start:.2f} s"
     )
+    for remark in mesh.remarks:
+        shell.say(f"{order.source}: {remark}")
 
 
 def _of_scene(order: GridOrder, shell: Shell, level: float | None, close: bool) -> Mesh:

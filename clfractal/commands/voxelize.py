@@ -109,6 +109,8 @@ def _voxelize(order: GridOrder, shell: Shell, compress: bool) -> None:
     size = memory.shown(order.output.stat().st_size)
     sides = " x ".join(map(str, volume.values.shape[::-1]))
     shell.say(f"{order.output}: {sides} voxels, {size}, {time.perf_counter() - start:.2f} s")
+    for remark in volume.remarks:
+        shell.say(f"{order.source}: {remark}")
 
 
 def load_order(order: GridOrder) -> tuple[Scene, Coloring]:

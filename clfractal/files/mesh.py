@@ -44,6 +44,7 @@ class Mesh:
         colors: (n, 3), linear Rec. 709, 0 to 1, or None.
         text: the scene that made it, kept in files; or empty.
         inputs: files that were read for it, which `save` does not replace.
+        remarks: those on the volume that it is the surface of; mostly none.
     """
 
     vertices: npt.NDArray[np.float64]
@@ -52,6 +53,7 @@ class Mesh:
     colors: npt.NDArray[Any] | None = None
     text: str = ""
     inputs: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def save(self, path: str | Path) -> None:
         """Writes the mesh: .ply, .stl, .obj or .glb; see `write_mesh`.

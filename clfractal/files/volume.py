@@ -67,6 +67,7 @@ class Volume:
             being x; scene units.
         texts: what else is told of it, by keys; under `SCENE_KEY` the scene that made it.
         inputs: files that were read for it, which `save` does not replace.
+        remarks: on a grid that holds less than it could, one line each; mostly none.
     """
 
     values: Values
@@ -74,6 +75,7 @@ class Volume:
     directions: Doubles = field(default_factory=lambda: np.eye(3))
     texts: Mapping[str, str] = field(default_factory=dict)
     inputs: tuple[Path, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.values.ndim != 3 or 0 in self.values.shape or self.values.dtype.kind not in "biuf":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from clfractal.voxels.grid import Grid
 from clfractal.voxels.lattice import lattice_of
 from clfractal.work.job import Job
 from clfractal.work.prepare import prepare
+from clfractal.work.remarks import remarks_of_grid
 
 COLORING_KEY = "coloring"
 """Key of the volume's text with the scene's coloring: the volume renderer supports fewer colorings than a mesh."""
@@ -99,8 +100,6 @@ def filled(
     chosen = choose(device)
     job = prepare(scene, chosen, on_start=talk.say)
     plan = job.views[0].plan
-    if job.remark:
-        talk.note(job.remark)
 
     def progress(state: FillProgress) -> None:
         talk.progress(f"voxels, {state.stage}", state.done / max(state.total, 1))
@@ -115,7 +114,11 @@ def filled(
         progress=progress,
         token=token,
     )
-    return _volume(grid, job, coloring), Made(job, chosen, coloring)
+    volume = _volume(grid, job, coloring)
+    own = (job.remark,) if job.remark else ()
+    return replace(volume, remarks=(*own, *remarks_of_grid(scene, volume.values))), Made(
+        job, chosen, coloring
+    )
 
 
 def given(scene: Scene) -> Volume | None:
@@ -128,7 +131,11 @@ def given(scene: Scene) -> Volume | None:
         return None
     spacing = np.array(found.spacing)
     return Volume(
-        found.values, np.array(found.corner) + spacing / 2, np.diag(spacing), inputs=files_of(scene)
+        found.values,
+        np.array(found.corner) + spacing / 2,
+        np.diag(spacing),
+        inputs=files_of(scene),
+        remarks=remarks_of_grid(scene, found.values),
     )
 
 

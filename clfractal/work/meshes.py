@@ -124,7 +124,7 @@ def _extracted(found: _Found, close: bool, check: Check | None, talk: Talk) -> M
     if not len(mesh.triangles):
         raise _no_surface(found, close)
     dressed = mesh if found.made is None else _dressed(mesh, found.made, volume, talk)
-    return replace(dressed, inputs=volume.inputs)
+    return replace(dressed, inputs=volume.inputs, remarks=volume.remarks)
 
 
 def _of_given(scene: Scene, volume: Volume, level: float | None, talk: Talk) -> _Found:
@@ -168,7 +168,7 @@ def _of_file(
     elif level is None:
         low, high = value_range(volume.values)
         if low == high:
-            raise SceneError(f"has no surface: all its values are {low:g}")
+            raise SceneError(f"has no surface: {_values_of(volume)}")
         level = (low + high) / 2
     talk.note(_summary(volume, level))
     return _Found(volume, level, made, True)
@@ -223,18 +223,23 @@ def _no_surface(found: _Found, close: bool) -> ClfractalError:
             "has no surface: the whole box is inside; closed, its faces would be the surface (without --no-close)"
         )
     if found.is_file:
-        from clfractal.voxels.mesh import value_range
-
-        low, high = value_range(volume.values)
-        return SceneError(
-            f"has no surface at the level {found.level:g}: its values are from {low:g} to {high:g}"
-        )
+        return SceneError(f"has no surface at the level {found.level:g}: {_values_of(volume)}")
     size = " x ".join(f"{side:.4g}" for side in volume.spacing * (x, y, z))
     middle = volume.origin + (np.array((x, y, z)) - 1) / 2 @ volume.directions
     place = ", ".join(f"{number:.6g}" for number in middle)
     return SceneError(
         f"nothing of the set lies in the box of {size} around [{place}], at {x} x {y} x {z} voxels"
     )
+
+
+def _values_of(volume: Volume) -> str:
+    """Which values a volume holds, in words."""
+    from clfractal.voxels.mesh import value_range
+
+    low, high = value_range(volume.values)
+    if low < high:
+        return f"its values are from {low:g} to {high:g}"
+    return f"all its values are {low:g}" if np.isfinite(volume.values).any() else "it holds nothing but NaN"
 
 
 def _dressed(mesh: Mesh, made: Made, volume: Volume, talk: Talk) -> Mesh:

@@ -6,8 +6,9 @@ mends it. Everything here follows from the job, what its rays counted and its pi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -148,19 +149,11 @@ def _why_no_surface(seen: _Seen) -> str:
 def _why_no_volume(seen: _Seen, renderer: VolumeRenderer) -> str:
     """Why nothing of a volume is seen; empty if that need not be a mistake."""
     scene, given = seen.scene, seen.scene.given
-    if given is not None and not np.isfinite(given.values).any():
-        return "the volume holds nothing but NaN; renderer.file has no value to show"
+    if given is not None and not _holds(given.values, np.isfinite):
+        return _ONLY_NAN
+    if given is None and (beyond := _beyond(scene, renderer)):
+        return beyond
     low, high = _shown_box(scene, renderer)
-    if given is None:
-        box = used_boxes(scene, renderer)[1]
-        center, radius = scene.bounds
-        beyond = np.maximum(np.abs(np.array(box.center) - center) - np.array(box.sides) / 2, 0)
-        if float(np.linalg.norm(beyond)) >= radius:
-            key = "renderer.zoom" if renderer.zoom else "renderer.box"
-            return (
-                f"the volume lies beyond the set; {key} must reach into its bounds, a ball of radius {radius:g} around"
-                f" {_point(center)}"
-            )
     if not any(_sees_box(view.camera, low, high) for view in seen.views):
         middle = _point((low + high) / 2)
         return f"no ray meets the volume; its box is not in the picture: turn camera.target to {middle}"
@@ -170,8 +163,53 @@ def _why_no_volume(seen: _Seen, renderer: VolumeRenderer) -> str:
     if stops is not None and all(stop.opacity == 0 for stop in stops):
         return "nothing of the volume is visible; renderer.transfer.opacity is 0 for all values"
     if given is None and renderer.value != "iterations" and stops is None:
-        return "the volume holds nothing of the set; a finer renderer.resolution or another renderer.box shows more"
+        return _EMPTY
     return "nothing of the volume is visible; renderer.transfer.opacity is 0 for the values that it holds"
+
+
+def remarks_of_grid(scene: Scene, values: npt.NDArray[Any]) -> tuple[str, ...]:
+    """The remarks on a grid that a volume scene was made into, or that it shows from a file; mostly none.
+
+    Args:
+        values: of the grid, as they are stored.
+    """
+    renderer = scene.renderer
+    assert isinstance(renderer, VolumeRenderer)
+    if scene.given is not None:
+        return () if _holds(values, np.isfinite) else (_ONLY_NAN,)
+    if beyond := _beyond(scene, renderer):
+        return (beyond,)
+    if renderer.value == "iterations":
+        return ()
+    if not _holds(values, np.sign):
+        return (_EMPTY,)
+    full = 255 if values.dtype == np.uint8 else 1
+    if not _holds(values, lambda plane: plane < full):
+        return ("all of the volume is inside the set; a larger renderer.box shows its surface",)
+    return ()
+
+
+_ONLY_NAN = "the volume holds nothing but NaN; renderer.file has no value to show"
+_EMPTY = "the volume holds nothing of the set; a finer renderer.resolution or another renderer.box shows more"
+
+
+def _holds(values: npt.NDArray[Any], wanted: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> bool:
+    """Whether any value is as wanted; the planes after the first one with such a value are not looked at."""
+    return any(bool(wanted(plane).any()) for plane in values)
+
+
+def _beyond(scene: Scene, renderer: VolumeRenderer) -> str:
+    """What to do if the box that is filled does not touch the set's bounds; else empty."""
+    box = used_boxes(scene, renderer)[1]
+    center, radius = scene.bounds
+    beyond = np.maximum(np.abs(np.array(box.center) - center) - np.array(box.sides) / 2, 0)
+    if float(np.linalg.norm(beyond)) < radius:
+        return ""
+    key = "renderer.zoom" if renderer.zoom else "renderer.box"
+    return (
+        f"the volume lies beyond the set; {key} must reach into its bounds, a ball of radius {radius:g} around"
+        f" {_point(center)}"
+    )
 
 
 def _of_solid(seen: _Seen) -> list[str]:
