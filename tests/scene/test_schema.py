@@ -134,7 +134,7 @@ def test_mistakes_are_marked_where_they_are(sections: dict[str, Any], at: str) -
 def test_a_mapping_without_its_word_is_one_thing_alone() -> None:
     """Else an editor offers the keys of all kinds, and says that one value is two things."""
     for key in ("camera", "renderer"):
-        kinds = validator().schema["properties"][key]["oneOf"]  # type: ignore[index]
+        kinds = validator().schema["properties"][key]["oneOf"]
         bare = [kind for kind in kinds if "required" not in kind]
         assert len(bare) == 1
         words = {"camera": ["projection"], "renderer": ["type"]}[key]
