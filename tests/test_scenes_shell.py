@@ -120,6 +120,23 @@ def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
     assert Path("first.yaml").read_text("utf-8") == text
 
 
+def test_a_set_that_fills_its_bounds_is_seen_from_within(clf: InProcess) -> None:
+    """Elsewhere one sees but the ball in which it was cut off."""
+    ended = clf("new", "hall", "--formula", "pseudo_kleinian")
+    assert ended.status == 0, ended
+    scene = load_scene(Path("hall.yaml"))
+    center, radius = scene.bounds
+    assert np.linalg.norm(np.subtract(scene.camera.position, center)) < 0.7 * radius
+    assert scene.fog is not None
+    assert not any(light.shadow for light in scene.lights)
+    small = scene.model_copy(update={"image": {"width": 64, "height": 36}})
+    film = clfractal.render(small, samples=1, channels=["A", "Z"])
+    seen = film["A"] > 0.5
+    assert seen.mean() > 0.6
+    assert np.median(film["Z"][seen]) > 0.1 * radius
+    assert film.remarks == ()
+
+
 def test_what_new_refuses(clf: InProcess) -> None:
     wrong = "--formula: unknown formula 'mandelbub'; did you mean 'mandelbulb'?"
     assert clf("new", "x", "--formula", "mandelbub").is_one_line(2, wrong)

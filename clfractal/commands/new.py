@@ -37,7 +37,7 @@ camera:
   target: {target}
   fov: {fov}
 
-# `direction` is where light travels to. angular_size: 3 makes the shadows soft.
+# `direction` is where light travels to. angular_size: 3 makes soft shadows.
 lights:
 {lights}
 material: {material}
@@ -51,7 +51,7 @@ coloring: {coloring}
 renderer: {renderer}
 
 background: {background}
-
+{fog}
 # Stops: 1 is twice as bright.
 output: {output}
 """
@@ -109,6 +109,7 @@ def scene_text(file: str, formula: Mapping[str, Any], found: Framing) -> str:
     """
     sections = found.sections()
     camera = sections.pop("camera")
+    fog = sections.pop("fog", None)
     lights = "".join(f"  - {flow_text(light)}\n" for light in sections.pop("lights"))
     kind, source = next(iter(formula.items()))
     title = Path(file).stem.replace("_", " ").replace("-", " ")
@@ -118,6 +119,9 @@ def scene_text(file: str, formula: Mapping[str, Any], found: Framing) -> str:
         formula_name=source if kind == "name" else "NAME",
         formula=flow_text({**formula, "iterations": found.iterations}),
         lights=lights,
+        fog=""
+        if fog is None
+        else f"# The set goes on beyond what is rendered of it; fog hides that end.\nfog: {flow_text(fog)}\n",
         orbit=flow_text(camera["orbit"]),
         target=flow_text(camera["target"]),
         fov=flow_text(camera["fov"]),

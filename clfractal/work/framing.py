@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from clfractal.errors import SceneError, Where
 from clfractal.optics.view import scene_view
 from clfractal.pictures.film import Film
+from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES
@@ -24,6 +25,8 @@ Floats = npt.NDArray[np.float64]
 
 FOV = 40.0
 """Vertical angle of view, degrees."""
+FOV_INSIDE = 60.0
+"""The same from within a set that fills its bounds."""
 SIZE = (1280, 720)
 """Pixels of the finished picture."""
 
@@ -31,6 +34,15 @@ SIZE = (1280, 720)
 _LOOK = (192, 108)
 # From where the set is looked at: azimuth and elevation, degrees.
 _PLACES = ((35, 25), (-40, 20), (10, 35), (75, 15), (150, 30), (-100, 30), (25, 60))
+# A set fills its bounds if that much of what is seen lies on them, where it was only cut off (parts of the radius).
+_CUT_SHARE, _CUT_NEAR = 0.15, 0.001
+# Such a set is looked at from among it: azimuth, elevation, and the distance from the middle in parts of the radius.
+_INSIDE = ((0, 12), (40, 15), (80, 10), (130, 15), (-50, 20), (-100, 12))
+_INSIDE_DISTANCES = (0.56, 0.4)
+# What is nearest there: parts of the radius, the twentieth and the median of what is seen.
+_NEAREST, _MIDDLE = 0.06, 0.2
+# Fog inside: what lies a radius away is seen through so much of it.
+_FOG = 0.45
 # Part of the picture's height or width that the set fills.
 _FILLED = 0.86
 # Points of the outline that may lie outside, on each side: fine needles do not count.
@@ -56,6 +68,7 @@ class Framing:
         palette: a name.
         scale, offset: of the palette, over the values that a trap at the origin has.
         exposure: stops.
+        fog: density of a fog without which one sees the end of what is rendered; 0: the set is seen from outside.
     """
 
     iterations: int
@@ -68,19 +81,24 @@ class Framing:
     scale: float
     offset: float
     exposure: float
+    fog: float = 0.0
 
     def sections(self) -> dict[str, Any]:
         """The camera, lights, colours and exposure as plain sections of a scene."""
         warm, cool = (list(direction) for direction in self.lights)
+        inside = self.fog > 0
+        # Inside, light comes from nowhere that one can see; openness to all sides gives the form.
+        shadow = {"shadow": False} if inside else {}
+        behind = "#131822" if inside else {"top": "#2a3344", "bottom": "#0c0e13"}
         return {
             "image": {"width": SIZE[0], "height": SIZE[1]},
             "camera": {
                 "orbit": {"azimuth": self.azimuth, "elevation": self.elevation, "distance": self.distance},
                 "target": list(self.target),
-                "fov": FOV,
+                "fov": FOV_INSIDE if inside else FOV,
             },
             "lights": [
-                {"direction": warm, "color": "#ffe2c4", "intensity": 1.6},
+                {"direction": warm, "color": "#ffe2c4", "intensity": 1.6, **shadow},
                 {"direction": cool, "color": "#8fb4ff", "intensity": 0.6, "shadow": False},
             ],
             "material": {"ambient": 0.12, "diffuse": 0.9, "specular": 0.25, "shininess": 40},
@@ -92,7 +110,8 @@ class Framing:
                 "repeat": False,
             },
             "renderer": {"samples": 16, "ambient_occlusion": {"rays": 4}},
-            "background": {"top": "#2a3344", "bottom": "#0c0e13"},
+            "background": behind,
+            **({"fog": {"color": behind, "density": self.fog}} if inside else {}),
             "output": {"exposure": self.exposure},
         }
 
@@ -110,19 +129,22 @@ def framed(formula: Mapping[str, Any], folder: Path, engine: Engine, *, name: st
         DeviceError, KernelBuildError: a look failed.
     """
     finder = _Finder(formula, folder, engine)
-    iterations = finder.iterations()
-    best: tuple[float, dict[str, Any], Floats] | None = None
-    for camera, points in finder.cameras(iterations):
-        score = finder.interest(iterations, camera)
-        if best is None or score > best[0]:
-            best = (score, camera, points)
-    if best is None:
+    around = finder.around(*_PLACES[0])
+    iterations = finder.iterations(around)
+    inside = finder.is_cut(iterations, around)
+    found = finder.inside() if inside else None
+    if found is None:
+        if inside:
+            # A cut through fine details is but grain.
+            inside, iterations = False, _COUNTS[0]
+        found = finder.best(iterations, finder.cameras(iterations))
+    if found is None:
         raise SceneError("nothing of it is seen within its bounds", Where("formula"))
-    camera = best[1]
+    iterations, camera = found
     orbit = camera["orbit"]
     palettes = [each for each, it in PALETTES.items() if not it.periodic]
     scale, offset = finder.trap_range(iterations, camera)
-    found = Framing(
+    framing = Framing(
         iterations,
         tuple(camera["target"]),
         orbit["azimuth"],
@@ -133,8 +155,9 @@ def framed(formula: Mapping[str, Any], folder: Path, engine: Engine, *, name: st
         scale,
         offset,
         0.0,
+        _short(-math.log(1 - _FOG) / finder.radius) if inside else 0.0,
     )
-    return finder.exposed(found)
+    return finder.exposed(framing)
 
 
 class _Finder:
@@ -159,9 +182,8 @@ class _Finder:
     def look(self, scene: Scene, *channels: str) -> Film:
         return self.engine.render(scene, samples=1, channels=channels)
 
-    def iterations(self) -> int:
+    def iterations(self, camera: Mapping[str, Any]) -> int:
         """The most applications of those that are tried that leave a form: neither noise nor dust."""
-        camera = self._around(*_PLACES[0])
         found = _COUNTS[0]
         for count in _COUNTS:
             film = self.look(self.scene(count, camera), *_NORMALS)
@@ -170,20 +192,60 @@ class _Finder:
             found = count
         return found
 
-    def cameras(self, iterations: int) -> Iterator[tuple[dict[str, Any], Floats]]:
-        """Cameras from several sides, each with the points that it sees, shape (n, 3)."""
+    def is_cut(self, iterations: int, camera: Mapping[str, Any]) -> bool:
+        """Whether the set goes on beyond its bounds, so that what is seen of them is a cut."""
+        points = self._points(self.scene(iterations, camera))
+        away = np.linalg.norm(points - np.array(self.center), axis=1) / self.radius
+        return bool(len(points)) and float((away > 1 - _CUT_NEAR).mean()) > _CUT_SHARE
+
+    def inside(self) -> tuple[int, dict[str, Any]] | None:
+        """The best view from within the bounds, and its iterations; None if there is no room for a camera."""
+        fewest = _COUNTS[0]
+        for part in _INSIDE_DISTANCES:
+            cameras = [
+                self.around(azimuth, elevation, part * self.radius, FOV_INSIDE)
+                for azimuth, elevation in _INSIDE
+            ]
+            best = self.best(fewest, filter(lambda camera: self._has_room(fewest, camera), cameras))
+            if best is not None:
+                # With more applications the set may come nearer to the camera.
+                most = self.iterations(best[1])
+                counts = [count for count in reversed(_COUNTS) if fewest < count <= most]
+                return next((count for count in counts if self._has_room(count, best[1])), fewest), best[1]
+        return None
+
+    def best(self, iterations: int, cameras: Iterable[dict[str, Any]]) -> tuple[int, dict[str, Any]] | None:
+        """The camera that sees most; None if there is none."""
+        found = max(cameras, key=lambda camera: self.interest(iterations, camera), default=None)
+        return None if found is None else (iterations, found)
+
+    def _has_room(self, iterations: int, camera: Mapping[str, Any]) -> bool:
+        """Whether a camera is outside the set, and not right before it."""
+        scene = self.scene(iterations, camera)
+        film = self.look(scene, "Z", "A")
+        depth = film["Z"][film["A"] > 0.5] / self.radius
+        if inside_solid(scene, [scene.camera.position])[0] or len(depth) < 0.3 * film["A"].size:
+            return False
+        near, middle = np.percentile(depth, (5, 50))
+        return bool(near > _NEAREST and middle > _MIDDLE)
+
+    def _points(self, scene: Scene) -> Floats:
+        film = self.look(scene, "Z")
+        return points_of_depth(scene_view(scene), film["Z"], film.display)
+
+    def cameras(self, iterations: int) -> Iterator[dict[str, Any]]:
+        """Cameras from several sides, each so far away that the set fills the picture."""
         for azimuth, elevation in _PLACES:
-            camera = self._around(azimuth, elevation)
+            camera = self.around(azimuth, elevation)
             # Once more from nearby, where the outline is known better.
             for _ in range(2):
                 scene = self.scene(iterations, camera)
-                film = self.look(scene, "Z")
-                points = points_of_depth(scene_view(scene), film["Z"], film.display)
+                points = self._points(scene)
                 if len(points) < 20:
                     break
                 camera = _filled(camera, scene, points)
             else:
-                yield camera, points
+                yield camera
 
     def interest(self, iterations: int, camera: Mapping[str, Any]) -> float:
         """How much there is to see: light and shade, and how much of the picture the set covers."""
@@ -226,11 +288,15 @@ class _Finder:
         stops = math.log2(_BRIGHT / lightest) if lightest > 0 else 0.0
         return replace(found, exposure=round(min(max(stops, -1.5), 2.0), 1))
 
-    def _around(self, azimuth: float, elevation: float) -> dict[str, Any]:
-        """A camera that sees all of the bounds."""
-        distance = self.radius / math.sin(math.radians(FOV) / 2) * 1.02
-        orbit = {"azimuth": azimuth, "elevation": elevation, "distance": distance}
-        return {"orbit": orbit, "target": list(self.center), "fov": FOV}
+    def around(
+        self, azimuth: float, elevation: float, distance: float | None = None, fov: float = FOV
+    ) -> dict[str, Any]:
+        """A camera that looks at the middle of the bounds; without a distance it sees all of them."""
+        if distance is None:
+            distance = self.radius / math.sin(math.radians(fov) / 2) * 1.02
+        fine = 1e-3 * self.radius
+        orbit = {"azimuth": azimuth, "elevation": elevation, "distance": _rounded(distance, fine)}
+        return {"orbit": orbit, "target": list(self.center), "fov": fov}
 
 
 def _filled(camera: Mapping[str, Any], scene: Scene, points: Floats) -> dict[str, Any]:
