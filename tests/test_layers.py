@@ -79,10 +79,65 @@ def test_checking_a_scene_needs_no_opencl() -> None:
         "import tempfile, pathlib; f = pathlib.Path(tempfile.mkdtemp()) / 's.yaml'\n"
         "f.write_text('version: 1\\nformula: {name: hast}\\ncamera: {}\\n')\n"
         "assert run(['check', str(f)], Shell(owns_process=False)) == 0\n"
-        "print([m for m in ('pyopencl', 'OpenEXR', 'rich', 'PIL', 'cmap', 'mpmath') if m in sys.modules])"
+        "heavy = ('numpy', 'pyopencl', 'OpenEXR', 'rich', 'PIL', 'cmap', 'mpmath')\n"
+        "print([m for m in heavy if m in sys.modules])"
     )
     ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert ended.stdout.splitlines()[-1] == "[]"
+
+
+def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> None:
+    """Loading modules is most of the time of a small picture from the shell."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("version: 1\nformula: {name: hast}\ncamera: {}\n", encoding="utf-8")
+    code = (
+        "import sys; from clfractal.cli import run; from clfractal.commands.shell import Shell\n"
+        f"order = ['render', {str(scene)!r}, '--size', '16x16', '-o', {str(tmp_path / 'picture.png')!r}]\n"
+        "assert run(order, Shell(owns_process=False)) == 0\n"
+        "print(*sys.modules)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(ended.stdout.splitlines()[-1].split())
+    assert "clfractal.renderers.surface" in loaded
+    own = {
+        *("clfractal.device.buildlog", "clfractal.pictures.anaglyph", "clfractal.pictures.probe"),
+        *("clfractal.renderers.volume", "clfractal.renderers.cut_plane", "clfractal.voxels"),
+        *("clfractal.scene.messages", "clfractal.scene.palette", "clfractal.optics.stereo"),
+        *(
+            "clfractal.work.comfort",
+            "clfractal.work.films",
+            "clfractal.work.probing",
+            "clfractal.work.refine",
+        ),
+    }
+    foreign = {"OpenEXR", "PIL", "cmap", "mpmath", "rich", "ruamel", "ssl", "xml", "http"}
+    assert loaded & (own | foreign) == set()
+
+
+def test_the_program_starts_without_what_it_does_not_need(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The user's own settings of the libraries stay."""
+    code = (
+        "import gc, os, sys; from clfractal import cli\n"
+        "cli.run = lambda *_: print(gc.isenabled(), os.environ['OPENBLAS_NUM_THREADS']) or 0\n"
+        "os._exit = sys.exit; cli.main()"
+    )
+    for given, used in (({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")):
+        monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+        for name, value in given.items():
+            monkeypatch.setenv(name, value)
+        ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+        assert ended.stdout.split() == ["False", used]
+
+
+def test_garbage_is_collected_again_while_a_command_works(tmp_path: Path) -> None:
+    code = (
+        "import gc; gc.disable()\n"
+        "from clfractal.commands import app, check; from clfractal.commands.shell import Shell\n"
+        "check.check_scene = lambda *_, **__: print(gc.isenabled(), gc.get_freeze_count() > 0)\n"
+        "app.call(['check', 'scene.yaml'], Shell(owns_process=False))"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert ended.stdout.split() == ["True", "True"]
 
 
 def test_importing_the_package_imports_nothing_else() -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Sequence
+from copy import copy
 from typing import Annotated
 
 import typer
+from typer.models import CommandInfo
 
 import clfractal
 from clfractal.commands import list_facts, list_grids, list_pictures, list_scenes, list_window
@@ -34,10 +37,14 @@ _ORDER = (
     "mesh",
     "schema",
 )
+
+
+def _name_of(command: CommandInfo) -> str:
+    return str(command.name or getattr(command.callback, "__name__", ""))
+
+
 _PLACES = {name: place for place, name in enumerate(_ORDER)}
-app.registered_commands.sort(
-    key=lambda command: _PLACES.get(getattr(command.callback, "__name__", ""), len(_ORDER))
-)
+app.registered_commands.sort(key=lambda command: _PLACES.get(_name_of(command), len(_ORDER)))
 
 
 def call(arguments: Sequence[str], shell: Shell) -> int:
@@ -49,7 +56,9 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
         ClfractalError: and whatever else a command raises.
     """
     try:
-        work = app(list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False)
+        work = _application(arguments)(
+            list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False
+        )
     except Exception as error:
         # Typer's own errors: their classes differ between its versions, but all have this method.
         tell = getattr(error, "format_message", None)
@@ -62,9 +71,22 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
     if work == STATUS_INTERRUPTED:  # Typer's status for Ctrl-C
         raise KeyboardInterrupt
     if callable(work):
+        if not gc.isenabled():
+            # What the start has made stays until the end, so it is no garbage: from now on only newer objects are searched.
+            gc.freeze()
+            gc.enable()
         with Patience(shell):
             work()
     return 0
+
+
+def _application(arguments: Sequence[str]) -> typer.Typer:
+    """The commands; only the one that comes first, if one does: Typer takes a millisecond to make each of them."""
+    alone = copy(app)
+    alone.registered_commands = [
+        command for command in app.registered_commands if [_name_of(command)] == list(arguments[:1])
+    ]
+    return alone if alone.registered_commands else app
 
 
 def _version(wanted: bool) -> None:

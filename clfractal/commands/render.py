@@ -62,7 +62,6 @@ def render_files(order: Order, shell: Shell) -> None:
     from clfractal.commands.unfinished import Unfinished
     from clfractal.pictures.outputs import output_files
     from clfractal.work import stats
-    from clfractal.work.comfort import comfort_of_job
     from clfractal.work.engine import Engine
     from clfractal.work.remarks import remarks_of
     from clfractal.work.run import run
@@ -85,7 +84,11 @@ def render_files(order: Order, shell: Shell) -> None:
         rendered = time.perf_counter()
         save_job(job, unfinished.films, outputs, header)
         written = time.perf_counter()
-        comfort = comfort_of_job(job, unfinished.films, engine.look)
+        comfort = None
+        if job.scene.stereo is not None:  # asked here, so that other scenes do not load what measures it
+            from clfractal.work.comfort import comfort_of_job
+
+            comfort = comfort_of_job(job, unfinished.films, engine.look)
         remarks = remarks_of(job, state, unfinished.films, comfort)
     shell.state = lambda: "clfractal: interrupted"
     values = stats.statistics(

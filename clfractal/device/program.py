@@ -14,7 +14,6 @@ from typing import Any
 import pyopencl as cl
 
 from clfractal.device import activity, cache, compiler, isolate
-from clfractal.device.buildlog import build_error
 from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
 from clfractal.device.source import SourceMap
@@ -100,6 +99,8 @@ def build(
         try:
             program, cached = _built(device, key, text, flags, warm, isolated, on_compile, stopped)
         except BuildFailureError as failure:
+            from clfractal.device.buildlog import build_error
+
             raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
     device.loaded.keep(key, program)
     return Program(device, program, _milliseconds(start), cached=cached)

@@ -15,8 +15,6 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, TypeAlias
-from xml.etree import ElementTree
-from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
@@ -144,6 +142,8 @@ def _segment(data: bytes) -> bytes:
 
 def _packet(texts: Mapping[str, str], *, more: str = "", framed: bool = True) -> bytes:
     """An XMP packet with the texts; `more` names the extended packet that goes on."""
+    from xml.sax.saxutils import escape
+
     entries = [f"<{_name(key)}>{escape(text)}</{_name(key)}>" for key, text in texts.items()]
     if more:
         entries.append(f"<xmpNote:HasExtendedXMP>{more}</xmpNote:HasExtendedXMP>")
@@ -284,6 +284,8 @@ def _properties(packet: bytes) -> dict[str, str]:
 
     Other programs may write an element as an attribute.
     """
+    from xml.etree import ElementTree
+
     found: dict[str, str] = {}
     if not packet or b"<!" in packet:  # entities could grow without end; XMP has none
         return found

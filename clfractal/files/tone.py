@@ -15,15 +15,14 @@ the same, bit for bit.
 from __future__ import annotations
 
 from functools import cache
-from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.files.curves import TONES, Tone
+
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
-Tone = Literal["linear", "reinhard", "agx"]
-TONES: tuple[Tone, ...] = get_args(Tone)
 
 MIDDLE = 0.18
 """Middle grey: what reflects so much of the light looks half as light as white."""

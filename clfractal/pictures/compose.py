@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clfractal.pictures.anaglyph import matrices, mix
 from clfractal.pictures.develop import Development, developed
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.modes import BELOW, BESIDE, PICKED, eye_size, picture_size
@@ -251,6 +250,8 @@ def _anaglyph(stereo: Stereo, left: Planes, right: Planes, channels: Sequence[st
 
     Covered where either eye's picture is: so no colour becomes lighter than its coverage, and none is lost.
     """
+    from clfractal.pictures.anaglyph import matrices, mix
+
     by = matrices(stereo.method, stereo.glasses)
     first, second = (right, left) if stereo.swap else (left, right)
     # Stored as planes, with the colours as the last axis of the view.

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from clfractal import arguments
 from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.files.curves import TONES, Tone
 from clfractal.files.srgb import encode8
-from clfractal.files.tone import TONES, Tone, toned
+from clfractal.files.tone import toned
 from clfractal.pictures.tiled import Bands, Floats, Picture
 from clfractal.pictures.tiles import Region
 

@@ -12,9 +12,8 @@ import numpy.typing as npt
 from clfractal import arguments
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
-from clfractal.files.tone import Tone
+from clfractal.files.curves import Tone
 from clfractal.pictures.develop import Development, developed, rgb8
-from clfractal.pictures.probe import Probe
 from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
     from xarray import Dataset
 
+    from clfractal.pictures.probe import Probe
     from clfractal.scene.stereo import Stereo
 
 Facts: TypeAlias = Mapping[str, Any] | Callable[[], Mapping[str, Any]]

@@ -13,10 +13,10 @@ import numpy as np
 from clfractal import arguments
 from clfractal.errors import Where
 from clfractal.files.channels import CHANNELS, VIEWS, check_channels, in_view
+from clfractal.files.curves import Tone
 from clfractal.files.photo import LOSSLESS, write_photo
 from clfractal.files.png import stream_png, write_png
 from clfractal.files.srgb import Bits
-from clfractal.files.tone import Tone
 from clfractal.pictures.develop import Development, developed
 from clfractal.pictures.formats import KINDS, PHOTOS, Content, check_output, check_views, kind_of
 from clfractal.pictures.tiled import Floats, Picture

@@ -15,12 +15,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.scene.lighting import Environment
+
+if TYPE_CHECKING:
+    from clfractal.scene.environment import EnvironmentMap
 
 COLUMNS, ROWS = 1024, 512
 """Largest grid of the tables: 4 MB, and cells smaller than the sun."""
@@ -42,6 +46,18 @@ class PackedEnvironment:
     height: int
     columns: int
     rows: int
+
+
+def packed_map(found: EnvironmentMap) -> PackedEnvironment:
+    """A map as the kernel reads it; of one that comes with the program it is made once for a process."""
+    return _packed_once(found) if found.is_shipped else pack_environment(found.pixels)
+
+
+@cache
+def _packed_once(found: EnvironmentMap) -> PackedEnvironment:
+    packed = pack_environment(found.pixels)
+    packed.data.flags.writeable = False
+    return packed
 
 
 def pack_environment(pixels: Floats) -> PackedEnvironment:

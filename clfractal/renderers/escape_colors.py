@@ -11,7 +11,6 @@ from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.language import Chain
 from clfractal.scene.cut_plane import EscapeColors
-from clfractal.scene.palette import named_table
 
 ESCAPE_COLORS = Struct(
     "EscapeColors",
@@ -55,6 +54,8 @@ def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:
     Raises:
         SceneError: no palette has its name.
     """
+    from clfractal.scene.palette import named_table
+
     return np.ascontiguousarray(named_table(colors.palette), np.float32)
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from clfractal.device.source import FlatText
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
-from clfractal.renderers.environment import pack_environment
+from clfractal.renderers.environment import packed_map
 from clfractal.renderers.kernel import KernelArgument, TileKernel, flat_text
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
@@ -110,9 +110,7 @@ class SurfaceKernel(TileKernel):
         surroundings = scene.surroundings
         packed = None
         if surroundings is not None:
-            packed = kept.once(
-                f"environment {surroundings.digest}", lambda: pack_environment(surroundings.pixels)
-            )
+            packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
         return [
             records.march_record(scene, precision),
             np.stack(

@@ -23,9 +23,13 @@ Floats = npt.NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class EnvironmentMap:
-    """`pixels` has the shape (height, 2 height, 3): linear Rec. 709, finite, none below 0."""
+    """`pixels` has the shape (height, 2 height, 3): linear Rec. 709, finite, none below 0.
+
+    `is_shipped`: it comes with the program, and stays in memory once it was read.
+    """
 
     pixels: Floats
+    is_shipped: bool = False
 
     @cached_property
     def digest(self) -> str:
@@ -76,4 +80,4 @@ def _shipped(name: str) -> EnvironmentMap:
 
     pixels = read_environment(resources.folder("environments") / f"{name}.exr")
     pixels.flags.writeable = False
-    return EnvironmentMap(pixels)
+    return EnvironmentMap(pixels, is_shipped=True)

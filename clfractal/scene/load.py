@@ -24,7 +24,6 @@ from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
-from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
 
 
@@ -147,6 +146,8 @@ def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple
     try:
         return document, Scene.model_validate(plain, context={"folder": folder})
     except ValidationError as error:
+        from clfractal.scene.messages import first_error
+
         raise first_error(error, document, Scene) from error
 
 

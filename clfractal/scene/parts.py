@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field, Tag, model_validator
 
 from clfractal.errors import unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
-from clfractal.files.tone import Tone
+from clfractal.files.curves import Tone
 from clfractal.scene.base import (
     Amount,
     Color,

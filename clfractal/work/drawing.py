@@ -17,18 +17,10 @@ from clfractal.device.select import Device
 from clfractal.device.source import FlatText
 from clfractal.device.watched import Watched, is_watched
 from clfractal.pictures.tiles import TILE, TileGrid
-from clfractal.renderers.cut_plane import CutPlaneKernel
 from clfractal.renderers.kernel import KernelArgument, TileKernel
 from clfractal.renderers.passes import STATISTICS, kept_numbers
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Resources
-from clfractal.renderers.surface import SurfaceKernel
-from clfractal.renderers.volume import VolumeKernel
-
-KERNELS: dict[str, type[TileKernel]] = {
-    kernel.name: kernel for kernel in (SurfaceKernel, VolumeKernel, CutPlaneKernel)
-}
-"""The kernel of each kind of renderer."""
 
 TILE_PIXELS = TILE * TILE
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
@@ -134,7 +126,7 @@ class Drawing:
             Stopped: cancelled while a program was built or a grid was filled.
         """
         plan, built_before = view.plan, self.device.loaded.building.milliseconds
-        kernel = KERNELS[view.scene.renderer.type](view, resources)
+        kernel = _kernel_of(view.scene.renderer.type)(view, resources)
         arguments = kernel.arguments()
         self.packets = TILE_PIXELS // plan.lanes
         self.group = max(GROUP_PIXELS[plan.lanes] // plan.lanes, 1)
@@ -308,6 +300,21 @@ class Drawing:
         arguments = [Argument("buffer", size) for size in buffers]
         arguments += [Argument("scalar", dtype="int32", value=0.0)] * 7
         return Warm(name, (self.packets, 1), (self.group, 1), tuple(arguments))
+
+
+def _kernel_of(renderer: str) -> type[TileKernel]:
+    """The kernel of a kind of renderer. Each is imported when it is needed: volumes bring all of `voxels` along."""
+    if renderer == "volume":
+        from clfractal.renderers.volume import VolumeKernel
+
+        return VolumeKernel
+    if renderer == "cut_plane":
+        from clfractal.renderers.cut_plane import CutPlaneKernel
+
+        return CutPlaneKernel
+    from clfractal.renderers.surface import SurfaceKernel
+
+    return SurfaceKernel
 
 
 def _size(argument: KernelArgument) -> int:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from clfractal import arguments
 from clfractal.device.cancel import CancelToken
@@ -17,20 +17,19 @@ from clfractal.device.forked import is_lost, use_opencl
 from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, SceneError, Where
-from clfractal.pictures.film import Film
-from clfractal.pictures.probe import Probe
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
-from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
-from clfractal.work.look import Look
 from clfractal.work.prepare import prepare
-from clfractal.work.probing import checked_pixel, probed
-from clfractal.work.quality import with_quality
-from clfractal.work.refine import Refinement, refined
 from clfractal.work.run import ProgressCallback, run
 from clfractal.work.settle import is_settled, settled
+
+if TYPE_CHECKING:
+    from clfractal.pictures.film import Film
+    from clfractal.pictures.probe import Probe
+    from clfractal.work.look import Look
+    from clfractal.work.refine import Refinement
 
 SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
@@ -95,6 +94,8 @@ class Engine:
     @property
     def look(self) -> Look:
         """Quick looks at a scene, on the engine's device."""
+        from clfractal.work.look import Look
+
         return Look(self.device, self._looking)
 
     def settled(self, scene: SceneLike) -> Scene:
@@ -128,6 +129,8 @@ class Engine:
         built_before = self.device.loaded.building.milliseconds
         loaded = as_scene(scene)
         if quality is not None:
+            from clfractal.work.quality import with_quality
+
             loaded = with_quality(loaded, quality)
         decide = partial(
             prepare,
@@ -162,6 +165,8 @@ class Engine:
         Args:
             token: ends the render when any thread cancels it; `clfractal.Stopped` is then raised.
         """
+        from clfractal.work.films import JobFilms, Took
+
         start = time.perf_counter()
         arguments.function("progress", progress)
         _check_token(token)
@@ -196,6 +201,8 @@ class Engine:
         token: CancelToken | None = None,
     ) -> tuple[Film, Film]:
         """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
+        from clfractal.work.films import JobFilms, Took
+
         start = time.perf_counter()
         arguments.function("progress", progress)
         _check_token(token)
@@ -217,6 +224,8 @@ class Engine:
 
     def probe(self, scene: SceneLike, x: int, y: int, *, precision: str | None = None) -> Probe:
         """What lies at a pixel of a scene's picture; arguments, result and errors as for `clfractal.probe`."""
+        from clfractal.work.probing import checked_pixel, probed
+
         with self._alone():
             job = self.prepare(scene, precision=precision)
             return probed(job, *checked_pixel(x, y, job.region), self.look)
@@ -240,6 +249,7 @@ class Engine:
 
         Arguments and errors as for `render`.
         """
+        from clfractal.work.refine import Refinement, refined
 
         _check_token(token)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,9 +22,11 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.work.comfort import Comfort
 from clfractal.work.job import Job
 from clfractal.work.run import Progress
+
+if TYPE_CHECKING:
+    from clfractal.work.comfort import Comfort
 
 Floats = npt.NDArray[np.float64]
 

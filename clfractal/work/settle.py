@@ -7,18 +7,20 @@ picture, and the scene in a picture's header all have the same numbers.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import seen_by, shown_views
-from clfractal.pictures.film import Film
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Eye
-from clfractal.work.comfort import fitted
-from clfractal.work.look import Look
+
+if TYPE_CHECKING:
+    from clfractal.pictures.film import Film
+    from clfractal.work.look import Look
 
 Floats = npt.NDArray[np.float64]
 Camera = PerspectiveCamera | OrthographicCamera
@@ -53,6 +55,8 @@ def settled(scene: Scene, look: Look) -> Scene:
     """
     if is_settled(scene):
         return scene
+    from clfractal.work.comfort import fitted
+
     return exposed(focused(fitted(scene, look), look), look)
 
 

@@ -17,7 +17,7 @@ from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Struct
 from clfractal.device.watched import Watched
 from clfractal.files import srgb, tone
-from clfractal.files.tone import Tone
+from clfractal.files.curves import TONES, Tone
 from clfractal.pictures.anaglyph import matrices
 from clfractal.pictures.compose import Side
 from clfractal.pictures.modes import BELOW, BESIDE, eye_size, picture_size
@@ -256,7 +256,7 @@ class Shower:
             "views": len(canvas.parts),
             "smooth": int(look.smooth),
             "transparent": int(look.transparent),
-            "tone": tone.TONES.index(look.tone),
+            "tone": TONES.index(look.tone),
             "gain": 2.0**look.exposure,
             "background": np.array(arrangement.background, np.float32),
             "matrix": matrix,
@@ -298,7 +298,7 @@ def _tone_defines() -> dict[str, object]:
         return f"{float(value).hex()}f"
 
     kept = np.float32(1) - tone.INSET
-    found: dict[str, object] = {f"TONE_{name.upper()}": number for number, name in enumerate(tone.TONES)}
+    found: dict[str, object] = {f"TONE_{name.upper()}": number for number, name in enumerate(TONES)}
     found |= {"TONE_SHIFT": tone.SHIFT, "TONE_LOWEST": tone.LOWEST, "TONE_ENTRIES": tone.ENTRIES}
     found |= {"TONE_LIGHTEST": exact(tone.LIGHTEST), "TONE_INSET": exact(tone.INSET)}
     found |= {"TONE_KEPT": exact(kept), "TONE_BACK": exact(np.float32(1) / kept)}

@@ -6,15 +6,17 @@ import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import clfractal
 from clfractal.files import memory
 from clfractal.files.atomic import atomic_writer
 from clfractal.optics.view import scene_view
-from clfractal.work.comfort import Comfort
 from clfractal.work.job import Job
 from clfractal.work.run import Progress
+
+if TYPE_CHECKING:
+    from clfractal.work.comfort import Comfort
 
 
 def statistics(

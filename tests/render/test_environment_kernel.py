@@ -7,6 +7,7 @@ blend is, and that the cells of the tables have equal density per steradian.
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,9 @@ from scipy import stats
 from clfractal.device.select import choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
-from clfractal.renderers.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment
+from clfractal.renderers.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
+from clfractal.scene.environment import EnvironmentMap, read_map
+from clfractal.scene.lighting import Environment
 from tests.render.environment_kernel import ask, settings_of
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -292,3 +295,15 @@ def test_means_and_maxima_of_cells() -> None:
     assert ratio.min() > mean_bounds[0]
     assert np.median(ratio) < mean_bounds[1]
     assert ratio.max() < 1.6
+
+
+def test_a_map_that_comes_along_is_packed_once_for_a_process() -> None:
+    """Otherwise every call of `clfractal.render` would pack it again. A user's map goes with its scene."""
+    studio, again = (read_map(Environment.checked({"name": "studio"}), Path()) for _ in range(2))
+    packed = packed_map(studio)
+    assert packed_map(again) is packed
+    own = EnvironmentMap(studio.pixels)
+    assert packed_map(own) is not packed_map(own)
+    assert np.array_equal(packed_map(own).data, packed.data)
+    with pytest.raises(ValueError, match="read-only"):
+        packed.data[0] = 0.0

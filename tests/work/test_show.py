@@ -11,8 +11,9 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.files.curves import TONES, Tone
 from clfractal.files.srgb import encode8
-from clfractal.files.tone import TONES, Tone, toned
+from clfractal.files.tone import toned
 from clfractal.pictures.outputs import png_bytes
 from clfractal.pictures.tiled import Floats
 from clfractal.scene.stereo import APART, Stereo
