@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import io
 import time
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
+import numpy as np
 import pytest
 
 from clfractal.commands import progress
 from clfractal.commands.progress import Patience, Reporter
 from clfractal.commands.shell import Shell
 from clfractal.device import activity
+from clfractal.files import environment, volume
+from clfractal.files.exr import write_exr
+from clfractal.scene import load
 from clfractal.work.run import Progress
 
 
@@ -108,6 +115,36 @@ def test_a_bar_shows_it_beside_the_rest(monkeypatch: pytest.MonkeyPatch) -> None
         assert shell.stalled != shell.status
         reporter.close()
         assert shell.stalled == shell.status
+
+
+def test_the_files_that_a_scene_reads_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The scene itself, its grid and its map; any of them may be large, or lie on a slow disk."""
+    told: dict[str, str] = {}
+
+    def listening(module: ModuleType, name: str) -> None:
+        read = getattr(module, name)
+
+        def listen(path: Path, *rest: Any, **more: Any) -> Any:
+            found = activity.current()
+            told[Path(path).name] = "" if found is None else found.what
+            return read(path, *rest, **more)
+
+        monkeypatch.setattr(module, name, listen)
+
+    listening(load, "read_text")
+    listening(volume, "read_volume")
+    listening(environment, "read_environment")
+    np.save(tmp_path / "scan.npy", np.arange(8, dtype=np.float32).reshape(2, 2, 2))
+    sky = np.ones((8, 16), np.float32)
+    bands = [dict.fromkeys("RGB", sky)]
+    write_exr(tmp_path / "sky.exr", bands, display=(16, 8), region=(0, 0, 16, 8), channels="RGB", half="RGB")
+    (tmp_path / "scene.yaml").write_text(
+        "version: 1\nformula: {name: mandelbulb}\ncamera: {}\nrenderer: {type: volume, file: scan.npy}\n"
+        "environment: {file: sky.exr}\n"
+    )
+    load.load_scene(tmp_path / "scene.yaml")
+    assert told == {name: f"reading {tmp_path / name}" for name in ("scene.yaml", "scan.npy", "sky.exr")}
+    assert activity.current() is None
 
 
 def test_what_began_last_is_told() -> None:
