@@ -76,10 +76,11 @@ lowest: $(LOWEST)/.installed
 	cd build/lowest && program=$(abspath $(LOWEST))/bin/clfractal && scene=$(CURDIR)/scenes/mandelbulb.yaml \
 		&& $$program --version && $$program check $$scene >checked.yaml \
 		&& $$program render checked.yaml --size 96x54 --samples 1 -o bulb.exr -o bulb.png \
-		&& $$program render bulb.exr -o again.png \
+		&& $$program render bulb.exr -o again.png -o again.jpg -o again.webp \
+		&& $$program render again.webp -o once-more.png && $$program probe again.jpg 48,27 \
 		&& $$program voxelize $$scene --resolution 32 -o bulb.nrrd \
 		&& $$program mesh bulb.nrrd -o bulb.ply && $$program mesh $$scene --resolution 32 -o bulb.glb \
-		&& test -s bulb.exr -a -s bulb.png -a -s again.png -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb \
+		&& test -s bulb.exr -a -s bulb.png -a -s once-more.png -a -s again.jpg -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb \
 		&& if command -v xvfb-run >/dev/null; then xvfb-run -a $$program view $$scene --size 640x360 --shot view.png \
 		&& test -s view.png; fi
 
