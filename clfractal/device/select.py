@@ -245,6 +245,11 @@ def is_rusticl(info: DeviceInfo) -> bool:
     return info.platform.casefold() == "rusticl"
 
 
+def compiles_packets_slowly(info: DeviceInfo) -> bool:
+    """Whether a program of packets takes half a minute and more: rusticl compiles them number by number."""
+    return is_rusticl(info)
+
+
 def loses_copies_when_unrolling(info: DeviceInfo) -> bool:
     """Whether loops of a constant count must not copy structs; kernels are told by COUNTS_AT_RUN_TIME.
 

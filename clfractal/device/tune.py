@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from clfractal.device import activity, cache, isolate
-from clfractal.device.select import Device, has_float64, is_rusticl, vectorises_across_work_items
+from clfractal.device.select import Device, compiles_packets_slowly, has_float64, vectorises_across_work_items
 from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
 
@@ -81,8 +81,7 @@ def accepted_lanes(device: Device, precision: Precision) -> tuple[int, ...]:
 
 def promising(device: Device) -> tuple[tuple[int, ...], ...]:
     """Groups of lane counts; a group is tried if none before it works. Each trial costs seconds."""
-    if is_rusticl(device.info):
-        # It compiles packets number by number: one lane takes a second where eight take half a minute.
+    if compiles_packets_slowly(device.info):
         return (1,), (4,), (8,), (16,)
     if not vectorises_across_work_items(device.info):
         return (16, 8), (4, 1)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import pytest
 
-from clfractal.device import tune
 from clfractal.device.select import choose, has_float64, is_simulator
 from clfractal.device.structs import Precision
 from tests.portability.compare import difference
+from tests.portability.lane_counts import accepted_in_use
 from tests.portability.pictures import picture
 
 pytestmark = pytest.mark.conformance
@@ -28,7 +28,7 @@ def test_lane_counts_give_the_same_picture() -> None:
     size = (12, 8) if is_simulator(device.info) else (64, 48)
     scalar = picture(device, "hast", precision, size, lanes=1)
     # The widest, which has the most neighbours.
-    for lanes in {max(tune.accepted_lanes(device, precision))} - {1}:
+    for lanes in {max(accepted_in_use(device, precision))} - {1}:
         packet = picture(device, "hast", precision, size, lanes=lanes)
         other_bits = float((scalar != packet).any(axis=0).mean())
         assert other_bits <= _OTHER_BITS[precision], f"{lanes} lanes: {other_bits:.1%} of the pixels differ"

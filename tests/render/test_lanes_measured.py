@@ -12,11 +12,11 @@ import pytest
 
 from clfractal.device import cache, child, select, tune
 from clfractal.device.select import Device, choose
-from clfractal.device.tune import accepted_lanes
 from clfractal.errors import DeviceError
 from clfractal.formulas.catalog import load_chain
 from clfractal.renderers import lanes
 from clfractal.renderers.lanes import best_lanes, march, march_reports, rule_of
+from tests.portability.lane_counts import accepted_in_use
 
 pytestmark = pytest.mark.conformance
 
@@ -54,7 +54,7 @@ def _of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def rigged(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tune, "PROBE", f"{_HERE}:working_job")
     monkeypatch.setattr(lanes, "JOB", f"{_HERE}:rigged_job")
-    monkeypatch.setattr(tune, "vectorises_across_work_items", lambda info: False)
+    monkeypatch.setattr(tune, "promising", lambda device: ((16, 8), (4, 1)))
 
 
 @pytest.mark.usefixtures("rigged")
@@ -128,7 +128,9 @@ def test_formulas_march_by_their_scalar_rule_if_all_have_one() -> None:
 @pytest.mark.parametrize("rule", lanes.RULES)
 def test_what_is_marched_is_the_object(device: Device, rule: lanes.Rule) -> None:
     """With every lane count the same: rays that meet the set, and places that the light does not reach."""
-    met = {count: march(device, "float32", count, rule, 64)[1] for count in accepted_lanes(device, "float32")}
+    met = {
+        count: march(device, "float32", count, rule, 64)[1] for count in accepted_in_use(device, "float32")
+    }
     wanted = next(iter(met.values()))
     hit = wanted[..., 0] > 0
     assert 0.15 < hit.mean() < 0.6
