@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 import time
 from pathlib import Path
 from types import ModuleType
@@ -145,6 +146,26 @@ def test_the_files_that_a_scene_reads_are_told(tmp_path: Path, monkeypatch: pyte
     load.load_scene(tmp_path / "scene.yaml")
     assert told == {name: f"reading {tmp_path / name}" for name in ("scene.yaml", "scan.npy", "sky.exr")}
     assert activity.current() is None
+
+
+def test_nothing_is_shown_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even what was about to be shown when the command ended."""
+    monkeypatch.setattr(progress, "_LAST_SECONDS", 10.0)
+    shell, errors = shell_on(monkeypatch, terminal=True)
+    begun = threading.Event()
+
+    def slowly(line: str) -> None:
+        begun.set()
+        time.sleep(0.2)
+        shell.status(line)
+
+    shell.stalled = slowly
+    with Patience(shell), activity.doing("rendering"):
+        assert begun.wait(20)
+    told = errors.getvalue()
+    assert told.endswith("\r\x1b[2K")
+    time.sleep(0.4)
+    assert errors.getvalue() == told
 
 
 def test_what_began_last_is_told() -> None:

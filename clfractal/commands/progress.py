@@ -25,6 +25,7 @@ SILENT_SECONDS = 2.0
 """After so long without a sign of life the user is told what the program is doing."""
 _LONGEST_SILENCE = 60.0
 _LOOK_SECONDS = 0.25
+_LAST_SECONDS = 0.1
 
 
 class Patience:
@@ -36,15 +37,18 @@ class Patience:
     def __init__(self, shell: Shell) -> None:
         self._shell = shell
         self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="clfractal-patience", daemon=True)
 
     def __enter__(self) -> None:
         self._shell.alive()
-        threading.Thread(target=self._watch, name="clfractal-patience", daemon=True).start()
+        self._thread.start()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._ended.set()
+        # What it is just showing comes before the last words. (Whoever shows it may hang: they do not wait for that.)
+        self._thread.join(_LAST_SECONDS)
         self._shell.clear_status()
 
     def _watch(self) -> None:

@@ -39,8 +39,7 @@ class Unfinished:
         self.films: list[JournalFilm] = []
         try:
             for number, (view, path) in enumerate(zip(job.views, self.paths, strict=True)):
-                if path.exists() and not resume:
-                    shell.say(f"{path}: earlier work is discarded; --resume would have continued it")
+                discards = path.exists() and not resume
                 self.films.append(
                     JournalFilm(
                         path,
@@ -52,6 +51,8 @@ class Unfinished:
                         resume=resume,
                     )
                 )
+                if discards:
+                    shell.say(f"{path}: earlier work is discarded; --resume would have continued it")
         except BaseException:
             self._leave()
             raise
