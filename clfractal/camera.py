@@ -11,12 +11,17 @@ from __future__ import annotations
 
 from typing import Any
 
+from clfractal import arguments
 from clfractal.scene.model import Scene
 
 
 def angles(scene: Scene) -> tuple[float, float, float]:
-    """Where the camera is on the sphere round its target: azimuth, elevation and distance, as `orbit` takes them."""
-    return scene.camera.angles
+    """Where the camera is on the sphere round its target: azimuth, elevation and distance, as `orbit` takes them.
+
+    Raises:
+        SceneError: it is no Scene.
+    """
+    return _checked(scene).camera.angles
 
 
 def orbit(
@@ -47,7 +52,8 @@ def turn(scene: Scene, *, azimuth: float = 0.0, elevation: float = 0.0) -> Scene
         SceneError: an angle is out of its range.
     """
     at, high, _ = angles(scene)
-    return orbit(scene, azimuth=at + azimuth, elevation=min(max(high + elevation, -90.0), 90.0))
+    round_it, upwards = arguments.number("azimuth", azimuth), arguments.number("elevation", elevation)
+    return orbit(scene, azimuth=at + round_it, elevation=min(max(high + upwards, -90.0), 90.0))
 
 
 def roll(scene: Scene, angle: float) -> Scene:
@@ -81,5 +87,11 @@ def frame(scene: Scene) -> Scene:
 
 
 def _with(scene: Scene, **words: Any) -> Scene:
-    camera = {**scene.camera.model_dump(mode="json"), **words}
+    camera = {**_checked(scene).camera.model_dump(mode="json"), **words}
     return scene.model_copy(update={"camera": camera})
+
+
+def _checked(scene: Scene) -> Scene:
+    if not isinstance(scene, Scene):
+        arguments.refuse("scene", "must be a Scene, as load_scene gives it", arguments.plain(scene))
+    return scene

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import clfractal
+from clfractal import camera
 from clfractal.pictures.film import Film
 from tests.shell import SCENE
 
@@ -36,6 +37,8 @@ RENDER: list[tuple[dict[str, Any], str]] = [
     ({"channels": ["R", 3]}, "channels: must be a list of texts, got 3"),
     ({"channels": ["R", "Q"]}, "channels: unknown channel 'Q'"),
     ({"channels": []}, "channels: a picture needs at least one channel"),
+    ({"quality": ["good"]}, "quality: must be a word such as good, got a list of 1"),
+    ({"quality": "god"}, "quality: unknown quality 'god'; did you mean 'good'?"),
     ({"device": 3}, "device: must be text such as cpu, gpu, 0:0 or part of a name, got 3"),
     ({"progress": 3}, "progress: must be a function, got 3"),
 ]
@@ -131,9 +134,9 @@ def test_numbers_of_numpy_in_scenes() -> None:
     scene = clfractal.load_scene(plain)
     assert clfractal.load_scene(numpy) == scene
     assert clfractal.load_scene(clfractal.load_scene(numpy).resolved()) == scene
-    camera = scene.camera.model_copy(update={"position": np.array([1, 2, 3]), "fov": np.float32(40)})
-    assert camera.position == (1, 2, 3)
-    assert isinstance(camera.position[0], float)
+    changed = scene.camera.model_copy(update={"position": np.array([1, 2, 3]), "fov": np.float32(40)})
+    assert changed.position == (1, 2, 3)
+    assert isinstance(changed.position[0], float)
     wider = scene.model_copy(update={"image": {"width": np.int64(64), "height": np.int64(48)}})
     assert (wider.image.width, type(wider.image.width)) == (64, int)
     assert (
@@ -253,3 +256,18 @@ def test_other_functions_name_their_arguments() -> None:
         lambda: clfractal.distances("mandelbulb", POINTS, iterations=0),
         "iterations: must be from 1 to 1000000",
     )
+
+
+def test_moves_of_a_camera_name_their_arguments() -> None:
+    scene: Any = clfractal.load_scene(SCENE)
+    wrong: Any = "a"
+    for call, message in (
+        (lambda: camera.frame(wrong), "scene: must be a Scene, as load_scene gives it, got 'a'"),
+        (lambda: camera.angles(wrong), "scene: must be a Scene, as load_scene gives it, got 'a'"),
+        (lambda: camera.turn(scene, azimuth=wrong), "azimuth: must be a number, got 'a'"),
+        (lambda: camera.turn(scene, elevation=float("nan")), "elevation: must be a finite number, got nan"),
+        (lambda: camera.roll(scene, wrong), "camera.roll: must be a number, got 'a'"),
+    ):
+        refused(call, message)
+    turned = camera.turn(scene, azimuth=np.float32(90))  # type: ignore[arg-type]
+    assert camera.angles(turned)[0] == pytest.approx(camera.angles(scene)[0] + 90)

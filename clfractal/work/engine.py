@@ -82,9 +82,10 @@ class Engine:
         self.close()
 
     def close(self) -> None:
-        """Frees the device's memory; the engine cannot be used afterwards."""
+        """Frees the device's memory; the engine cannot be used afterwards. A second call does nothing."""
         if is_lost():  # a forked process leaves what belongs to its parent
             self._closed = True
+        if self._closed:
             return
         with self._alone():
             self.executor.close()

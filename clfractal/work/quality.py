@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
+from clfractal import arguments
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.scene.model import Scene
 
@@ -40,8 +41,10 @@ def with_quality(scene: Scene, quality: str, *, kept: Collection[str] = ()) -> S
     Raises:
         SceneError: there is no such preset.
     """
+    if not isinstance(quality, str):
+        arguments.refuse("quality", "must be a word such as good", arguments.plain(quality))
     if quality not in PRESETS:
-        raise SceneError(unknown_name("quality", str(quality), get_args(Quality)), Where(path="quality"))
+        raise SceneError(unknown_name("quality", quality, get_args(Quality)), Where(path="quality"))
     preset = PRESETS[quality]  # type: ignore[index]
     updates: dict[str, Any] = {"renderer": _preset(scene.renderer, preset, "renderer", kept)}
     if scene.layout is not None:

@@ -161,6 +161,7 @@ def test_one_thread_at_a_time(device: Device) -> None:
 def test_a_closed_engine_says_so(device: Device) -> None:
     engine = Engine(device)
     engine.close()
+    engine.close()  # as `with` does after it
     with pytest.raises(ClfractalError, match=r"^this engine is closed$"):
         engine.render(changed(BULB))
 
