@@ -179,7 +179,8 @@ def test_what_is_refused(clf: InProcess, options: tuple[str, str]) -> None:
 def test_nothing_that_exists_is_replaced(clf: InProcess, there: str) -> None:
     Path(there).write_text("mine")
     ended = clf("vary", "scene.yaml", *SMALL, "--sheet", "sheet.png")
-    assert ended.is_one_line(2, f"{there}: exists already and is not replaced; choose another folder with -o")
+    other = "name" if there == "sheet.png" else "folder with -o"
+    assert ended.is_one_line(2, f"{there}: exists already and is not replaced; choose another {other}\n")
     assert names() == [there]
     assert Path(there).read_text() == "mine"
 

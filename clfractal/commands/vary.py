@@ -171,9 +171,8 @@ def _check_files(scene: Scene, choice: Choice, names: Sequence[str]) -> None:
     files = [choice.folder / f"{name}{suffix}" for name in names for suffix in suffixes]
     for file in (*choice.sheets, *files):
         if file.exists() or file.is_symlink():
-            raise FileError(
-                "exists already and is not replaced; choose another folder with -o", Where(str(file))
-            )
+            other = "name" if file in choice.sheets else "folder with -o"
+            raise FileError(f"exists already and is not replaced; choose another {other}", Where(str(file)))
     for sheet in choice.sheets:
         check_picture(sheet)
     try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -134,14 +133,9 @@ def given(scene: Scene) -> Volume | None:
         found.values,
         np.array(found.corner) + spacing / 2,
         np.diag(spacing),
-        inputs=files_of(scene),
+        inputs=scene.files,
         remarks=remarks_of_grid(scene, found.values),
     )
-
-
-def files_of(scene: Scene) -> tuple[Path, ...]:
-    """The files that were read for a scene."""
-    return scene.files
 
 
 def volume_settings(scene: Scene) -> VolumeRenderer:
@@ -170,7 +164,7 @@ def _volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
         # What the bytes 0 and 255 stand for; floats are the value's own numbers.
         "range": f"{grid.range[0]:g} {grid.range[1]:g}",
     }
-    return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts, files_of(job.scene))
+    return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts, job.scene.files)
 
 
 def _one_line(plain: Any) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from clfractal import arguments
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import choose
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
@@ -262,8 +261,3 @@ def _dressed(mesh: Mesh, made: Made, volume: Volume, talk: Talk) -> Mesh:
         progress=talk.of("normals"),
     )
     return replace(dressed, text=_text(made))
-
-
-def checked_level(level: float | None) -> float | None:
-    """A level as it was given; SceneError if it is no number."""
-    return None if level is None else arguments.number("level", level)
