@@ -26,6 +26,7 @@ from clfractal.api import load_scene, render
 from clfractal.files.srgb import encode8
 from clfractal.formulas import catalog
 from clfractal.pictures.compose import APART
+from clfractal.pictures.develop import Development, developed
 from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent
@@ -102,9 +103,10 @@ def make_picture(path: Path) -> None:
     """Renders a scene and writes its reduced picture."""
     scene = load_scene(path)
     film = render(beside(scene), channels=["R", "G", "B", "A"])
-    linear = np.stack([film["R"], film["G"], film["B"]], axis=-1)
+    bands = [band for _, band in developed(film, Development.of(film.header)).bands()]
+    linear = np.stack([np.concatenate([band[name] for band in bands]) for name in "RGB"], axis=-1)
     # What is brighter than the screen can show is cut before it is averaged, as in the full picture.
-    linear = np.clip(linear * np.float32(2.0**scene.output.stops), 0, 1)
+    linear = np.clip(linear, 0, 1)
     coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
     shown = picture(reduced(linear, WIDTH), reduced(coverage, WIDTH))
     content, quality = small_enough(shown)
