@@ -334,6 +334,9 @@ def test_what_is_told_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
         def say(self, line: str) -> None:
             told.append(line)
 
+        def alive(self) -> None:
+            """Something was seen; nobody waits here."""
+
     monkeypatch.setattr(voxelize_command, "LINE_EVERY_SECONDS", 0.0)
     stages = voxelize_command.StageProgress(Told())  # type: ignore[arg-type]
     stages.say("triangles", 0.25)

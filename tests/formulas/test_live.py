@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import pickle
 import time
 from typing import Any
@@ -89,8 +90,10 @@ def values_of(parameter: Parameter) -> st.SearchStrategy[float]:
     if parameter.choices is not None:
         return st.sampled_from(parameter.choices)
     low, high = parameter.minimum or 0.0, parameter.maximum or 4.0
-    whole = st.integers(-(-int(low * 1000) // 1000), int(high)).map(float).filter(lambda v: low <= v <= high)
-    return whole if parameter.type == "int" else whole | st.floats(low, high)
+    whole = [float(v) for v in range(math.ceil(low), math.floor(high) + 1)]
+    if parameter.type == "int":
+        return st.sampled_from(whole)
+    return (st.sampled_from(whole) if whole else st.nothing()) | st.floats(low, high)
 
 
 def drawn(data: st.DataObject, name: str) -> dict[str, float]:
