@@ -90,7 +90,7 @@ def test_what_is_no_single_film() -> None:
         clfractal.render_pair(SCENE)
     with pytest.raises(clfractal.SceneError, match=r"output\.channels: anaglyph needs the channels R, G, B"):
         clfractal.render(stereo("anaglyph"), channels=["R", "A"])
-    with pytest.raises(clfractal.SceneError, match="^region: must lie inside the picture of 80 x 36"):
+    with pytest.raises(clfractal.SceneError, match=r"^region: must lie inside the picture of 80 x 36"):
         clfractal.render(stereo("split"), region=(70, 0, 11, 1))
 
 
