@@ -202,6 +202,7 @@ def test_the_formulas_above_fail_for_what_they_say(here: Path, shell: InProcess)
     ("name", "message"),
     [
         ("nothing.yaml", "nothing.yaml: cannot be read: No such file or directory"),
+        ("inside", "inside: cannot be read: No such file or directory; did you mean inside.yaml?"),
         ("/dev/zero", "/dev/zero: is not a regular file"),
         (".", ".: is a folder, not a file"),
         ("old.png", "old.png:"),
@@ -210,6 +211,7 @@ def test_the_formulas_above_fail_for_what_they_say(here: Path, shell: InProcess)
 )
 def test_a_scene_that_cannot_be_read(here: Path, shell: InProcess, name: str, message: str) -> None:
     (here / "picture").write_bytes(b"\x89PNG\r\n\x1a\n")
+    (here / "inside.yaml").write_text("version: 1")
     ended = shell("render", name, "-o", "old.exr")
     (here / "picture").unlink()
     assert ended.is_one_line(2, message)

@@ -29,6 +29,8 @@ _INT = re.compile(r"[-+]?[0-9]+")
 _OTHER_BASES = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _NON_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+# A colour without quotes: YAML takes it for a comment.
+_BARE_COLOR = re.compile(r"[:,\[]\s+(#[0-9a-fA-F]{3}(?:[0-9a-fA-F]{3})?)\b")
 _WORDS: Mapping[str, bool | None] = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), None),
     **dict.fromkeys(("true", "True", "TRUE"), True),
@@ -174,7 +176,11 @@ class _Builder:
             mark: Any = error.problem_mark or error.context_mark
             place = Where(self.file, mark.line + 1, mark.column + 1) if mark is not None else Where(self.file)
             problem = error.problem or error.context or "cannot be read"
-            raise self.error(f"not valid YAML: {problem}", place) from error
+            near = text.splitlines()[max(mark.line - 3, 0) : mark.line + 1] if mark is not None else []
+            # The rest of the line is a comment then, the closing bracket included.
+            bare = next(filter(None, map(_BARE_COLOR.search, near)), None)
+            hint = f'; a colour needs quotes: "{bare.group(1)}"' if bare else ""
+            raise self.error(f"not valid YAML: {problem}{hint}", place) from error
         except (yaml.YAMLError, ValueError) as error:
             raise self.error(f"not valid YAML: {str(error)[:200]}", Where(self.file)) from error
 

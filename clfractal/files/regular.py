@@ -38,7 +38,10 @@ def read_bytes(
         descriptor = os.open(path, system.READ)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise FileError(f"cannot be read: {reason}", Where(shown)) from error
+        # `clfractal new pollen` writes pollen.yaml: its user may leave the ending away here, too.
+        ended = isinstance(error, FileNotFoundError) and path.with_name(f"{path.name}.yaml").is_file()
+        hint = f"; did you mean {shown}.yaml?" if ended else ""
+        raise FileError(f"cannot be read: {reason}{hint}", Where(shown)) from error
     try:
         check_regular(descriptor, shown, None if prefix is not None else limit)
         with os.fdopen(descriptor, "rb", closefd=False) as stream:

@@ -118,7 +118,8 @@ class _Parser:
         good = _ALLOWED.match(self.text)
         end = good.end() if good else 0
         if end < len(self.text):
-            self.fail(f"unexpected character {self.text[end]!r}", end + 1)
+            hint = "; a power is written x**2" if self.text[end] == "^" else ""
+            self.fail(f"unexpected character {self.text[end]!r}{hint}", end + 1)
         if not self.text.strip():
             self.fail("is empty")
         depth = 0
@@ -142,6 +143,8 @@ class _Parser:
             # In `{d: max(a, 1)}` the comma ends the value, so that the expression is cut short.
             hint = "; inside {} or [] of YAML an expression with a comma needs quotes"
             hint = hint if "never closed" in problem and "," not in self.text else ""
+            if re.search(r"(?<![\w.])[\d.]+(?!e[-+]?\d)[a-z_]", self.text, re.IGNORECASE):
+                hint = "; a product is written 2*x"
             self.fail(f"cannot be read: {problem[:1].lower()}{problem[1:80]}{hint}", column)
         except (RecursionError, MemoryError):
             self.fail(f"nested more than {MAX_DEPTH} levels deep", 1)

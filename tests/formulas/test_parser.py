@@ -171,7 +171,8 @@ def test_random_tokens_raise_only_formula_errors(text: str) -> None:
         ("{x}", "unexpected character '{'", 1),
         ("x # y", "unexpected character '#'", 3),
         ("x % y", "unexpected character '%'", 3),
-        ("x ^ y", "unexpected character '^'", 3),
+        ("x ^ y", "unexpected character '^'; a power is written x**2", 3),
+        ("2x*y", "invalid decimal literal; a product is written 2*x", 1),
         ("\uff58", "unexpected character", 1),
         ("x y", "cannot be read", 3),
         ("x +", "cannot be read", None),
@@ -187,6 +188,11 @@ def test_everything_else_is_one_located_line(text: str, words: str, column: int 
         assert error.where.column == column
         assert f"at column {column} of " in error.message
     assert len(error.message) < 250
+
+
+@pytest.mark.parametrize("text", ["x2 y", "2e3 +* x", "x1y +", "1.5e-3 y"])
+def test_a_product_is_not_suggested_where_none_is_meant(text: str) -> None:
+    assert "2*x" not in failure(text).message
 
 
 @pytest.mark.parametrize(
