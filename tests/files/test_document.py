@@ -70,7 +70,7 @@ def test_values(text: str, value: Any) -> None:
         ("a: [1, 2\nb: 3", "a.yaml:2:2: not valid YAML"),
         ("a: b: c", "a.yaml:1:5: not valid YAML"),
         ("a: {b: #ffd9a8, c: 1}\nd: 2", '; a colour needs quotes: "#ffd9a8"'),
-        ("a: [#fff, #000]\n", '; a colour needs quotes: "#fff"'),
+        ("a: [#fff, #000]\n", '; a colour needs quotes: "#000"'),
         ("a: 1\nb: \x07", "a.yaml:2: holds a character that YAML does not allow"),
         ("a: '\udc80'", "a.yaml: is not UTF-8 text"),
         ("x" * (MAX_BYTES + 1), "a.yaml: is too large: at most 1,000,000 bytes"),
