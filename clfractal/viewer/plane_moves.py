@@ -214,7 +214,7 @@ def _place_of(steps: list[Transform], name: str) -> int | None:
 def _step(name: str, amount: float) -> Transform:
     if name.startswith("rotate") and abs(amount) > _MOST_DEGREES:
         amount = float(np.fmod(amount, 360.0))
-    return Transform.model_validate({name: amount})
+    return Transform.checked({name: amount})
 
 
 def _pixel(plane: Plane, size: Size) -> float:

@@ -335,3 +335,12 @@ def test_every_plane_is_valid_whatever_is_asked(plane: Plane, data: st.DataObjec
         plane = moves[data.draw(st.sampled_from(sorted(moves)))]()
         Plane.model_validate(plane.model_dump())
         assert_frame(plane)
+
+
+def test_a_step_beyond_its_range_leaves_a_valid_plane() -> None:
+    """Joined steps may leave a step's range: the plane is then told by its middle, or stays as it is."""
+    plane = Plane(center=(0, 0, 0), normal=(0, 0, 1), transform=({"rotate_side": 30}, {"scale": 0.5}))
+    for side in (9e5, 2e6, 5e13):
+        moved = plane_moves.shift(plane, side=side)
+        Plane.model_validate(moved.model_dump())
+        assert_frame(moved)

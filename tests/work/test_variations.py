@@ -354,9 +354,12 @@ def test_rounding_is_fine_against_the_step(value: float, step: float) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"strength": "hevy"}, "unknown strength 'hevy'; did you mean 'heavy'?"),
-        ({"kinds": ["colours"]}, "unknown kind 'colours'; did you mean 'colors'?"),
-        ({"count": 0}, "count: must be at least 1, got 0"),
+        (
+            {"strength": "hevy"},
+            "strength: must be slight, medium or heavy, got 'hevy'; did you mean 'heavy'?",
+        ),
+        ({"kinds": ["colours"]}, "kinds: unknown kind 'colours'; did you mean 'colors'?"),
+        ({"count": 0}, "count: must be from 1 to 100000, got 0"),
     ],
 )
 def test_wrong_arguments(arguments: dict[str, Any], message: str) -> None:
