@@ -14,7 +14,7 @@ from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_fr
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
 from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.model import Formula, inside
-from clfractal.formulas.own import find_own, library_names
+from clfractal.formulas.own import check_inside, find_own, library_names
 from clfractal.formulas.turns import MAX_START
 from clfractal.resources import folder
 
@@ -306,12 +306,7 @@ def safe_path(text: str, base_folder: Path, where: Where) -> Path:
     if not text or "\0" in text or path.is_absolute() or ".." in path.parts or path.drive:
         raise FileError(f"must be a path inside the scene's folder, got {text[:80]!r}", where)
     full = base_folder / path
-    try:
-        real, base = full.resolve(), base_folder.resolve()
-    except (OSError, RuntimeError) as error:
-        raise FileError(f"cannot be read: {text[:80]}", where) from error
-    if not real.is_relative_to(base):
-        raise FileError(f"leads out of the scene's folder: {text[:80]!r}", where)
+    check_inside(full, base_folder, text[:80], where)
     return full
 
 

@@ -68,10 +68,19 @@ def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
         raise FormulaError(unknown_name("formula", name, (*library, *files)), where)
     path = files[name]
     if beside is not None and path.parent == beside / FOLDER:
-        try:
-            real, base = path.resolve(), beside.resolve()
-        except (OSError, RuntimeError) as error:
-            raise FileError(f"cannot be read: {path}", where) from error
-        if not real.is_relative_to(base):
-            raise FileError(f"leads out of the scene's folder: {str(path)[:200]!r}", where)
+        check_inside(path, beside, str(path)[:200], where)
     return path
+
+
+def check_inside(path: Path, folder: Path, shown: str, where: Where) -> None:
+    """Refuses a file that a link leads out of a scene's folder; `shown` is the path as the user knows it.
+
+    Raises:
+        FileError: it lies elsewhere, or its links cannot be followed.
+    """
+    try:
+        real, base = path.resolve(), folder.resolve()
+    except (OSError, RuntimeError) as error:
+        raise FileError(f"cannot be read: {shown}", where) from error
+    if not real.is_relative_to(base):
+        raise FileError(f"leads out of the scene's folder: {shown!r}", where)
