@@ -1,0 +1,173 @@
+"""How near pictures are to the set that they show: hits, losses, the unit sphere, steps.
+
+    python -m benchmarks.truth [--part hits|losses|sphere|steps ...] [--formula NAME ...] [--all] [-o FILE.json]
+
+Pictures are rendered as any others, and judged by the formula alone, in float64: brute force that knows nothing of the
+march. Exit status 1 if a target is missed; the last lines say which.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import zlib
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.truth import hits, losses, sphere, steps
+from benchmarks.truth.picture import see
+from benchmarks.truth.solid import Solid
+from benchmarks.truth.subjects import SIDE, subjects
+from clfractal.errors import ClfractalError
+from clfractal.work.engine import Engine
+
+PARTS = ("hits", "losses", "sphere", "steps")
+
+
+class Report:
+    """Prints lines as they are measured, and keeps them and the targets that are missed."""
+
+    def __init__(self) -> None:
+        self.found: dict[str, list[dict[str, Any]]] = {}
+        self.missed: list[str] = []
+
+    def keep(self, part: str, what: Any, **more: Any) -> None:
+        """Keeps a measurement for the JSON file."""
+        self.found.setdefault(part, []).append({**more, **asdict(what), "met": what.met})
+
+    def say(self, line: str = "") -> None:
+        """A line of the table, at once."""
+        print(line, flush=True)
+
+
+def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> None:
+    """Hits and losses of every formula, from one picture each."""
+    both = [part for part in ("hits", "losses") if part in options.part]
+    report.say(
+        f"Hits: share with an inside point within 1, 1.5 and 3 pixel widths ({hits.PLACES} random places), the"
+    )
+    report.say(
+        "median distance of the nearest, and the share that has one within 1 by a descent too (thin sets)."
+    )
+    report.say(
+        f"Losses: rays that miss {losses.THICK:g} widths of inside, or hit over {losses.LATE:g} widths behind.\n"
+    )
+    head = f"{'formula':22} {'scene':22} {'hits':>5} {'<=1':>6} {'<=1.5':>6} {'<=3':>6} {'median':>6} {'reached':>7}"
+    report.say(f"{head} {'fill':>6} {'set':>4} {'steps':>6} {'rays':>6} {'lost':>4} {'s':>5}")
+    for subject in subjects(options.formula, side=options.size):
+        start = time.perf_counter()
+        random = np.random.default_rng(zlib.crc32(subject.name.encode()))
+        seen = see(subject.scene, engine, precision=options.precision)
+        solid = Solid(subject.scene.chain, subject.scene.formula.iterations, engine.device)
+        cells = [f"{subject.name:22} {subject.source:22}"]
+        named = {"formula": subject.name, "scene": subject.source}
+        if "hits" in both:
+            near = hits.measure_hits(seen, solid, 2000 if options.all else options.hits, random)
+            report.keep("hits", near, **named, fat=near.fat)
+            shares = " ".join(f"{100 * share:5.1f}%" for share in near.within)
+            cells.append(
+                f"{near.tested:5} {shares} {near.nearest:6.2f} {100 * near.reached:6.1f}% {100 * near.fill:5.1f}%"
+            )
+            cells.append(" fat" if near.fat else "thin")
+            if not near.met:
+                share = near.within[0] if near.fat else near.reached
+                report.missed.append(
+                    f"hits: {subject.name}: {100 * share:.1f} % have an inside point within a pixel's width,"
+                    f" not {100 * hits.SHARE:.0f} %"
+                )
+        else:
+            cells.append(" " * 54)
+        cells.append(f"{seen.film.stats['steps_per_ray']:6.2f}")
+        if "losses" in both:
+            gone = losses.measure_losses(seen, solid, 10_000 if options.all else options.rays, random)
+            report.keep("losses", gone, **named)
+            cells.append(f"{gone.tried:6} {len(gone.lost):4}")
+            if not gone.met:
+                places = ", ".join(f"({one.x}, {one.y})" for one in gone.lost[:4])
+                report.missed.append(
+                    f"losses: {subject.name}: {len(gone.lost)} of {gone.tried} rays, at {places}"
+                )
+        else:
+            cells.append(" " * 11)
+        report.say(" ".join([*cells, f"{time.perf_counter() - start:5.1f}"]))
+
+
+def spheres(report: Report, engine: Engine) -> None:
+    """The unit sphere."""
+    report.say(f"\n{'unit sphere':22} {'area':>9} {'depth 99%':>10} {'normals 99%':>12}")
+    for one in sphere.measure_spheres(engine):
+        report.keep("sphere", one)
+        report.say(f"{one.name:22} {100 * one.area:+8.3f}% {one.depth:7.3f} px {one.normal:8.4f} deg")
+        if not one.met:
+            report.missed.append(
+                f"sphere: {one.name}: area {100 * one.area:+.3f} %, depth {one.depth:.3f} pixels,"
+                f" normals {one.normal:.4f} degrees; to reach: {100 * sphere.MOST_AREA:g} %,"
+                f" {sphere.MOST_DEPTH:g} and {sphere.MOST_NORMAL:g}"
+            )
+
+
+def rows(report: Report, engine: Engine) -> None:
+    """Steps of the speed table's rows."""
+    report.say(
+        f"\n{'steps per ray':22} {'now':>8} {'before':>8} {'ratio':>6} {'bad/1000':>8} {'iter/ray':>9}"
+    )
+    for one in steps.measure_steps(engine, steps.record().get("steps", {})):
+        report.keep("steps", one)
+        before = "-" if one.before is None else f"{one.before:.2f}"
+        ratio = "-" if one.before is None else f"{one.steps / one.before:.2f}"
+        report.say(
+            f"{one.row:22} {one.steps:8.2f} {before:>8} {ratio:>6} {one.bad:8.2f} {one.iterations:9.1f}"
+        )
+        if not one.met:
+            report.missed.append(f"steps: {one.row}: {ratio} of those before, not {steps.SHARE:g}")
+
+
+def main() -> int:
+    """Entry point; exit status 1 if a target is missed, 2 for wrong arguments, 3 if the device failed."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.truth", description=(__doc__ or "").split("\n")[0]
+    )
+    parser.add_argument("--part", action="append", choices=PARTS, help="only this part; repeat it for more")
+    parser.add_argument(
+        "--formula", action="append", default=[], help="only this formula; repeat it for more"
+    )
+    parser.add_argument("--hits", type=int, default=200, help="hits of each formula that are looked at")
+    parser.add_argument("--rays", type=int, default=1000, help="rays of each formula that are tried")
+    parser.add_argument("--all", action="store_true", help="2000 hits and 10,000 rays of each formula")
+    parser.add_argument("--size", type=int, default=SIDE, help="width and height of the formulas' pictures")
+    parser.add_argument("--precision", choices=("float32", "float64"), help="number type of the pictures")
+    parser.add_argument("--device", help="which device, as of `clfractal render`")
+    parser.add_argument(
+        "-o", dest="output", type=Path, help="also write everything that was measured to a JSON file"
+    )
+    options = parser.parse_args()
+    options.part = options.part or (["hits", "losses"] if options.formula else list(PARTS))
+    report = Report()
+    try:
+        with Engine(options.device) as engine:
+            if {"hits", "losses"} & set(options.part):
+                formulas(report, engine, options)
+            if "sphere" in options.part:
+                spheres(report, engine)
+            if "steps" in options.part:
+                rows(report, engine)
+    except ClfractalError as error:
+        print(error, file=sys.stderr)
+        return error.status
+    if options.output:
+        whole = {**report.found, "missed": report.missed}
+        options.output.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+    report.say()
+    for line in report.missed:
+        report.say(f"missed: {line}")
+    report.say("all targets are met" if not report.missed else f"{len(report.missed)} targets are missed")
+    return 1 if report.missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
