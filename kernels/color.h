@@ -7,7 +7,7 @@ INLINE color color_of(real r, real g, real b) {
     const color c = {r, g, b};
     return c;
 }
-INLINE color color_splat(__constant const scalar *c) { return color_of((real)(c[0]), (real)(c[1]), (real)(c[2])); }
+#define color_splat(c) color_of((real)((c)[0]), (real)((c)[1]), (real)((c)[2]))  // of a struct in any memory
 INLINE color color_pick(mask m, color yes, color no) {
     return color_of(pick(m, yes.r, no.r), pick(m, yes.g, no.g), pick(m, yes.b, no.b));
 }

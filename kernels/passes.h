@@ -5,12 +5,13 @@
 //   shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost)
 // which takes one shot at (across, below), in pixels from each pixel's middle.
 
-// The first and the last arguments of a renderer's kernel; its own stand between them.
+// The first and the last arguments of a renderer's kernel; its own stand between them. OpenCL 1.2 guarantees eight `__constant` ones:
+// lists are `__global`, and constant what all work-items read at the same time.
 #define PASS_BUFFERS                                                                                                       \
     __global float *film, __global scalar *kept, __global uint *statistics, __global const int4 *places,                   \
         __constant const struct View *view, __constant const struct Sampling *sampling
 #define PASS_SPAN                                                                                                          \
-    __constant const int *slots, int channel_count, int kept_count, int first_packet, int end_packet, int first, int end, \
+    __global const int *slots, int channel_count, int kept_count, int first_packet, int end_packet, int first, int end, \
         int mode
 #define PASS {film, kept, statistics, places, view, sampling, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode}
 
@@ -22,7 +23,7 @@ typedef struct {
     __global const int4 *places;    // of each tile: its top left pixel, x and y; its number in `kept`
     __constant const struct View *view;
     __constant const struct Sampling *sampling;
-    __constant const int *slots;    // places of channels in the film, then of a pixel's numbers in `kept`; -1: not wanted
+    __global const int *slots;      // places of channels in the film, then of a pixel's numbers in `kept`; -1: not wanted
     int channel_count, kept_count;
     int first_packet, end_packet;
     int first, end;                 // samples
@@ -30,7 +31,7 @@ typedef struct {
 } pass;
 
 // A number of a packet's pixels, loaded from the kept data or stored there.
-INLINE void kept_number(__global scalar *kept, __constant const int *slots, int number, int write, real *value) {
+INLINE void kept_number(__global scalar *kept, __global const int *slots, int number, int write, real *value) {
     if (slots[number] < 0) return;
     __global scalar *at = kept + slots[number] * TILE_PIXELS;
     scalar each[LANES];
@@ -43,7 +44,7 @@ INLINE void kept_number(__global scalar *kept, __constant const int *slots, int 
     }
 }
 
-INLINE void kept_pixel(__global scalar *kept, __constant const int *slots, int write, pixel *p) {
+INLINE void kept_pixel(__global scalar *kept, __global const int *slots, int write, pixel *p) {
     kept_number(kept, slots, KEPT_RED, write, &p->radiance.r);
     kept_number(kept, slots, KEPT_GREEN, write, &p->radiance.g);
     kept_number(kept, slots, KEPT_BLUE, write, &p->radiance.b);
@@ -73,7 +74,7 @@ INLINE void render_packet(pass s, world w) {
     const int4 place = s.places[tile];
     const packet_pixels at = packet_at(packet, (int2)(place.x, place.y), s.view);
     __global scalar *kept = s.kept + place.z * s.kept_count * TILE_PIXELS + packet * LANES;
-    __constant const int *kept_slots = s.slots + CHANNEL_COUNT;
+    __global const int *kept_slots = s.slots + CHANNEL_COUNT;
     pixel p = pixel_start();
     if (s.first > 0) kept_pixel(kept, kept_slots, 0, &p);
     const real shots_before = p.shots;

@@ -71,7 +71,7 @@ INLINE real noise_of(const pixel *p, int transparent) {
 #endif
 
 // Writes a pixel's channels; `slots` has for each channel its place among the wanted ones, or -1; `film` begins at the tile.
-INLINE void pixel_write(__global float *film, __constant const int *slots, const int *place, const pixel *p) {
+INLINE void pixel_write(__global float *film, __global const int *slots, const int *place, const pixel *p) {
     const real share = R(1.0) / fmax(p->shots, R(1.0));
     write_channel(film, slots[CHANNEL_R], place, p->radiance.r * share);
     write_channel(film, slots[CHANNEL_G], place, p->radiance.g * share);

@@ -3,7 +3,7 @@
 //
 // PLANES of them; `orbits` has the scene's own limits, then those of each plane.
 typedef struct {
-    __constant const struct CutPlane *planes;
+    __global const struct CutPlane *planes;
     __constant const struct Orbit *orbits;
     __constant const scalar *k;
     __global const float *palettes;   // PALETTE_SIZE colours for each plane
@@ -38,7 +38,7 @@ INLINE mask planes_cut(ray *r, real *face, plane_set set) {
 }
 
 // Where the formula is evaluated for a point of the picture: elsewhere if a volume is zoomed.
-INLINE vec plane_place(vec point, __constant const struct CutPlane *plane) {
+INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
     return vec_along(vec_splat(plane->zoom_origin), (real)(plane->zoom), point);
 }
 
@@ -82,7 +82,7 @@ typedef struct {
 INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
     plane_hits hits;
     for (int i = 0; i < PLANES; ++i) {
-        __constant const struct CutPlane *plane = set.planes + i;
+        __global const struct CutPlane *plane = set.planes + i;
         const vec normal = vec_splat(plane->normal);
         const real climb = vec_dot(r.direction, normal);
         const vec offset = vec_sub(vec_splat(plane->center), r.origin);

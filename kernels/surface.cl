@@ -44,7 +44,7 @@ __kernel void surface(PASS_BUFFERS, __constant const struct March *settings, __c
                       __constant const struct Light *lights, __global const float *palette,
                       __global const float *environment,
 #if PLANES > 0
-                      __constant const struct CutPlane *planes, __global const float *plane_palettes,
+                      __global const struct CutPlane *planes, __global const float *plane_palettes,
 #endif
                       PASS_SPAN) {
 #if PLANES > 0

@@ -7,7 +7,8 @@ INLINE vec vec_of(real x, real y, real z) {
     const vec r = {x, y, z};
     return r;
 }
-INLINE vec vec_splat(__constant const scalar *a) { return vec_of((real)(a[0]), (real)(a[1]), (real)(a[2])); }
+// Three numbers of a struct, the same for all lanes. A macro, as they may lie in any memory.
+#define vec_splat(a) vec_of((real)((a)[0]), (real)((a)[1]), (real)((a)[2]))
 INLINE vec vec_add(vec a, vec b) { return vec_of(a.x + b.x, a.y + b.y, a.z + b.z); }
 INLINE vec vec_sub(vec a, vec b) { return vec_of(a.x - b.x, a.y - b.y, a.z - b.z); }
 INLINE vec vec_scale(vec a, real s) { return vec_of(a.x * s, a.y * s, a.z * s); }

@@ -53,7 +53,7 @@ __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __c
                      __global const sample *values3, __global const uchar *normals0, __global const uchar *normals1,
                      __global const uchar *normals2, __global const uchar *normals3,
 #if PLANES > 0
-                     __constant const struct CutPlane *planes, __constant const struct Orbit *orbits,
+                     __global const struct CutPlane *planes, __constant const struct Orbit *orbits,
                      __constant const scalar *k, __global const float *plane_palettes,
 #endif
                      PASS_SPAN) {

@@ -53,7 +53,7 @@ def plane_defines(scene: Scene) -> dict[str, object]:
     """What the text of `kernels/planes.h` depends on."""
     return {
         "PLANES": sum(1 for _ in all_planes(scene)),
-        "ESCAPE_COLORS": "CutPlane",
+        "ESCAPE_COLORS": "__global const struct CutPlane",
         **escape_defines(scene.chain),
     }
 
