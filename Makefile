@@ -9,6 +9,7 @@
 #   make locks         which versions the dependencies resolve to on Linux, macOS and Windows (tests/platforms/locks)
 #   make lowest        render, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
+#   make truth         how near pictures are to the set, by brute force (ARGUMENTS="--formula mandelbulb")
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
 #
@@ -33,7 +34,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test window soak lint locks lowest bench mutate portability install clean
+.PHONY: demo view test window soak lint locks lowest bench truth mutate portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -86,6 +87,9 @@ lowest: $(LOWEST)/.installed
 
 bench: $(VENV)/.installed
 	$(BIN)/clfractal bench
+
+truth: $(VENV)/.installed
+	$(BIN)/python -m benchmarks.truth $(ARGUMENTS)
 
 # Copies of the checkout are changed, so it is the checkout that is tested and not what is installed.
 mutate: $(VENV)/.mutates-with

@@ -1,6 +1,6 @@
-"""How near pictures are to the set that they show: hits, losses, the unit sphere, steps.
+"""How near pictures are to the set that they show: hits, losses, the unit sphere, steps, noise.
 
-    python -m benchmarks.truth [--part hits|losses|sphere|steps ...] [--formula NAME ...] [--all] [-o FILE.json]
+    python -m benchmarks.truth [--part hits|losses|sphere|steps|noise ...] [--formula NAME ...] [--all] [-o FILE.json]
 
 Pictures are rendered as any others, and judged by the formula alone, in float64: brute force that knows nothing of the
 march. Exit status 1 if a target is missed; the last lines say which.
@@ -9,40 +9,24 @@ march. Exit status 1 if a target is missed; the last lines say which.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 import zlib
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from benchmarks.truth import hits, losses, sphere, steps
+from benchmarks.truth import hits, losses, noise, sphere, steps
 from benchmarks.truth.picture import see
+from benchmarks.truth.report import Report
 from benchmarks.truth.solid import Solid
 from benchmarks.truth.subjects import SIDE, subjects
 from clfractal.errors import ClfractalError
+from clfractal.files.atomic import check_output
 from clfractal.work.engine import Engine
 
-PARTS = ("hits", "losses", "sphere", "steps")
-
-
-class Report:
-    """Prints lines as they are measured, and keeps them and the targets that are missed."""
-
-    def __init__(self) -> None:
-        self.found: dict[str, list[dict[str, Any]]] = {}
-        self.missed: list[str] = []
-
-    def keep(self, part: str, what: Any, **more: Any) -> None:
-        """Keeps a measurement for the JSON file."""
-        self.found.setdefault(part, []).append({**more, **asdict(what), "met": what.met})
-
-    def say(self, line: str = "") -> None:
-        """A line of the table, at once."""
-        print(line, flush=True)
+PARTS = ("hits", "losses", "sphere", "steps", "noise")
 
 
 def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> None:
@@ -127,7 +111,21 @@ def rows(report: Report, engine: Engine) -> None:
             report.missed.append(f"steps: {one.row}: {ratio} of those before, not {steps.SHARE:g}")
 
 
-def main() -> int:
+def flicker(report: Report, engine: Engine) -> None:
+    """Noise and flicker of six scenes."""
+    report.say(f"\n{'one sample, codes':22} {'noise':>8} {'before':>8} {'flicker':>8} {'before':>8}")
+    for one in noise.measure_noise(engine, steps.record().get("noise", {})):
+        report.keep("noise", one)
+        before = ("-", "-") if one.before is None else tuple(f"{figure:.2f}" for figure in one.before)
+        report.say(f"{one.scene:22} {one.noise:8.2f} {before[0]:>8} {one.flicker:8.2f} {before[1]:>8}")
+        if not one.met:
+            report.missed.append(
+                f"noise: {one.scene}: noise {one.noise:.2f} and flicker {one.flicker:.2f},"
+                f" before {before[0]} and {before[1]}"
+            )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; exit status 1 if a target is missed, 2 for wrong arguments, 3 if the device failed."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.truth", description=(__doc__ or "").split("\n")[0]
@@ -145,10 +143,15 @@ def main() -> int:
     parser.add_argument(
         "-o", dest="output", type=Path, help="also write everything that was measured to a JSON file"
     )
-    options = parser.parse_args()
+    options = parser.parse_args(arguments)
     options.part = options.part or (["hits", "losses"] if options.formula else list(PARTS))
+    for name in ("hits", "rays", "size"):
+        if getattr(options, name) < 1:
+            parser.error(f"--{name}: must be at least 1")
     report = Report()
     try:
+        if options.output:
+            check_output(options.output, (".json",))
         with Engine(options.device) as engine:
             if {"hits", "losses"} & set(options.part):
                 formulas(report, engine, options)
@@ -156,12 +159,13 @@ def main() -> int:
                 spheres(report, engine)
             if "steps" in options.part:
                 rows(report, engine)
+            if "noise" in options.part:
+                flicker(report, engine)
+        if options.output:
+            report.write(options.output)
     except ClfractalError as error:
         print(error, file=sys.stderr)
         return error.status
-    if options.output:
-        whole = {**report.found, "missed": report.missed}
-        options.output.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
     report.say()
     for line in report.missed:
         report.say(f"missed: {line}")

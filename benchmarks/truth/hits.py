@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.truth.picture import Seen
-from benchmarks.truth.solid import Floats, Mask, Solid
+from benchmarks.truth.solid import Estimated, Floats, Inside, Mask
 
 PLACES = 4096
 """Random places in each ball."""
@@ -55,7 +55,7 @@ class Hits:
         return self.tested == 0 or (self.within[0] if self.fat else self.reached) >= SHARE
 
 
-def measure_hits(seen: Seen, solid: Solid, count: int, random: np.random.Generator) -> Hits:
+def measure_hits(seen: Seen, solid: Estimated, count: int, random: np.random.Generator) -> Hits:
     """Looks around `count` hits of a picture, or all of them if they are fewer."""
     hit = np.flatnonzero(np.isfinite(seen.t))
     chosen = np.sort(random.choice(hit, min(count, len(hit)), replace=False))
@@ -100,7 +100,7 @@ def _look(
     nearest: Floats,
     place: Floats,
     radius: float,
-    solid: Solid,
+    solid: Inside,
     places: Floats,
 ) -> None:
     """Puts into `nearest` how far inside points lie, and where into `place`, for points that have none so far.
@@ -118,7 +118,7 @@ def _look(
             place[some] = around[np.arange(len(some)), best]
 
 
-def _descended(points: Floats, width: Floats, solid: Solid, random: np.random.Generator) -> Mask:
+def _descended(points: Floats, width: Floats, solid: Estimated, random: np.random.Generator) -> Mask:
     """Whether a way down the distance's gradient, from some place within a pixel's width, ends inside within the width."""
     starts = np.concatenate([np.zeros((1, 3)), in_ball(random, _DESCENTS - 1)])
     place = (points[:, None] + width[:, None, None] * starts).reshape(-1, 3)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from benchmarks.truth.picture import Seen
 from benchmarks.truth.rays import Floats, Mask, Rays
-from benchmarks.truth.solid import Solid
+from benchmarks.truth.solid import Inside
 
 THICK = 3.0
 """Widths of a pixel: an inside stretch of a ray that is as long must not be missed."""
@@ -53,7 +53,7 @@ class Losses:
         return not self.lost
 
 
-def measure_losses(seen: Seen, solid: Solid, count: int, random: np.random.Generator) -> Losses:
+def measure_losses(seen: Seen, solid: Inside, count: int, random: np.random.Generator) -> Losses:
     """Tries `count` rays that meet the bounds: half of them anywhere, half where the depth jumps from pixel to pixel."""
     meets = seen.rays.near < seen.rays.far
     edges = np.flatnonzero(meets & _edges(seen))
@@ -95,7 +95,7 @@ def _edges(seen: Seen) -> Mask:
     return edge.ravel()
 
 
-def first_stretch(solid: Solid, rays: Rays, near: Floats, end: Floats) -> Floats:
+def first_stretch(solid: Inside, rays: Rays, near: Floats, end: Floats) -> Floats:
     """Where the first inside stretch of at least THICK widths begins on each ray; NaN if there is none.
 
     All of each ray between the distances `near` and `end`, shape (n,), is sampled: first every width, and where two
@@ -120,7 +120,7 @@ def first_stretch(solid: Solid, rays: Rays, near: Floats, end: Floats) -> Floats
     return start
 
 
-def _coarse(solid: Solid, rays: Rays, near: Floats, end: Floats, steps: npt.NDArray[np.int_]) -> Floats:
+def _coarse(solid: Inside, rays: Rays, near: Floats, end: Floats, steps: npt.NDArray[np.int_]) -> Floats:
     """As `first_stretch`, for rays of some whole numbers of steps."""
     start = np.full(len(rays), np.nan)
     column = np.arange(steps.max(initial=0) + 2)

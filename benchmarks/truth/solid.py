@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device import program
-from clfractal.device.select import Device
+from clfractal.device.select import Device, has_float64
 from clfractal.device.source import flatten
 from clfractal.device.watched import Watched
+from clfractal.errors import DeviceError
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
@@ -25,14 +27,30 @@ _LAUNCH = 1 << 18
 _GROUP = 64
 
 
+class Inside(Protocol):
+    """Whatever can say which points are inside."""
+
+    def inside(self, points: Floats) -> Mask:
+        """Which of the points are inside: shape (..., 3) in scene units gives shape (...)."""
+
+
+class Estimated(Inside, Protocol):
+    """It also has an idea of how far away it is."""
+
+    def distances(self, points: Floats) -> Distances:
+        """Estimates at points of shape (n, 3): `full` and `normal` count."""
+
+
 class Solid:
     """The points that stay within the bailout for all iterations, or are inside the last `shape`.
 
     Raises:
-        DeviceError, KernelBuildError: the device failed.
+        DeviceError, KernelBuildError: the device failed, or has no float64.
     """
 
     def __init__(self, chain: Chain, iterations: int, device: Device) -> None:
+        if not has_float64(device.info):
+            raise DeviceError(f"{device.info.name} has no float64, which what is inside is decided in")
         self.chain, self.iterations, self.device = chain, iterations, device
         self.lanes = best_lanes(device, "float64", rule_of(chain))
         formula = write_formula(chain)

@@ -49,14 +49,15 @@ class Sphere:
 
 def measure_spheres(engine: Engine, sizes: tuple[int, ...] = SIZES) -> Iterator[Sphere]:
     """The sphere by each camera in each size."""
-    for camera, described in _CAMERAS.items():
+    for camera in _CAMERAS:
         for side in sizes:
-            yield measure_sphere(f"{camera} {side}", described, side, engine)
+            yield measure_sphere(camera, side, engine)
 
 
-def measure_sphere(name: str, camera: dict[str, object], side: int, engine: Engine) -> Sphere:
-    """The sphere by a camera, as a picture of `side` x `side` pixels."""
-    scene = bare({"formula": _FORMULA, "camera": camera}, side)
+def measure_sphere(camera: str, side: int, engine: Engine, search: str = "distance") -> Sphere:
+    """The sphere by an orthographic or a perspective camera, as a picture of `side` x `side` pixels."""
+    renderer = {"search": search}
+    scene = bare({"formula": _FORMULA, "camera": _CAMERAS[camera], "renderer": renderer}, side)
     seen = see(scene, engine, "N.X", "N.Y", "N.Z")
     near, far = chord(seen.rays.origin, seen.rays.direction, np.zeros(3), 1.0)
     meets = near < far
@@ -70,7 +71,7 @@ def measure_sphere(name: str, camera: dict[str, object], side: int, engine: Engi
     cross = np.linalg.norm(np.cross(normals, rays.at(exact)), axis=1)
     angle = np.degrees(np.arctan2(cross, np.sum(normals * rays.at(exact), axis=1)))
     return Sphere(
-        name,
+        f"{camera} {side}",
         float(np.isfinite(seen.t).sum() / meets.sum() - 1),
         float(np.percentile(depth, PART)),
         float(np.percentile(angle[hit], PART)),
