@@ -26,36 +26,38 @@ from clfractal.errors import ClfractalError
 from clfractal.files.atomic import check_output
 from clfractal.work.engine import Engine
 
+LEGEND = f"""\
+Hits, distances in widths of a pixel: the share with an inside point within 1, 1.5 and 3 ({hits.PLACES} random places), how
+far the nearest is (median), the share without any within 6 (stray); the share that has one within 1 by a way down the
+gradient too (reached), and how much of the ball of 1 around the nearest is inside (fill, median). A set is thin if that
+is hardly anything at more than {100 - 100 * hits.SHARE:.0f} % of the hits; it has to be reached by {100 * hits.SHARE:.0f} %, a fat set
+within 1. Losses: rays that miss {losses.THICK:g} widths of inside, or hit over {losses.LATE:g} widths behind its start.
+"""
 PARTS = ("hits", "losses", "sphere", "steps", "noise")
 
 
 def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> None:
     """Hits and losses of every formula, from one picture each."""
     both = [part for part in ("hits", "losses") if part in options.part]
-    report.say(
-        f"Hits: share with an inside point within 1, 1.5 and 3 pixel widths ({hits.PLACES} random places), the"
-    )
-    report.say(
-        "median distance of the nearest, and the share that has one within 1 by a descent too (thin sets)."
-    )
-    report.say(
-        f"Losses: rays that miss {losses.THICK:g} widths of inside, or hit over {losses.LATE:g} widths behind.\n"
-    )
-    head = f"{'formula':22} {'scene':22} {'hits':>5} {'<=1':>6} {'<=1.5':>6} {'<=3':>6} {'median':>6} {'reached':>7}"
-    report.say(f"{head} {'fill':>6} {'set':>4} {'steps':>6} {'rays':>6} {'lost':>4} {'s':>5}")
+    report.say(LEGEND)
+    head = f"{'formula':22} {'scene':22} {'hits':>5} {'<=1':>6} {'<=1.5':>6} {'<=3':>6} {'median':>6} {'stray':>6}"
+    report.say(f"{head} {'reached':>7} {'fill':>6} {'set':>4} {'steps':>6} {'rays':>6} {'lost':>4} {'s':>5}")
     for subject in subjects(options.formula, side=options.size):
         start = time.perf_counter()
-        random = np.random.default_rng(zlib.crc32(subject.name.encode()))
+        seed = zlib.crc32(subject.name.encode())
         seen = see(subject.scene, engine, precision=options.precision)
         solid = Solid(subject.scene.chain, subject.scene.formula.iterations, engine.device)
         cells = [f"{subject.name:22} {subject.source:22}"]
         named = {"formula": subject.name, "scene": subject.source}
         if "hits" in both:
-            near = hits.measure_hits(seen, solid, 2000 if options.all else options.hits, random)
+            near = hits.measure_hits(
+                seen, solid, 2000 if options.all else options.hits, np.random.default_rng(seed)
+            )
             report.keep("hits", near, **named, fat=near.fat)
             shares = " ".join(f"{100 * share:5.1f}%" for share in near.within)
             cells.append(
-                f"{near.tested:5} {shares} {near.nearest:6.2f} {100 * near.reached:6.1f}% {100 * near.fill:5.1f}%"
+                f"{near.tested:5} {shares} {near.nearest:6.2f} {100 * near.stray:5.1f}%"
+                f" {100 * near.reached:6.1f}% {100 * near.fill:5.1f}%"
             )
             cells.append(" fat" if near.fat else "thin")
             if not near.met:
@@ -65,10 +67,12 @@ def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> Non
                     f" not {100 * hits.SHARE:.0f} %"
                 )
         else:
-            cells.append(" " * 54)
+            cells.append(" " * 61)
         cells.append(f"{seen.film.stats['steps_per_ray']:6.2f}")
         if "losses" in both:
-            gone = losses.measure_losses(seen, solid, 10_000 if options.all else options.rays, random)
+            gone = losses.measure_losses(
+                seen, solid, 10_000 if options.all else options.rays, np.random.default_rng(seed)
+            )
             report.keep("losses", gone, **named)
             cells.append(f"{gone.tried:6} {len(gone.lost):4}")
             if not gone.met:

@@ -30,15 +30,17 @@ class Hits:
         tested: hits that were looked at.
         within: shares of them with an inside point among the random places within 1, 1.5 and 3 widths.
         nearest: median distance of the nearest inside point that was found; inf if that is none.
+        stray: share without any within 6 widths, in thick sets hits of something that is not there.
         reached: share with an inside point within 1 width, found at random or by a descent along the gradient.
         fill: median share of the ball of 1 width around the nearest inside point that is inside.
-        thin: share of hits where that is below _THIN, so that random places may well miss the set.
+        thin: share of hits where that is below _THIN, or where only a descent finds the set.
         floating: (column, row) of hits without one.
     """
 
     tested: int
     within: tuple[float, float, float]
     nearest: float
+    stray: float
     reached: float
     fill: float
     thin: float
@@ -60,7 +62,7 @@ def measure_hits(seen: Seen, solid: Estimated, count: int, random: np.random.Gen
     hit = np.flatnonzero(np.isfinite(seen.t))
     chosen = np.sort(random.choice(hit, min(count, len(hit)), replace=False))
     if not len(chosen):
-        return Hits(0, (0.0, 0.0, 0.0), math.inf, 0.0, 0.0, 0.0, ())
+        return Hits(0, (0.0, 0.0, 0.0), math.inf, 0.0, 0.0, 0.0, 0.0, ())
     rays, t = seen.rays[chosen], seen.t[chosen]
     points, width = rays.at(t), rays.width(t)
     nearest, place = np.full(len(points), math.inf), points.copy()
@@ -68,10 +70,11 @@ def measure_hits(seen: Seen, solid: Estimated, count: int, random: np.random.Gen
         _look(points, width, nearest, place, radius, solid, in_ball(random, PLACES))
     fill = solid.inside(place[:, None] + width[:, None, None] * in_ball(random, _FILLED)).mean(axis=1)
     within = [float((nearest <= radius).mean()) for radius in _BALLS[:3]]
-    reached = nearest <= 1
+    near, reached = nearest <= 1, nearest <= 1
     if within[0] < SHARE:
-        missing = np.flatnonzero(~reached)
+        missing = np.flatnonzero(~near)
         reached[missing] = _descended(points[missing], width[missing], solid, random)
+    thin = (reached & ~near) | (np.isfinite(nearest) & (fill < _THIN))
     floating = [
         (int(x), int(y)) for x, y in zip(seen.x[chosen][~reached], seen.y[chosen][~reached], strict=True)
     ]
@@ -79,9 +82,10 @@ def measure_hits(seen: Seen, solid: Estimated, count: int, random: np.random.Gen
         len(points),
         (within[0], within[1], within[2]),
         float(np.median(nearest)),
+        float(np.isinf(nearest).mean()),
         float(reached.mean()),
         float(np.median(fill)),
-        float((fill < _THIN).mean()),
+        float(thin.mean()),
         tuple(floating),
     )
 
