@@ -30,8 +30,9 @@ LEGEND = f"""\
 Hits, distances in widths of a pixel: the share with an inside point within 1, 1.5 and 3 ({hits.PLACES} random places), how
 far the nearest is (median), the share without any within 6 (stray); the share that has one within 1 by a way down the
 gradient too (reached), and how much of the ball of 1 around the nearest is inside (fill, median). A set is thin if that
-is hardly anything at more than {100 - 100 * hits.SHARE:.0f} % of the hits; it has to be reached by {100 * hits.SHARE:.0f} %, a fat set
-within 1. Losses: rays that miss {losses.THICK:g} widths of inside, or hit over {losses.LATE:g} widths behind its start.
+is hardly anything at more than {100 - 100 * hits.SHARE:.0f} % of the hits.
+Losses: rays that miss {losses.THICK:g} widths of inside, or hit over {losses.LATE:g} widths behind its start.
+To reach: {100 * hits.SHARE:.0f} % within 1, or of a thin set reached; nothing lost.
 """
 PARTS = ("hits", "losses", "sphere", "steps", "noise")
 

@@ -33,7 +33,7 @@ class Hits:
         stray: share without any within 6 widths, in thick sets hits of something that is not there.
         reached: share with an inside point within 1 width, found at random or by a descent along the gradient.
         fill: median share of the ball of 1 width around the nearest inside point that is inside.
-        thin: share of hits where that is below _THIN, or where only a descent finds the set.
+        thin: share of hits where that is below _THIN, or where only descents find any of it.
         floating: (column, row) of hits without one.
     """
 
@@ -74,7 +74,7 @@ def measure_hits(seen: Seen, solid: Estimated, count: int, random: np.random.Gen
     if within[0] < SHARE:
         missing = np.flatnonzero(~near)
         reached[missing] = _descended(points[missing], width[missing], solid, random)
-    thin = (reached & ~near) | (np.isfinite(nearest) & (fill < _THIN))
+    thin = np.where(np.isfinite(nearest), fill < _THIN, reached)
     floating = [
         (int(x), int(y)) for x, y in zip(seen.x[chosen][~reached], seen.y[chosen][~reached], strict=True)
     ]
