@@ -194,7 +194,7 @@ def test_what_is_inside_is_what_the_program_counts_as_inside(engine: Engine) -> 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_a_picture_by_the_other_search_meets_the_sphere(camera: str, engine: Engine) -> None:
     """It narrows a hit down to the number type's precision, so this is what a true picture gives."""
-    sphere = measure_sphere(camera, 96, engine, search="steps")
+    sphere = measure_sphere(camera, 96, engine, ["renderer.search=steps"])
     assert sphere.met
     assert abs(sphere.area) < 5e-4
     assert sphere.depth < 1e-3
@@ -220,6 +220,7 @@ def test_figures_are_held_against_those_on_record() -> None:
     assert not Noise("scene", 10.0, 20.5, (10.0, 20.0)).met
     record = steps.record()
     assert set(record["steps"]) == set(steps.rows()) <= set(bench.ROWS)
+    assert set(record["formulas"]) <= set(subjects.names())
     assert set(record["noise"]) == set(noise.scenes())
 
 

@@ -1,6 +1,7 @@
 """How near pictures are to the set that they show: hits, losses, the unit sphere, steps, noise.
 
-    python -m benchmarks.truth [--part hits|losses|sphere|steps|noise ...] [--formula NAME ...] [--all] [-o FILE.json]
+    python -m benchmarks.truth [--part hits|losses|sphere|steps|noise ...] [--formula NAME ...] [--all]
+        [--set KEY=VALUE ...] [-o FILE.json]
 
 Pictures are rendered as any others, and judged by the formula alone, in float64: brute force that knows nothing of the
 march. Exit status 1 if a target is missed; the last lines say which.
@@ -42,14 +43,18 @@ def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> Non
     both = [part for part in ("hits", "losses") if part in options.part]
     report.say(LEGEND)
     head = f"{'formula':22} {'scene':22} {'hits':>5} {'<=1':>6} {'<=1.5':>6} {'<=3':>6} {'median':>6} {'stray':>6}"
-    report.say(f"{head} {'reached':>7} {'fill':>6} {'set':>4} {'steps':>6} {'rays':>6} {'lost':>4} {'s':>5}")
-    for subject in subjects(options.formula, side=options.size):
+    report.say(
+        f"{head} {'reached':>7} {'fill':>6} {'set':>4} {'steps':>6} {'ratio':>5} {'rays':>6} {'lost':>4} {'s':>5}"
+    )
+    for subject in subjects(options.formula, side=options.size, overrides=options.set):
         start = time.perf_counter()
         seed = zlib.crc32(subject.name.encode())
         seen = see(subject.scene, engine, precision=options.precision)
         solid = Solid(subject.scene.chain, subject.scene.formula.iterations, engine.device)
+        taken = float(seen.film.stats["steps_per_ray"])
+        before = steps.record()["formulas"].get(subject.name)
         cells = [f"{subject.name:22} {subject.source:22}"]
-        named = {"formula": subject.name, "scene": subject.source}
+        named = {"formula": subject.name, "scene": subject.source, "steps": taken}
         if "hits" in both:
             near = hits.measure_hits(
                 seen, solid, 2000 if options.all else options.hits, np.random.default_rng(seed)
@@ -69,7 +74,7 @@ def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> Non
                 )
         else:
             cells.append(" " * 61)
-        cells.append(f"{seen.film.stats['steps_per_ray']:6.2f}")
+        cells.append(f"{taken:6.2f} " + (f"{taken / before:5.2f}" if before else "    -"))
         if "losses" in both:
             gone = losses.measure_losses(
                 seen, solid, 10_000 if options.all else options.rays, np.random.default_rng(seed)
@@ -86,10 +91,10 @@ def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> Non
         report.say(" ".join([*cells, f"{time.perf_counter() - start:5.1f}"]))
 
 
-def spheres(report: Report, engine: Engine) -> None:
+def spheres(report: Report, engine: Engine, options: argparse.Namespace) -> None:
     """The unit sphere."""
     report.say(f"\n{'unit sphere':22} {'area':>9} {'depth 99%':>10} {'normals 99%':>12}")
-    for one in sphere.measure_spheres(engine):
+    for one in sphere.measure_spheres(engine, options.set):
         report.keep("sphere", one)
         report.say(f"{one.name:22} {100 * one.area:+8.3f}% {one.depth:7.3f} px {one.normal:8.4f} deg")
         if not one.met:
@@ -100,12 +105,12 @@ def spheres(report: Report, engine: Engine) -> None:
             )
 
 
-def rows(report: Report, engine: Engine) -> None:
+def rows(report: Report, engine: Engine, options: argparse.Namespace) -> None:
     """Steps of the speed table's rows."""
     report.say(
         f"\n{'steps per ray':22} {'now':>8} {'before':>8} {'ratio':>6} {'bad/1000':>8} {'iter/ray':>9}"
     )
-    for one in steps.measure_steps(engine, steps.record().get("steps", {})):
+    for one in steps.measure_steps(engine, steps.record().get("steps", {}), options.set):
         report.keep("steps", one)
         before = "-" if one.before is None else f"{one.before:.2f}"
         ratio = "-" if one.before is None else f"{one.steps / one.before:.2f}"
@@ -116,10 +121,10 @@ def rows(report: Report, engine: Engine) -> None:
             report.missed.append(f"steps: {one.row}: {ratio} of those before, not {steps.SHARE:g}")
 
 
-def flicker(report: Report, engine: Engine) -> None:
+def flicker(report: Report, engine: Engine, options: argparse.Namespace) -> None:
     """Noise and flicker of six scenes."""
     report.say(f"\n{'one sample, codes':22} {'noise':>8} {'before':>8} {'flicker':>8} {'before':>8}")
-    for one in noise.measure_noise(engine, steps.record().get("noise", {})):
+    for one in noise.measure_noise(engine, steps.record().get("noise", {}), options.set):
         report.keep("noise", one)
         before = ("-", "-") if one.before is None else tuple(f"{figure:.2f}" for figure in one.before)
         report.say(f"{one.scene:22} {one.noise:8.2f} {before[0]:>8} {one.flicker:8.2f} {before[1]:>8}")
@@ -144,6 +149,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--all", action="store_true", help="2000 hits and 10,000 rays of each formula")
     parser.add_argument("--size", type=int, default=SIDE, help="width and height of the formulas' pictures")
     parser.add_argument("--precision", choices=("float32", "float64"), help="number type of the pictures")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="changes every scene; as of `render`"
+    )
     parser.add_argument("--device", help="which device, as of `clfractal render`")
     parser.add_argument(
         "-o", dest="output", type=Path, help="also write everything that was measured to a JSON file"
@@ -161,11 +169,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if {"hits", "losses"} & set(options.part):
                 formulas(report, engine, options)
             if "sphere" in options.part:
-                spheres(report, engine)
+                spheres(report, engine, options)
             if "steps" in options.part:
-                rows(report, engine)
+                rows(report, engine, options)
             if "noise" in options.part:
-                flicker(report, engine)
+                flicker(report, engine, options)
         if options.output:
             report.write(options.output)
     except ClfractalError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,18 +51,22 @@ class Noise:
         return self.noise <= SLACK * self.before[0] and self.flicker <= SLACK * self.before[1]
 
 
-def scenes() -> Mapping[str, Scene]:
+def scenes(overrides: Sequence[str] = ()) -> Mapping[str, Scene]:
     """The six scenes, small."""
     found: Mapping[str, Any] = yaml.safe_load(_SCENES.read_text(encoding="utf-8"))
     image = {"width": _SIZE[0], "height": _SIZE[1]}
-    return {name: load_scene({**data, "image": image}) for name, data in found.items()}
+    return {name: load_scene({**data, "image": image}, overrides=overrides) for name, data in found.items()}
 
 
 def measure_noise(
-    engine: Engine, before: Mapping[str, tuple[float, float]], *, samples: int = SAMPLES
+    engine: Engine,
+    before: Mapping[str, tuple[float, float]],
+    overrides: Sequence[str] = (),
+    *,
+    samples: int = SAMPLES,
 ) -> Iterator[Noise]:
     """Renders every scene four times: still and moved, with one sample and with many."""
-    for name, scene in scenes().items():
+    for name, scene in scenes(overrides).items():
         moved = half_a_pixel_on(scene)
         one, many = (engine.render(scene, samples=count) for count in (1, samples))
         one_moved, many_moved = (engine.render(moved, samples=count) for count in (1, samples))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,17 +47,16 @@ class Sphere:
         return abs(self.area) <= MOST_AREA and self.depth <= MOST_DEPTH and self.normal <= MOST_NORMAL
 
 
-def measure_spheres(engine: Engine, sizes: tuple[int, ...] = SIZES) -> Iterator[Sphere]:
+def measure_spheres(engine: Engine, overrides: Sequence[str] = ()) -> Iterator[Sphere]:
     """The sphere by each camera in each size."""
     for camera in _CAMERAS:
-        for side in sizes:
-            yield measure_sphere(camera, side, engine)
+        for side in SIZES:
+            yield measure_sphere(camera, side, engine, overrides)
 
 
-def measure_sphere(camera: str, side: int, engine: Engine, search: str = "distance") -> Sphere:
+def measure_sphere(camera: str, side: int, engine: Engine, overrides: Sequence[str] = ()) -> Sphere:
     """The sphere by an orthographic or a perspective camera, as a picture of `side` x `side` pixels."""
-    renderer = {"search": search}
-    scene = bare({"formula": _FORMULA, "camera": _CAMERAS[camera], "renderer": renderer}, side)
+    scene = bare({"formula": _FORMULA, "camera": _CAMERAS[camera]}, side, overrides)
     seen = see(scene, engine, "N.X", "N.Y", "N.Z")
     near, far = chord(seen.rays.origin, seen.rays.direction, np.zeros(3), 1.0)
     meets = near < far

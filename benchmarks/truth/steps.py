@@ -58,11 +58,14 @@ def _marches(text: str, changes: Sequence[str]) -> bool:
     return isinstance(renderer, SurfaceRenderer) and renderer.search == "distance"
 
 
-def measure_steps(engine: Engine, before: Mapping[str, float]) -> Iterator[Steps]:
+def measure_steps(
+    engine: Engine, before: Mapping[str, float], overrides: Sequence[str] = ()
+) -> Iterator[Steps]:
     """Renders every row that marches by distance once, in float32."""
     for row in rows():
         text, changes, _ = bench.ROWS[row]
-        stats = engine.render(load_scene(text, overrides=changes), precision="float32").stats
+        scene = load_scene(text, overrides=[*changes, *overrides])
+        stats = engine.render(scene, precision="float32").stats
         yield Steps(
             row,
             float(stats["steps_per_ray"]),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from clfractal import resources
 from clfractal.errors import ClfractalError, Where, unknown_name
 from clfractal.formulas import catalog
-from clfractal.resources import folder
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 
@@ -77,11 +78,13 @@ def names() -> list[str]:
     return [*catalog.names(), *_OWN]
 
 
-def subjects(wanted: Sequence[str] = (), *, side: int = SIDE) -> Iterator[Subject]:
-    """The wanted ones, or all, with a bare picture of `side` x `side` pixels.
+def subjects(
+    wanted: Sequence[str] = (), *, side: int = SIDE, overrides: Sequence[str] = ()
+) -> Iterator[Subject]:
+    """The wanted ones, or all, with a bare picture of `side` x `side` pixels; `overrides` as of `load_scene`.
 
     Raises:
-        ClfractalError: there is no such one.
+        ClfractalError: there is no such one, or an override is wrong.
     """
     for name in wanted:
         if name not in names():
@@ -90,15 +93,17 @@ def subjects(wanted: Sequence[str] = (), *, side: int = SIDE) -> Iterator[Subjec
     for name in wanted or names():
         if name in _OWN:
             formula, camera = _OWN[name]
-            yield Subject(name, "-", bare({"formula": dict(formula), "camera": dict(camera)}, side))
+            yield Subject(
+                name, "-", bare({"formula": dict(formula), "camera": dict(camera)}, side, overrides)
+            )
         elif name in shown:
-            yield Subject(name, shown[name][0], stripped(shown[name][1], side))
+            yield Subject(name, shown[name][0], stripped(shown[name][1], side, overrides))
         else:
             data = {"formula": {"name": name, "iterations": 8}, "camera": {"frame": "all"}}
-            yield Subject(name, "-", bare(data, side))
+            yield Subject(name, "-", bare(data, side, overrides))
 
 
-def stripped(scene: Scene, side: int) -> Scene:
+def stripped(scene: Scene, side: int, overrides: Sequence[str] = ()) -> Scene:
     """A scene's formula, camera and bounds, and nothing else of it, as a square picture."""
     camera = scene.camera.model_dump(mode="json", exclude_none=True)
     kept = ("projection", "position", "target", "up", "fov", "height")
@@ -109,19 +114,21 @@ def stripped(scene: Scene, side: int) -> Scene:
     }
     if own is not None:
         data["renderer"] = {"bounds": own.model_dump(mode="json")}
-    return bare(data, side, scene)
+    return bare(data, side, overrides, scene.folder)
 
 
-def bare(data: Mapping[str, Any], side: int, scene: Scene | None = None) -> Scene:
+def bare(
+    data: Mapping[str, Any], side: int, overrides: Sequence[str] = (), folder: Path | None = None
+) -> Scene:
     """A scene without light, one ray to a pixel through its middle, hits as near as `detail: 1` says."""
     whole = {"version": 1, "image": {"width": side, "height": side}, "lights": [], **data}
-    return load_scene(whole, folder=scene.folder if scene is not None else None)
+    return load_scene(whole, overrides=overrides, folder=folder)
 
 
 def _scenes() -> dict[str, tuple[str, Scene]]:
     """By formula: the scene that shows its surface, and that scene's name."""
     found: dict[str, tuple[str, Scene]] = {}
-    for path in sorted(folder("scenes").glob("*.yaml")):
+    for path in sorted(resources.folder("scenes").glob("*.yaml")):
         scene = load_scene(path)
         name = scene.formula.name
         if name is None or scene.renderer.type != "surface" or scene.layout is not None:
