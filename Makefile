@@ -11,6 +11,7 @@
 #   make bench         the speed table of this machine
 #   make truth         how near pictures are to the set, by brute force (ARGUMENTS="--formula mandelbulb")
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
+#   make gpu-check     what all kernels need on GPUs of NVIDIA and AMD, without one (needs clang-16 and libclc-16)
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
 #
 # Another Python: `make test PYTHON=python3.12 VENV=.venv-3.12`. An environment keeps the Python that it was made with.
@@ -34,7 +35,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test window soak lint locks lowest bench truth mutate portability install clean
+.PHONY: demo view test window soak lint locks lowest bench truth mutate gpu-check portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -95,6 +96,10 @@ truth: $(VENV)/.installed
 mutate: $(VENV)/.mutates-with
 	PYTHONPATH=$(CURDIR) $(BIN)/python -P -m tests.mutants $(ARGUMENTS)
 
+# Run in the checkout, whose record and page it may write.
+gpu-check: $(VENV)/.gpu-compilers
+	PYTHONPATH=$(CURDIR) $(BIN)/python -P -m tests.gpu $(ARGUMENTS)
+
 portability: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && $(BIN)/python -m tests.portability $(ARGUMENTS)
 
@@ -129,6 +134,10 @@ $(VENV)/.tested-with: $(VENV)/.installed
 
 $(VENV)/.mutates-with: $(VENV)/.tested-with
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[mutate]'
+	@touch $@
+
+$(VENV)/.gpu-compilers: requirements-gpu.txt $(VENV)/.tested-with
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -r requirements-gpu.txt
 	@touch $@
 
 $(LINT)/.installed: requirements-lint.txt | $(LINT)/bin/python

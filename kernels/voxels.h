@@ -26,7 +26,7 @@
 
 // The points of voxels `first` and those after it in a brick: coordinates are looked up, because they are found in float64
 // and rounded once. `axes` has x, then y, then z; each has its sub-points' coordinates one after the other.
-INLINE vec voxel_points(ulong place, int first, int3 sub_point, __global const scalar *axes,
+INLINE vec voxel_points(ulong place, int first, int4 sub_point, __global const scalar *axes,
                         __constant const struct Lattice *lattice) {
     const int octant = first / OCTANT_VOXELS;
     __global const scalar *along_x = axes + sub_point.x * lattice->padded[0];

@@ -47,13 +47,13 @@ INLINE void packet_values(ulong place, int first, real *values, __global const s
                           __constant const scalar *k) {
 #if FILL_KIND == FILL_ITERATIONS
     for (int p = 0; p < TURNS(PACKETS); ++p) {
-        values[p] = solid_count(voxel_points(place, first + p * LANES, (int3)(0), axes, lattice), orbit, k);
+        values[p] = solid_count(voxel_points(place, first + p * LANES, (int4)(0), axes, lattice), orbit, k);
     }
 #else
     const int n = FILL_KIND == FILL_COVERAGE ? lattice->sub_points : 1;
     for (int p = 0; p < TURNS(PACKETS); ++p) values[p] = R(0.0);
     for (int sub = 0; sub < n * n * n; ++sub) {
-        const int3 sub_point = (int3)(sub % n, sub / n % n, sub / (n * n));
+        const int4 sub_point = (int4)(sub % n, sub / n % n, sub / (n * n), 0);
         vec points[PACKETS];
         mask inside[PACKETS];
         #pragma unroll
@@ -83,7 +83,7 @@ __kernel void fill_bricks(__global SAMPLE *samples, __global const ulong *bricks
         vec points[PACKETS];
         mask inside[PACKETS];
         #pragma unroll
-        for (int p = 0; p < TURNS(PACKETS); ++p) points[p] = voxel_points(place, item + part + p * LANES, (int3)(0), axes, lattice);
+        for (int p = 0; p < TURNS(PACKETS); ++p) points[p] = voxel_points(place, item + part + p * LANES, (int4)(0), axes, lattice);
         solid_inside(points, inside, orbit, k);
         #pragma unroll
         for (int p = 0; p < TURNS(PACKETS); ++p) bits |= lanes_bits(inside[p]) << (part + p * LANES);

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +13,7 @@ from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import cut_plane, lanes, points, records, surface, volume
 from clfractal.renderers.plan import make_plan
+from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels import programs
 from clfractal.work import canvas, show
@@ -30,6 +31,11 @@ EVERY_KIND = ("still", "steps", "cloud", "plane")
 def every_text(count: int, precision: Precision, pictures: Sequence[str] = PICTURES) -> Iterator[Named]:
     """Names and texts, with packets of `count` lanes."""
     yield from of_pictures(count, precision, pictures)
+    yield from of_others(count, precision)
+
+
+def of_others(count: int, precision: Precision) -> Iterator[Named]:
+    """All that is no renderer: grids, lists of points, measurements of the device, the window."""
     yield from of_grids(count, precision)
     yield "probe", probe.program_text(count, precision)
     for name in ("mandelbulb", "hast"):  # by a scalar rule, and by the Jacobian
@@ -47,15 +53,27 @@ def of_pictures(count: int, precision: Precision, pictures: Sequence[str]) -> It
     """The programs of renderers."""
     for name in pictures:
         scene = scene_of(name, (16, 16))
-        plan = make_plan(scene, precision=precision, lanes=count, channels=CHANNELS)
         if scene.renderer.type == "volume":
             for values, pools in (("byte", 1), ("float", 3)):
-                grid: Any = SimpleNamespace(kind=values, values=(None,) * pools)
-                yield f"{name} of {values}s in {pools}", volume.program_text(scene, plan, grid)
-        elif scene.renderer.type == "cut_plane":
-            yield name, cut_plane.program_text(scene, plan)
+                for part, text in of_scene(scene, count, precision, values, pools):
+                    yield f"{part} {name} of {values}s in {pools}", text
         else:
-            yield name, surface.program_text(scene, plan)
+            for part, text in of_scene(scene, count, precision):
+                yield f"{part} {name}", text
+
+
+def of_scene(
+    scene: Scene, count: int, precision: Precision, values: str = "byte", pools: int = 1
+) -> Iterator[Named]:
+    """The programs that render a scene, each by what it does; a volume's for a grid of such values in so many buffers."""
+    plan = make_plan(scene, precision=precision, lanes=count, channels=CHANNELS)
+    if scene.renderer.type == "volume":
+        grid: Any = SimpleNamespace(kind=values, values=(None,) * pools)
+        yield "volume", volume.program_text(scene, plan, grid)
+    elif scene.renderer.type == "cut_plane":
+        yield "cut_plane", cut_plane.program_text(scene, plan)
+    else:
+        yield "surface", surface.program_text(scene, plan)
 
 
 def of_grids(count: int, precision: Precision) -> Iterator[Named]:
@@ -81,7 +99,13 @@ def of_grids(count: int, precision: Precision) -> Iterator[Named]:
             programs.blocks_recipe("float"),
         ]
     for recipe in recipes:
-        yield f"{recipe.kernel} {recipe.defines}", programs.program_text(recipe)
+        yield f"{recipe.kernel} {_choices(recipe.defines)}".strip(), programs.program_text(recipe)
+
+
+def _choices(defines: Mapping[str, object]) -> str:
+    """What a recipe's defines say beside the number type: `fill_kind=1 sample=float`."""
+    said = ("NORMALS", "FILL_KIND", "SOURCE", "SAMPLE", "VALUE", "RADIUS")
+    return " ".join(f"{name.lower()}={defines[name]}" for name in said if name in defines)
 
 
 def of_formulas() -> Iterator[Named]:

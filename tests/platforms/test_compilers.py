@@ -8,30 +8,18 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
-import subprocess
 from functools import cache
-from pathlib import Path
 
 import pytest
 
-from clfractal.device.program import math_flags
 from clfractal.device.structs import Precision
 from clfractal.resources import folder
+from tests.platforms import clang
 from tests.platforms.programs import EVERY_KIND, Named, every_text, of_formulas
 
 EXPECTED = "CLFRACTAL_EXPECT_CLANG"
 """Set to 1: a missing clang is a failure, not a reason to skip."""
 
-# What OpenCL 1.2 has without asking; float64 is not among it.
-_EXTENSIONS = (
-    "-all",
-    "+cl_khr_byte_addressable_store",
-    "+cl_khr_global_int32_base_atomics",
-    "+cl_khr_global_int32_extended_atomics",
-    "+cl_khr_local_int32_base_atomics",
-    "+cl_khr_local_int32_extended_atomics",
-)
 # A text has more functions than each program calls.
 _WARNINGS = ("-Wall", "-Werror", "-Wno-unused", "-Wno-unused-command-line-argument")
 NO_PROCESSOR = ("-fsyntax-only", "-target", "spir64-unknown-unknown")
@@ -41,21 +29,13 @@ GPUS = {
 }
 # How both name numbers of 64 bits in instructions that are not loads or stores of pairs.
 _FLOAT64 = re.compile(r"\bv_\w*_f64\b|\b(?!ld|st|mov)[a-z]\w*(?:\.\w+)*\.f64\b")
-_CALLED = re.compile(r"(\w+)@(?:got)?(?:pc)?rel32@lo|\bcall\.uni\s*(?:\([^)]*\)\s*,)?\s*(\w+)\s*,")
 
 
 @cache
-def clang(*target: str) -> str:
+def newest(*target: str) -> str:
     """The newest clang that has a target; skips, or fails where one is expected."""
-    programs = {
-        path.name: path.name.partition("-")[2]
-        for place in os.get_exec_path()
-        for path in Path(place).glob("clang*")
-        if re.fullmatch(r"clang(-\d+)?", path.name)
-    }
-    newest = sorted(programs, key=lambda name: int(programs[name] or 1000), reverse=True)
-    for program in newest:
-        if shutil.which(program) and not _compiled(program, "__kernel void k(void) {}\n", *target)[1]:
+    for program in clang.found():
+        if not clang.call(program, "__kernel void k(void) {}\n", *target)[1]:
             return program
     missing = f"no clang for {target[2]} on this machine (Debian: clang)"
     if os.environ.get(EXPECTED) == "1":
@@ -63,27 +43,11 @@ def clang(*target: str) -> str:
     pytest.skip(missing)
 
 
-def _compiled(program: str, text: str, *options: str) -> tuple[str, str]:
-    """What clang writes to standard output, and its messages; a number that is not 0 is a message, too."""
-    command = [program, "-x", "cl", "-o", "-", *options, "-O1", "-Xclang", "-finclude-default-header"]
-    command += ["-Xclang", "-fdeclare-opencl-builtins", "-"]
-    ended = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
-    failed = f"status {ended.returncode}" if ended.returncode else ""
-    return ended.stdout, ended.stderr.strip() or failed
-
-
 def compiled(text: str, precision: Precision, target: tuple[str, ...]) -> str:
-    extensions = (*_EXTENSIONS, *(["+cl_khr_fp64"] if precision == "float64" else []))
     warnings = (*_WARNINGS, *(["-Wdouble-promotion"] if precision == "float32" else []))
-    flags = (*math_flags(precision), "-Xclang", f"-cl-ext={','.join(extensions)}", *warnings)
-    made, said = _compiled(clang(*target), text, *target, *flags)
+    made, said = clang.call(newest(*target), text, *target, "-O1", *clang.language(precision), *warnings)
     assert not said, said[:3000]
     return made
-
-
-def called(code: str) -> set[str]:
-    """The functions that machine code calls."""
-    return {one or other for one, other in _CALLED.findall(code)}
 
 
 def checked(programs: list[Named], precision: Precision) -> None:
@@ -110,7 +74,9 @@ def test_every_program_becomes_code_of_a_gpu(maker: str) -> None:
     for name, program in every_text(1, "float32", EVERY_KIND):
         code = compiled(program.text, "float32", GPUS[maker])
         assert not _FLOAT64.findall(code), name
-        foreign = {each for each in called(code) if not each.startswith("_Z") and each not in program.text}
+        foreign = {
+            each for each in clang.called(code) if not each.startswith("_Z") and each not in program.text
+        }
         assert not foreign, name
 
 
@@ -143,4 +109,4 @@ def test_the_check_sees_float64_and_foreign_calls_in_machine_code() -> None:
     for target in GPUS.values():
         code = compiled(text, "float64", target)
         assert _FLOAT64.findall(code)
-        assert called(code) == {"far"}
+        assert clang.called(code) == {"far"}

@@ -1,0 +1,1 @@
+"""What every program needs on GPUs that are not here, told by their compilers: `make gpu-check`."""

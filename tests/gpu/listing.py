@@ -1,0 +1,152 @@
+"""Every program with its features, and a part that has every pair of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from clfractal.device.source import FlatText
+from clfractal.device.structs import Precision
+from clfractal.formulas import catalog
+from clfractal.formulas.opencl import write_formula
+from clfractal.renderers import lanes, points
+from clfractal.scene.load import load_scene
+from tests.gpu.pairs import covering
+from tests.platforms import programs
+
+PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
+
+# One of each kind: a scalar rule, the Jacobian (by partials, and operation by operation), a shape, a chain, states
+# of four numbers by both rules, folds with an inversion, and the one that needs the most registers.
+_FORMULAS = (
+    "mandelbulb",
+    "hast",
+    "aexion",
+    "sierpinski_tetrahedron",
+    "mengerbulb",
+    "quaternion_julia",
+    "box_fold_quaternion",
+    "kaliset",
+    "riemann_sphere",
+)
+_OFTEN: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "planes": {
+        "": {},
+        "planes": {"cut_planes": [{"plane": {"normal": [1, -1, 0.2], "width": 2, "height": 2}, "count": 2}]},
+    },
+    "lens": {"": {}, "lens": {"camera": {"f_number": 0.5}}},
+    "noise": {"": {}, "noise": {"renderer": {"noise": 0.01, "samples": 64}}},
+}
+# What a scene says for each value of a feature: sections that are put together.
+_SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
+    "coloring": {
+        "solid": {},
+        "normal": {"coloring": {"by": "normal"}},
+        "iterations": {"coloring": {"by": "iterations"}},
+        "residual": {"coloring": {"by": "residual"}},
+        "thickness": {"coloring": {"by": "thickness", "along": "view"}},
+        "layer": {"coloring": {"by": "layer_distance", "along": "reflection"}},
+        "trap": {"coloring": {"by": "trap", "trap": {"shape": "sphere"}}},
+    },
+    "points": {
+        "": {},
+        "grid": {"renderer": {"points": {"count": 9}}},
+        "stochastic": {"renderer": {"points": {"pattern": "stochastic", "count": 4}}},
+        "triangle": {"renderer": {"normal": "one_triangle"}},
+        "shading": {"renderer": {"normal": "eight_triangles_shading"}},
+        "eight": {"renderer": {"normal": "eight_triangles_normal"}},
+        "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
+    },
+    "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
+    "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
+    "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
+    "light": {
+        "": {},
+        "soft": {"lights": [{"type": "directional", "direction": [1, 1, -1], "angular_size": 5}]},
+    },
+    "fog": {"": {}, "fog": {"fog": {"density": 0.05}}},
+    **_OFTEN,
+}
+_STOPS = [{"at": 0.05, "opacity": 0}, {"at": 1, "opacity": 0.6}]
+_TINTS = [{"at": 0, "color": [1, 0, 0]}, {"at": 1, "color": [0, 0, 1]}]
+_VOLUME: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "formula": {name: {"formula": {"name": name}} for name in ("mandelbulb", "hast")},
+    "values": {"byte": {}, "float": {}},
+    "pools": {"one": {}, "three": {}},
+    "transfer": {
+        "level": {},
+        "opacity": {"renderer": {"transfer": {"opacity": _STOPS}}},
+        "tinted": {"renderer": {"transfer": {"opacity": _STOPS, "color": _TINTS}}},
+    },
+    "shadows": {"": {}, "shadows": {"renderer": {"shadows": True}}},
+    "places": {"": {}, "nearest": {"renderer": {"interpolation": "nearest"}}},
+    "coloring": {"solid": {}, "normal": {"coloring": {"by": "normal"}}},
+    **_OFTEN,
+}
+_CUT_PLANE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
+    "counts": {"smooth": {}, "stepped": {"renderer": {"colors": {"mode": "stepped"}}}},
+    "noise": _OFTEN["noise"],
+}
+_APART = {frozenset({("coloring", "residual"), ("points", "")})}  # a plane needs points
+_FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A program for one lane: its name on the record, and its text."""
+
+    name: str
+    precision: Precision
+    text: FlatText
+
+
+def paired() -> Iterator[Listed]:
+    """Programs that have every pair of a renderer's features, number types included, and one of each other kind."""
+    for renderer, features in _FEATURES.items():
+        for chosen in covering({**features, "precision": PRECISIONS}, _APART):
+            yield from _of_choice(renderer, chosen)
+    for precision in PRECISIONS:
+        for name, text in programs.of_others(1, precision):
+            yield Listed(f"{name} {precision}", precision, text)
+
+
+def everything() -> Iterator[Listed]:
+    """Those, the pictures that all implementations render, and the march and the orbits of every formula of the library."""
+    yield from paired()
+    for precision in PRECISIONS:
+        for name, text in programs.of_pictures(1, precision, programs.PICTURES):
+            yield Listed(f"{name} {precision}", precision, text)
+        for name in catalog.names():
+            formula = write_formula(catalog.load_chain(name))
+            yield Listed(f"march {name} {precision}", precision, lanes.program_text(formula, 1, precision))
+            yield Listed(f"points {name} {precision}", precision, points.program_text(formula, 1, precision))
+
+
+def unlike(listed: Iterable[Listed]) -> list[Listed]:
+    """Without programs whose text and number type an earlier one has."""
+    first: dict[tuple[str, Precision], Listed] = {}
+    for each in listed:
+        first.setdefault((each.text.text, each.precision), each)
+    return list(first.values())
+
+
+def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
+    """The programs of a scene that has what is chosen of each feature."""
+    scene: dict[str, Any] = {
+        "version": 1,
+        "image": {"width": 16, "height": 16},
+        "camera": {"position": [0, -20, 5], "target": [0, 0, 0]},
+        "renderer": {"type": renderer},
+    }
+    for feature, value in chosen.items():
+        for section, content in _FEATURES[renderer].get(feature, {}).get(value, {}).items():
+            known = scene.get(section)
+            scene[section] = {**known, **content} if isinstance(known, dict) else content
+    precision: Precision = "float64" if chosen["precision"] == "float64" else "float32"
+    values, pools = chosen.get("values", "byte"), 3 if chosen.get("pools") == "three" else 1
+    name = " ".join(value for value in chosen.values() if value)
+    for part, text in programs.of_scene(load_scene(scene), 1, precision, values, pools):
+        yield Listed(f"{part} {name}", precision, text)

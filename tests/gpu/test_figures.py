@@ -1,0 +1,84 @@
+"""What compilers write is read, and occupancy follows the makers' own tables."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.gpu.figures import GPUS, Figures, of_amd, of_ptxas
+
+PTXAS = """ptxas info    : 0 bytes gmem, 208 bytes cmem[4]
+ptxas info    : Compiling entry function 'first' for 'sm_75'
+ptxas info    : Function properties for first
+    240 bytes stack frame, 24 bytes spill stores, 32 bytes spill loads
+ptxas info    : Used 168 registers, used 1 barriers, 4096 bytes smem, 492 bytes cmem[0]
+ptxas info    : Compile time = 12.345 ms
+ptxas info    : Compiling entry function 'second' for 'sm_75'
+ptxas info    : Function properties for second
+    0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads
+ptxas info    : Used 18 registers, 400 bytes cmem[0]
+"""
+
+AMD = """
+	.amdhsa_kernel first
+	.amdhsa_kernel second
+amdhsa.kernels:
+  - .args:
+      - .address_space:  global
+        .name:           out
+        .offset:         0
+    .group_segment_fixed_size: 512
+    .name:           first
+    .private_segment_fixed_size: 136
+    .sgpr_spill_count: 25
+    .symbol:         first.kd
+    .vgpr_count:     195
+    .vgpr_spill_count: 3
+    .wavefront_size: 32
+  - .args:           []
+    .group_segment_fixed_size: 0
+    .name:           second
+    .private_segment_fixed_size: 0
+    .vgpr_count:     11
+    .vgpr_spill_count: 0
+amdhsa.target:   amdgcn-amd-amdhsa--gfx1030
+amdhsa.version:
+  - 1
+  - 1
+"""
+
+
+def test_what_ptxas_says() -> None:
+    assert of_ptxas(PTXAS) == {"first": Figures(168, 240, 24, 4096), "second": Figures(18)}
+
+
+def test_what_stands_in_assembly_for_amd() -> None:
+    """A register that is spilled takes four bytes; names of arguments are no kernels."""
+    assert of_amd(AMD) == {"first": Figures(195, 136, 12, 512), "second": Figures(11)}
+
+
+def test_a_kernel_without_metadata_is_noticed() -> None:
+    with pytest.raises(ValueError, match="third"):
+        of_amd(AMD.replace("\t.amdhsa_kernel second", "\t.amdhsa_kernel second\n\t.amdhsa_kernel third"))
+
+
+@pytest.mark.parametrize(
+    ("name", "registers", "expected"),
+    [
+        # CUDA's occupancy calculator, of registers alone.
+        *(("sm_75", 64, 32), ("sm_75", 65, 28), ("sm_75", 96, 20), ("sm_75", 168, 12), ("sm_75", 255, 8)),
+        *(("sm_90", 1, 64), ("sm_90", 32, 64), ("sm_90", 33, 48), ("sm_90", 96, 20), ("sm_90", 255, 8)),
+        # What LLVM writes into its assembly, of two SIMDs.
+        *(("gfx1030", 64, 32), ("gfx1030", 85, 20), ("gfx1030", 175, 10), ("gfx1030", 256, 8)),
+        *(("gfx1100", 96, 32), ("gfx1100", 171, 16), ("gfx1100", 256, 10)),
+    ],
+)
+def test_how_many_fit_beside_each_other(name: str, registers: int, expected: int) -> None:
+    (gpu,) = [gpu for gpu in GPUS if gpu.name == name]
+    assert gpu.occupancy(registers) == expected
+
+
+def test_what_is_worse() -> None:
+    old = Figures(96, 0, 0)
+    assert not old.worse_than(old)
+    assert not Figures(95).worse_than(old)
+    assert Figures(97, 8).worse_than(old) == ["registers 97, were 96", "stack 8, were 0"]

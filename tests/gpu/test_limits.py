@@ -1,0 +1,85 @@
+"""Whatever leaves OpenCL 1.2's guarantees, or is known to be missing somewhere, is found."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.gpu import limits
+
+ENTRY = ".entry kernel_a(\n{}\n)\n{{\n}}\n"
+CONSTANT = ".param .u64 .ptr .const .align 8 kernel_a_param_{}"
+GLOBAL = ".param .u64 .ptr .global .align 4 kernel_a_param_{}"
+
+
+def entry(*arguments: str) -> str:
+    return ENTRY.format(",\n".join(f"\t{each}" for each in arguments))
+
+
+def test_arguments_are_counted() -> None:
+    (found,) = limits.entries(
+        entry(*(CONSTANT.format(i) for i in range(3)), GLOBAL.format(3), ".param .u32 kernel_a_param_4")
+    )
+    assert found == limits.Entry("kernel_a", 3, 36, 0)
+
+
+def test_what_is_guaranteed_passes() -> None:
+    ptx = ".const .align 4 .b8 table[65536];\n.shared .align 4 .b8 rays[32768];\n" + entry(
+        *(CONSTANT.format(i) for i in range(8)), *(GLOBAL.format(i) for i in range(8, 128))
+    )
+    assert not list(limits.broken(ptx))
+
+
+@pytest.mark.parametrize(
+    ("ptx", "told"),
+    [
+        (entry(*(CONSTANT.format(i) for i in range(9))), "9 constant arguments, 8 are guaranteed"),
+        (entry(*(GLOBAL.format(i) for i in range(129))), "1032 bytes of arguments, 1024 are guaranteed"),
+        (entry(".param .align 8 .b8 kernel_a_param_0[48]"), "vectors or structs"),
+        (".const .align 16 .b8 one[65000];\n.const .align 4 .u32 two[200];\n", "65800 bytes of .const"),
+        (".shared .align 4 .f64 rays[4097];\n", "32776 bytes of .shared"),
+        (
+            ".func  (.param .b32 func_retval0) f(\n\t.param .b32 f_param_0\n)\n{\n\tcall.uni (retval0), \n\tg, \n\t(\n"
+            "\tparam0\n\t);\n}\n.func g(\n)\n{\n\tcall.uni \n\tf, \n\t(\n\t);\n}\n",
+            "recursion",
+        ),
+    ],
+)
+def test_what_is_not_guaranteed_is_told(ptx: str, told: str) -> None:
+    (line,) = limits.broken(ptx)
+    assert told in line
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "printf(1);",
+        "goto end;",
+        "float3 a;",
+        "uchar3 a = vload3(0, p);",
+        "half a;",
+        "vload_half(0, p);",
+        "work_group_reduce_add(a);",
+        "sub_group_broadcast(a, 0);",
+        "__generic int *p;",
+        "atom_add(p, 1l);",
+        "__builtin_fma(a, b, c);",
+        "write_imagef(shown, at, color);",
+        "__write_only image2d_t shown",
+        'asm("bar");',
+    ],
+)
+def test_words_that_devices_lack(code: str) -> None:
+    assert list(limits.words(code, code))
+
+
+def test_words_that_are_no_such_words() -> None:
+    code = (
+        "float4 a = vload4(0, p); const float half_side = 0.5f; atomic_inc(p); float8 imagery; int printf_ed;"
+    )
+    assert not list(limits.words(code, code))
+
+
+def test_a_program_for_images_may_have_them() -> None:
+    code = "write_imagef(shown, at, color);"
+    assert not list(limits.words("#define TO_IMAGE 1\n" + code, code))
+    assert list(limits.words("#define TO_IMAGE 0\n" + code, code))
