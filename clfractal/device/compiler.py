@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 import pyopencl as cl
 
+from clfractal.device.groups import fitting
 from clfractal.device.select import Device, by_key, is_pocl
 
 BINARY = "binary"  # the file that `compile_job` leaves
@@ -137,7 +138,8 @@ def warm_up(device: Device, program: Any, warm: Warm) -> None:
         values = [_value(device, argument) for argument in warm.arguments]
         for index, value in enumerate(values):
             kernel.set_arg(index, value)  # keeps no reference: `values` must outlive the launch
-        cl.enqueue_nd_range_kernel(device.queue, kernel, warm.global_size, warm.local_size).wait()
+        local = None if warm.local_size is None else fitting(device, kernel, warm.local_size)
+        cl.enqueue_nd_range_kernel(device.queue, kernel, warm.global_size, local).wait()
 
 
 def compile_job(request: Mapping[str, Any]) -> str | None:

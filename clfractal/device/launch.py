@@ -14,6 +14,7 @@ import pyopencl as cl
 
 from clfractal.device import activity
 from clfractal.device.cancel import CancelToken
+from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.device.watched import Watched
 from clfractal.errors import ClfractalError, DeviceError
@@ -204,7 +205,7 @@ def run_in_parts(
         count: things; 0 launches nothing.
         doing: for messages.
         items: work-items along the first dimension.
-        group: work-group, along both dimensions.
+        group: work-group, along both dimensions, as far as the device takes it (`groups.fitting`).
         first_part: things of the first part.
         done: told how many things are finished after each part.
         token: ends the work.
@@ -230,7 +231,8 @@ def run_in_parts(
         part = min(-(-part // group[1]) * group[1], -(-(count - place) // group[1]) * group[1])
         with device.failures(doing):
             kernel.set_arg(first_argument, np.int32(place))
-            event = cl.enqueue_nd_range_kernel(device.queue, kernel, (items, part), group)
+            fits = fitting(device, kernel, group)
+            event = cl.enqueue_nd_range_kernel(device.queue, kernel, (items, part), fits)
             device.queue.flush()
         place += part
         return Part(event, part, min(place, count))

@@ -15,6 +15,7 @@ import numpy as np
 import pyopencl as cl
 
 from clfractal.device import activity, cache, isolate, program, select, tune
+from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
@@ -259,7 +260,7 @@ def march(
     kernel = built.kernel("march_probe")
     kernel.set_args(*arguments)
     across, down = (1, 1) if lanes == 1 else (4, lanes // 4)
-    group = _GROUP_GPU if device.info.kind == "gpu" else _GROUP
+    group = fitting(device, kernel, _GROUP_GPU if device.info.kind == "gpu" else _GROUP)
     times: list[float] = []
     with device.failures("marching"):
         # The first launch makes PoCL compile.

@@ -12,6 +12,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
+from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.pictures.tiled import Bands, Floats
@@ -87,7 +88,8 @@ class CanvasKernels:
         self._place.set_args(
             film, places, canvas.colors, canvas.depths, *(np.int32(each) for each in numbers)
         )
-        cl.enqueue_nd_range_kernel(self.device.queue, self._place, (TILE, tiles), ROW_GROUP)
+        group = fitting(self.device, self._place, ROW_GROUP)
+        cl.enqueue_nd_range_kernel(self.device.queue, self._place, (TILE, tiles), group)
 
     def enlarge(self, old: Canvas, canvas: Canvas) -> None:
         """Fills a canvas with an older picture of the same views, whatever the sizes of both."""
@@ -106,7 +108,8 @@ class CanvasKernels:
             )
             size = whole_groups((region.width, region.height), PIXEL_GROUP)
             with self.device.failures("enlarging a picture"):
-                cl.enqueue_nd_range_kernel(self.device.queue, self._enlarge, size, PIXEL_GROUP)
+                group = fitting(self.device, self._enlarge, PIXEL_GROUP)
+                cl.enqueue_nd_range_kernel(self.device.queue, self._enlarge, size, group)
         self.device.queue.flush()
 
 

@@ -12,6 +12,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
+from clfractal.device.groups import fitting
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText
@@ -201,9 +202,8 @@ class Drawing:
             for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
                 kernel.set_arg(index, np.int32(number))
             count = -(-(end - first) // self.group) * self.group
-            event = cl.enqueue_nd_range_kernel(
-                self.device.queue, kernel, (count, len(span.tiles)), (self.group, 1)
-            )
+            group = fitting(self.device, kernel, (self.group, 1))
+            event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (count, len(span.tiles)), group)
             self.device.queue.flush()
         return event
 

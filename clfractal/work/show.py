@@ -12,6 +12,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
+from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Struct
@@ -232,7 +233,8 @@ class Shower:
             self._kernel.set_args(
                 canvas.colors, self._views.buffer, self._show.buffer, self._table, self._tones, shown
             )
-            event = cl.enqueue_nd_range_kernel(self.queue, self._kernel, size, GROUP)
+            group = fitting(self.device, self._kernel, GROUP)
+            event = cl.enqueue_nd_range_kernel(self.queue, self._kernel, size, group)
             self.queue.flush()
         return event
 

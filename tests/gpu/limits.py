@@ -27,6 +27,7 @@ LACKING = {
     r"atom_\w+": "atomics of 64 bits are an extension",
     r"__builtin_\w+": "only clang has them",
     r"asm|__asm__": "one maker's instructions",
+    r"(?:__)?(?:constant|global|local)\b[^(),;{}*]*\w\[\w*\]\s*(?=[,)])": "Apple's compiler takes pointers, not arrays",
 }
 # A program that writes an image is chosen where the device has images, and the text says so.
 _IMAGES = (r"image\w+_t|(?:read|write)_image\w*", "a device may have no images")
@@ -37,7 +38,7 @@ def words(text: str, preprocessed: str) -> Iterator[str]:
     """Words that devices may lack, each with the reason, in a program's text as it is and after the preprocessor."""
     lacking = LACKING if _TO_IMAGE in text else {**LACKING, _IMAGES[0]: _IMAGES[1]}
     for pattern, reason in lacking.items():
-        for word in sorted(set(re.findall(rf"\b(?:{pattern})\b", preprocessed))):
+        for word in sorted(set(re.findall(rf"\b(?:{pattern})(?!\w)", preprocessed))):
             yield f"{word}: {reason}"
 
 
@@ -91,6 +92,8 @@ def broken(ptx: str) -> Iterator[str]:
     for space, limit in limits.items():
         if used[space] > limit:
             yield f"{used[space]} bytes of .{space} memory, {limit} are guaranteed"
+    if "cvta.const" in ptx:
+        yield "a constant pointer becomes one to any memory, which older drivers of NVIDIA refuse"
     calls = {match[1]: set(_CALL.findall(match[0])) for match in _FUNCTION.finditer(ptx)}
     try:
         TopologicalSorter(calls).prepare()

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from clfractal.device.orbit import ORBIT
+from clfractal.device.structs import Precision
+from clfractal.formulas import catalog
+from clfractal.formulas.opencl import write_formula
+from clfractal.renderers.records import LIGHT
+from clfractal.scene.checks import MAX_PLANES
+from clfractal.scene.lighting import MAX_LIGHTS
 from tests.gpu import limits
 
 ENTRY = ".entry kernel_a(\n{}\n)\n{{\n}}\n"
@@ -37,6 +45,7 @@ def test_what_is_guaranteed_passes() -> None:
         (entry(".param .align 8 .b8 kernel_a_param_0[48]"), "vectors or structs"),
         (".const .align 16 .b8 one[65000];\n.const .align 4 .u32 two[200];\n", "65800 bytes of .const"),
         (".shared .align 4 .f64 rays[4097];\n", "32776 bytes of .shared"),
+        ("\tcvta.const.u64 \t%rd1, %rd2;\n", "older drivers"),
         (
             ".func  (.param .b32 func_retval0) f(\n\t.param .b32 f_param_0\n)\n{\n\tcall.uni (retval0), \n\tg, \n\t(\n"
             "\tparam0\n\t);\n}\n.func g(\n)\n{\n\tcall.uni \n\tf, \n\t(\n\t);\n}\n",
@@ -66,15 +75,26 @@ def test_what_is_not_guaranteed_is_told(ptx: str, told: str) -> None:
         "write_imagef(shown, at, color);",
         "__write_only image2d_t shown",
         'asm("bar");',
+        "float f(__constant const float row[3], int i) { return row[i]; }",
     ],
 )
 def test_words_that_devices_lack(code: str) -> None:
     assert list(limits.words(code, code))
 
 
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_the_longest_lists_fit_constant_memory(precision: Precision) -> None:
+    """Lights, and the orbits of the object and of all planes; constants of a formula of the library are few."""
+    assert MAX_LIGHTS * LIGHT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    assert (1 + MAX_PLANES) * ORBIT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    most = max(len(write_formula(catalog.load_chain(name)).constants) for name in catalog.names())
+    assert 0 < 100 * most * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+
+
 def test_words_that_are_no_such_words() -> None:
     code = (
         "float4 a = vload4(0, p); const float half_side = 0.5f; atomic_inc(p); float8 imagery; int printf_ed;"
+        "float f(__constant const float *row, float a[3]) { __local float b[4]; return b[0]; }"
     )
     assert not list(limits.words(code, code))
 
