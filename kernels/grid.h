@@ -114,6 +114,7 @@ INLINE real grid_value(cell c, ints slots, mask active, grid g) {
     return pool_value(g.values[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner);
 #else
     real value = R(0.0);
+    #pragma unroll
     for (int pool = 0; pool < TURNS(POOLS); ++pool) {
         const ints place = slots - pool * g.about->pool_bricks;
         const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
@@ -131,6 +132,7 @@ INLINE vec grid_normal(cell c, ints slots, mask active, grid g) {
     return vec_normalize(pool_normal(g.normals[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner));
 #else
     vec normal = vec_of(R(0.0), R(0.0), R(0.0));
+    #pragma unroll
     for (int pool = 0; pool < TURNS(POOLS); ++pool) {
         const ints place = slots - pool * g.about->pool_bricks;
         const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));

@@ -92,15 +92,23 @@ INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
                          less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
                          less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
                          less(R(0.0), (real)(fmax(plane->opacity, plane->inside_opacity)));
-        hits.distance[i] = pick(met, t, (real)(REAL_LARGEST));
-        hits.alpha[i] = R(0.0);
-        hits.count[i] = R(0.0);
-        hits.tint[i] = color_of(R(0.0), R(0.0), R(0.0));
-        if (!any_lane(met)) continue;
-        const escaped e = plane_look(vec_along(r.origin, t, r.direction), met, i, set);
-        hits.tint[i] = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
-        hits.alpha[i] = pick(met, pick(e.inside, (real)(plane->inside_opacity), (real)(plane->opacity)), R(0.0));
-        hits.count[i] = e.count;
+        real distance = (real)(REAL_LARGEST), alpha = R(0.0), count = R(0.0);
+        color tint = color_of(R(0.0), R(0.0), R(0.0));
+        if (any_lane(met)) {
+            const escaped e = plane_look(vec_along(r.origin, t, r.direction), met, i, set);
+            distance = pick(met, t, distance);
+            alpha = pick(met, pick(e.inside, (real)(plane->inside_opacity), (real)(plane->opacity)), alpha);
+            count = e.count;
+            tint = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
+        }
+        // Places that the compiler knows: registers have no others, and few planes fit there.
+        for (int at = 0; at < PLANES; ++at) {
+            if (at != i) continue;
+            hits.distance[at] = distance;
+            hits.alpha[at] = alpha;
+            hits.count[at] = count;
+            hits.tint[at] = tint;
+        }
     }
     return hits;
 }

@@ -120,8 +120,8 @@ INLINE void sight_quads(sight *s, real until, mask active, const plane_hits *hit
 #endif
 
 #if !SURFACE
-// A visible place that is not lit yet.
-#define PENDING 4
+// A visible place that is not lit yet. One lane has no neighbours to wait for, and needs no array.
+#define PENDING (LANES == 1 ? 1 : 4)
 typedef struct {
     real number, value, weight;
 } pending;

@@ -12,8 +12,7 @@ __kernel void seen_blocks(__global uint2 *blocks, __global const VALUE *values, 
     const int brick = first + (int)get_global_id(1);
     if (brick >= count) return;
     __global const VALUE *value = values + (size_t)brick * BRICK_STRIDE;
-    // Rows of four bits, one for each layer of blocks and row of blocks.
-    uint rows[4][4] = {{0}};
+    ulong bits = 0;
     for (int z = 0; z < BRICK_SIDE; ++z) {
         for (int y = 0; y < BRICK_SIDE; ++y) {
             uint nine = 0;
@@ -26,16 +25,12 @@ __kernel void seen_blocks(__global uint2 *blocks, __global const VALUE *values, 
             const uint four = (three & 1) | (three >> 1 & 2) | (three >> 2 & 4) | (three >> 3 & 8);
             // Samples between two blocks belong to both.
             for (int k = max(z - 1, 0) >> 1; k <= min(z >> 1, 3); ++k) {
-                for (int j = max(y - 1, 0) >> 1; j <= min(y >> 1, 3); ++j) rows[k][j] |= four;
+                for (int j = max(y - 1, 0) >> 1; j <= min(y >> 1, 3); ++j) {
+                    const int shift = (k >> 1) * 32 + (k & 1) * 4 + (j & 1) * 2 + (j >> 1) * 16;
+                    bits |= (ulong)((four & 3) | (four >> 2) << 8) << shift;
+                }
             }
         }
     }
-    uint halves[2] = {0, 0};
-    for (int k = 0; k < 4; ++k) {
-        for (int j = 0; j < 4; ++j) {
-            const int shift = (k & 1) * 4 + (j & 1) * 2 + (j >> 1) * 16;
-            halves[k >> 1] |= (rows[k][j] & 3) << shift | (rows[k][j] >> 2) << (shift + 8);
-        }
-    }
-    blocks[slot + brick] = (uint2)(halves[0], halves[1]);
+    blocks[slot + brick] = (uint2)((uint)bits, (uint)(bits >> 32));
 }

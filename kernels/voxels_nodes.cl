@@ -97,6 +97,12 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
 
 #if LOGARITHMIC && !HAS_SHAPE
 #define CORNERS 8
+// One lane keeps its corners in registers, whose places the compiler has to know. Those of packets do not fit there.
+#if LANES == 1
+#define UNROLLED_ALONE _Pragma("unroll")
+#else
+#define UNROLLED_ALONE
+#endif
 
 INLINE real halved_difference_square(state a, state b) {
     state d = {R(0.5) * (a.s0 - b.s0), R(0.5) * (a.s1 - b.s1), R(0.5) * (a.s2 - b.s2)};
@@ -119,6 +125,7 @@ INLINE real bend_square(state a, state b, state middle) {
 INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
                         __constant const scalar *k) {
     state c[CORNERS + 1], z[CORNERS + 1];
+    UNROLLED_ALONE
     for (int i = 0; i < TURNS(CORNERS); ++i) {
         const vec corner = vec_of(middle.x + ((i & 1) != 0 ? half_side.x : -half_side.x),
                                   middle.y + ((i & 2) != 0 ? half_side.y : -half_side.y),
@@ -129,6 +136,7 @@ INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant c
     mask alive = candidates;
     for (int n = min(FIRST_COUNT, orbit->iterations);; ++n) {
         real spread = R(0.0), bend = R(0.0);
+        UNROLLED_ALONE
         for (int i = 0; i < TURNS(CORNERS / 2); ++i) {
             spread = fmax(spread, halved_difference_square(z[i], z[CORNERS - 1 - i]));
             bend = fmax(bend, bend_square(z[i], z[CORNERS - 1 - i], z[CORNERS]));
@@ -138,6 +146,7 @@ INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant c
         alive &= less_equal(reach, (real)(orbit->bailout_square));
         alive &= less_equal(bend, (real)(BEND * BEND) * spread + R(1e-10));
         if (n >= orbit->iterations || !any_lane(alive)) break;
+        UNROLLED_ALONE
         for (int i = 0; i < TURNS(CORNERS + 1); ++i) z[i] = apply(n, z[i], c[i], k);
     }
     return alive;

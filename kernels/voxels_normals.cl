@@ -23,31 +23,23 @@
 #define LINES 9
 #define LINE_STEP S(0.4)
 
-// The samples of a brick that belong to a cell with samples inside and outside, in order; gives how many there are.
-INLINE int surface_samples(__global const uint *normals, ushort *list) {
-    uchar mixed[BRICK * BRICK * BRICK];
-    for (int cell = 0; cell < BRICK * BRICK * BRICK; ++cell) {
-        const int corner = (cell & 7) + BRICK_SIDE * ((cell >> 3) & 7) + BRICK_SIDE * BRICK_SIDE * (cell >> 6);
-        int sum = 0;
-        for (int i = 0; i < 8; ++i) {
-            const int at = corner + (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
-            sum += (int)(normals[at] >> 31);
+#define SAMPLES_AT_A_TIME (LANES * PACKETS)
+
+// Whether a sample belongs to a cell of the brick with samples inside and outside: some neighbour in its cells is on the other
+// side. Without a direction for the search nothing can be found.
+INLINE bool wanted_sample(__global const uint *normals, int sample) {
+    const uint own = normals[sample];
+    if ((own & 0xffffff) == 0x808080) return false;
+    const int x = sample % BRICK_SIDE, y = sample / BRICK_SIDE % BRICK_SIDE, z = sample / (BRICK_SIDE * BRICK_SIDE);
+    const int left = max(x - 1, 0), right = min(x + 1, BRICK_SIDE - 1), below = max(y - 1, 0), above = min(y + 1, BRICK_SIDE - 1);
+    uint differ = 0;
+    for (int k = max(z - 1, 0); k <= min(z + 1, BRICK_SIDE - 1); ++k) {
+        for (int j = below; j <= above; ++j) {
+            __global const uint *row = normals + BRICK_SIDE * (BRICK_SIDE * k + j);
+            differ |= (row[left] ^ own) | (row[x] ^ own) | (row[right] ^ own);
         }
-        mixed[cell] = sum != 0 && sum != 8;
     }
-    int count = 0;
-    for (int sample = 0; sample < BRICK_SAMPLES; ++sample) {
-        const int x = sample % BRICK_SIDE, y = sample / BRICK_SIDE % BRICK_SIDE, z = sample / (BRICK_SIDE * BRICK_SIDE);
-        bool wanted = false;
-        for (int i = 0; i < 8; ++i) {
-            const int cell_x = x - (i & 1), cell_y = y - ((i >> 1) & 1), cell_z = z - (i >> 2);
-            const bool within = min(min(cell_x, cell_y), cell_z) >= 0 && max(max(cell_x, cell_y), cell_z) < BRICK;
-            wanted |= within && mixed[within ? cell_x + BRICK * (cell_y + BRICK * cell_z) : 0];
-        }
-        // Without a direction for the search nothing can be found.
-        if (wanted && (normals[sample] & 0xffffff) != 0x808080) list[count++] = (ushort)sample;
-    }
-    return count;
+    return differ >> 31 != 0;
 }
 
 // Lines of PACKETS packets, one a lane: through `from`, along `out`, which points out of the solid.
@@ -156,15 +148,19 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
     __global const scalar *along_z = along_y + lattice->sub_points * lattice->padded[1];
     const ulong place = bricks[brick];
     const real side = (real)(lattice->side);
-    ushort list[BRICK_SAMPLES];
-    const int wanted = surface_samples(normal, list);
-    for (int start_at = 0; start_at < wanted; start_at += LANES * PACKETS) {
+    for (int next = 0;;) {
+        ushort list[SAMPLES_AT_A_TIME];
+        int wanted = 0;
+        for (; next < BRICK_SAMPLES && wanted < SAMPLES_AT_A_TIME; ++next) {
+            if (wanted_sample(normal, next)) list[wanted++] = (ushort)next;
+        }
+        if (wanted == 0) break;
         lines l;
         for (int p = 0; p < TURNS(PACKETS); ++p) {
             scalar x[LANES], y[LANES], z[LANES], nx[LANES], ny[LANES], nz[LANES];
             for (int lane = 0; lane < LANES; ++lane) {
                 // The last lanes repeat the last sample.
-                const int sample = list[min(start_at + p * LANES + lane, wanted - 1)];
+                const int sample = list[min(p * LANES + lane, wanted - 1)];
                 const uint color = normal[sample];
                 const int voxel_x = BRICK * PLACE_X(place) + sample % BRICK_SIDE;
                 const int voxel_y = BRICK * PLACE_Y(place) + sample / BRICK_SIDE % BRICK_SIDE;
@@ -189,7 +185,7 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
             lanes_store(found[p].z, nz);
             lanes_store(pick(usable[p], R(1.0), R(0.0)), good);
             for (int lane = 0; lane < LANES; ++lane) {
-                const int at = start_at + p * LANES + lane;
+                const int at = p * LANES + lane;
                 if (at >= wanted || good[lane] == 0) continue;
                 const uint red = convert_uchar_sat((float)nx[lane] * 127.5f + 128.0f);
                 const uint green = convert_uchar_sat((float)ny[lane] * 127.5f + 128.0f);
