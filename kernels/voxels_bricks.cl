@@ -1,4 +1,4 @@
-// The stored part of a grid: bricks of 9 x 9 x 9 samples with their normals. One work-item takes one brick.
+// The stored part of a grid: bricks of 9 x 9 x 9 samples with their normals. One work-item takes one brick, or a part of it (ALONE).
 //
 // From the build besides what voxels_bricks.h needs: VALUE, the type of a stored value, and VALUE_BYTES; NORMALS, whether
 // normals are wanted; RADIUS of the low-pass filter before them, voxels.
@@ -33,7 +33,13 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
     for (int z = 0; z < BRICK_SIDE; ++z) {
         for (int y = 0; y < BRICK_SIDE; ++y) {
             const row r = row_at(&n, y, z);
-#if SOURCE == SOURCE_BITS
+#if ALONE
+            for (n.own = 0; n.own < BRICK_SIDE; ++n.own) {
+                const float value = row_window(&r, 0);
+                some |= value != 0.0f;
+                all &= value >= (SOURCE == SOURCE_BITS ? 1.0f : extent->whole);
+            }
+#elif SOURCE == SOURCE_BITS
             const uint own = (r >> VOXELS_BEFORE) & 0x1ff;
             some |= own != 0;
             all &= own == 0x1ff;
@@ -74,34 +80,42 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
 #define LAYERS (BRICK_SIDE + 2 * REACH)
 
 // 1/sqrt of each; a vector of 16 is more than some compilers can take the root of.
-INLINE float16 reciprocal_root(float16 a) {
+INLINE wide reciprocal_root(wide a) {
+#if ALONE
+    return 1.0f / sqrt(a);
+#else
     float16 result = (float16)(0.0f);
     result.lo = 1.0f / sqrt(a.lo);
     result.s8 = 1.0f / sqrt(a.s8);
     return result;
+#endif
 }
 
 // A component of a normal as the 8 bits of a colour.
-INLINE uint16 color_of(float16 component) { return as_uint16(convert_int16(component * 127.5f + 128.0f)); }
+INLINE wide_uint color_of(wide component) { return WHOLE(component * 127.5f + 128.0f); }
 
 // Eq. 6 of Englund 2010 after the filter: n = -G/|G| with G the central differences, (n + 1)/2 in red, green and blue, `alpha`
 // above. (The thesis prints f(x - 1) - f(x - 1).) Where G is 0 there is no normal, 128 in each.
-INLINE uint16 packed_normal(float16 gx, float16 gy, float16 gz, uint16 alpha) {
-    const float16 largest = fmax(fmax(fabs(gx), fabs(gy)), fabs(gz));
-    const int16 usable = (largest > 0.0f) & (largest <= 3.0e38f);
-    const float16 none = (float16)(0.0f), scale = usable ? -1.0f / largest : none;
+INLINE wide_uint packed_normal(wide gx, wide gy, wide gz, wide_uint alpha) {
+    const wide largest = fmax(fmax(fabs(gx), fabs(gy)), fabs(gz));
+    const wide_int usable = (largest > 0.0f) & (largest <= 3.0e38f);
+    const wide none = (wide)(0.0f), scale = usable ? -1.0f / largest : none;
     gx = usable ? gx * scale : none;
     gy = usable ? gy * scale : none;
     gz = usable ? gz * scale : none;
-    const float16 square = gx * gx + gy * gy + gz * gz;  // 1 to 3, or 0
-    const float16 unit = reciprocal_root(fmax(square, (float16)(0.5f)));
+    const wide square = gx * gx + gy * gy + gz * gz;  // 1 to 3, or 0
+    const wide unit = reciprocal_root(fmax(square, (wide)(0.5f)));
     return color_of(gx * unit) | color_of(gy * unit) << 8 | color_of(gz * unit) << 16 | alpha << 24;
 }
 #endif
 
-// A row's nine values.
-INLINE void store_values(__global VALUE *out, float16 row) {
-#if VALUE_BYTES == 1
+// A row's nine values, or the own one.
+INLINE void store_values(__global VALUE *out, wide row) {
+#if ALONE && VALUE_BYTES == 1
+    *out = convert_uchar(row);
+#elif ALONE
+    *out = row;
+#elif VALUE_BYTES == 1
     vstore8(convert_uchar8(row.lo), 0, out);
     out[8] = convert_uchar(row.s8);
 #else
@@ -119,37 +133,45 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
     const near_bricks around = near_bricks_of(bricks[brick], numbers, extent);
     neighbourhood n;
     load_neighbourhood(&n, samples, &around, extent);
+    int own = 0, first_line = 0;
+#if ALONE
+    // The rest of the items fills the last group.
+    const int item = (int)get_global_id(0);
+    if (item >= BRICK_SIDE * BRICK_SIDE) return;
+    n.own = own = item % BRICK_SIDE;
+    first_line = item / BRICK_SIDE;
+#endif
     const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;
     __global VALUE *value = values + start;
 #if NORMALS
     const float smooth[] = SMOOTH, differ[] = DIFFER;
     // Filtered along x and y: the values, and their differences along x and along y.
-    float16 plain[LAYERS][BRICK_SIDE], along_x[LAYERS][BRICK_SIDE], along_y[LAYERS][BRICK_SIDE];
-    uint16 alpha[BRICK_SIDE][BRICK_SIDE];
+    wide plain[LAYERS][LINES], along_x[LAYERS][LINES], along_y[LAYERS][LINES];
+    wide_uint alpha[BRICK_SIDE][LINES];
     for (int layer = 0; layer < LAYERS; ++layer) {
-        float16 rows[LAYERS], rows_x[LAYERS];
+        wide rows[LINES + 2 * REACH], rows_x[LINES + 2 * REACH];
         const int z = layer - REACH;
-        for (int line = 0; line < LAYERS; ++line) {
+        for (int line = 0; line < LINES + 2 * REACH; ++line) {
             const int y = line - REACH;
-            const row r = row_at(&n, y, z);
-            const float16 middle = row_window(&r, 0);
-            float16 sum = smooth[0] * middle, difference = (float16)(0.0f);
+            const row r = row_at(&n, first_line + y, z);
+            const wide middle = row_window(&r, 0);
+            wide sum = smooth[0] * middle, difference = (wide)(0.0f);
             #pragma unroll
             for (int i = 1; i <= REACH; ++i) {
-                const float16 before = row_window(&r, -i), after = row_window(&r, i);
+                const wide before = row_window(&r, -i), after = row_window(&r, i);
                 if (i <= RADIUS) sum += smooth[i] * (before + after);
                 difference += differ[i - 1] * (after - before);
             }
             rows[line] = sum;
             rows_x[line] = difference;
-            if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < BRICK_SIDE) {
-                alpha[z][y] = as_uint16(middle >= extent->opaque) & 255u;
-                store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y), middle * extent->scale);
+            if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < LINES) {
+                alpha[z][y] = middle >= extent->opaque ? (wide_uint)(255u) : (wide_uint)(0u);
+                store_values(value + BRICK_SIDE * (BRICK_SIDE * z + first_line + y) + own, middle * extent->scale);
             }
         }
-        for (int y = 0; y < BRICK_SIDE; ++y) {
+        for (int y = 0; y < LINES; ++y) {
             const int line = y + REACH;
-            float16 sum = smooth[0] * rows[line], sum_x = smooth[0] * rows_x[line], difference = (float16)(0.0f);
+            wide sum = smooth[0] * rows[line], sum_x = smooth[0] * rows_x[line], difference = (wide)(0.0f);
             #pragma unroll
             for (int i = 1; i <= REACH; ++i) {
                 if (i <= RADIUS) {
@@ -166,8 +188,8 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
     __global uint *normal = normals + start;
     for (int z = 0; z < BRICK_SIDE; ++z) {
         const int layer = z + REACH;
-        for (int y = 0; y < BRICK_SIDE; ++y) {
-            float16 gx = smooth[0] * along_x[layer][y], gy = smooth[0] * along_y[layer][y], gz = (float16)(0.0f);
+        for (int y = 0; y < LINES; ++y) {
+            wide gx = smooth[0] * along_x[layer][y], gy = smooth[0] * along_y[layer][y], gz = (wide)(0.0f);
             #pragma unroll
             for (int i = 1; i <= REACH; ++i) {
                 if (i <= RADIUS) {
@@ -176,21 +198,25 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
                 }
                 gz += differ[i - 1] * (plain[layer + i][y] - plain[layer - i][y]);
             }
-            const uint16 packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
-                                                alpha[z][y]);
-            __global uint *out = normal + BRICK_SIDE * (BRICK_SIDE * z + y);
+            const wide_uint packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
+                                                   alpha[z][y]);
+            __global uint *out = normal + BRICK_SIDE * (BRICK_SIDE * z + first_line + y) + own;
+#if ALONE
+            *out = packed;
+#else
             vstore8(packed.lo, 0, out);
             out[8] = packed.s8;
+#endif
         }
     }
-    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE; ++i) normal[i] = 0x00808080u;
+    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE && own + first_line == 0; ++i) normal[i] = 0x00808080u;
 #else
     for (int z = 0; z < BRICK_SIDE; ++z) {
-        for (int y = 0; y < BRICK_SIDE; ++y) {
+        for (int y = first_line; y < first_line + LINES; ++y) {
             const row r = row_at(&n, y, z);
-            store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y), row_window(&r, 0) * extent->scale);
+            store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y) + own, row_window(&r, 0) * extent->scale);
         }
     }
 #endif
-    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE; ++i) value[i] = 0;
+    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE && own + first_line == 0; ++i) value[i] = 0;
 }

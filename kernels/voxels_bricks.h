@@ -1,7 +1,8 @@
 // Rows of voxels around a brick, out of the bricks that the fill evaluated or of a slab of a whole grid, and vectors of
 // neighbouring voxels in them. Everything here is float: no formula is evaluated.
 //
-// From the build: SOURCE_BITS, SOURCE_BRICKS, SOURCE_SLAB and which of them SOURCE is; SAMPLE, what the source holds.
+// From the build: SOURCE_BITS, SOURCE_BRICKS, SOURCE_SLAB and which of them SOURCE is; SAMPLE, what the source holds; ALONE,
+// whether a work-item has one voxel's place of each row (for GPUs) instead of a vector of them (for processors).
 // Voxels past the ends of the grid repeat the last one.
 #include "direct.h"
 
@@ -22,6 +23,9 @@
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
+#include "voxels_alone.h"
+
+#if !ALONE
 // Where a brick's voxels are.
 typedef struct {
     int x, y, z;   // the brick's place
@@ -240,4 +244,5 @@ INLINE float16 row_window(const row *r, int offset) {
     return vload16(0, r->value + offset + VOXELS_BEFORE);
 #endif
 }
+#endif
 #endif

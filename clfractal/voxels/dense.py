@@ -70,7 +70,7 @@ def grid_from_dense(
     least = (
         float(np.nextafter(np.float32(threshold), np.float32(np.inf))) if threshold is not None else -np.inf
     )
-    build, start = _Slabs.recipe(kind, normal_radius), time.perf_counter()
+    build, start = _Slabs.recipe(device, kind, normal_radius), time.perf_counter()
     entries = np.full(visible.shape, -1, np.int32)
     stored = int(visible.sum())
     entries[visible] = np.arange(stored, dtype=np.int32)
@@ -135,8 +135,9 @@ class _Slabs:
         self.layers = max(SLAB_BYTES // (BRICK * values[0].nbytes) - 2, 1)
 
     @staticmethod
-    def recipe(kind: Kind, normal_radius: int) -> programs.Recipe:
-        return programs.store_recipe("slab", kind, kind, normal_radius)
+    def recipe(device: Device, kind: Kind, normal_radius: int) -> programs.Recipe:
+        alone = programs.takes_parts(device)
+        return programs.store_recipe("slab", kind, kind, normal_radius, alone=alone)
 
     def store(
         self,
@@ -169,6 +170,7 @@ class _Slabs:
                 3,
                 len(places),
                 doing="storing the grid",
+                items=self.built.items,
                 group=self.built.group,
                 first_part=1024,
             )

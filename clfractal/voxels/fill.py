@@ -145,14 +145,15 @@ class _Filler:
         octree = renderer.fill == "octree" and not whole
         sample: Kind = "byte" if renderer.value == "inside" else renderer.store
         source: programs.Source = "bits" if renderer.value == "inside" else "bricks"
+        alone = programs.takes_parts(self.device)
         recipes = [
             programs.fill_recipe(chain, self.formula, renderer, self.lanes, self.precision),
-            programs.store_recipe(source, sample, renderer.store, renderer.normal_radius),
+            programs.store_recipe(source, sample, renderer.store, renderer.normal_radius, alone=alone),
         ]
         if octree:
             recipes.append(programs.nodes_recipe(chain, self.formula, self.lanes, self.precision))
         if not whole:
-            recipes.append(programs.classify_recipe(source, sample))
+            recipes.append(programs.classify_recipe(source, sample, alone=alone))
         if renderer.normals != "gradient":
             recipes.append(programs.normals_recipe(chain, self.formula, renderer, self.lanes, self.precision))
         built = programs.build_all(self.device, recipes, on_compile, self.token)

@@ -32,6 +32,8 @@ SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
 C_TYPES: dict[Kind, str] = {"byte": "uchar", "float": "float"}
 # Work-items of a group that take a brick each, or a packet of nodes.
 BRICK_GROUP = (1, 16)
+# Where a work-item takes 9 places of a brick, one x and one y: 81 of them, in whole groups.
+ALONE_ITEMS, ALONE_GROUP = 96, (32, 1)
 NODE_POINTS = 64
 # Applications between two looks at a packet.
 CHUNK = 4
@@ -116,6 +118,11 @@ def build_all(
             raise
 
 
+def takes_parts(device: Device) -> bool:
+    """Whether work-items take parts of bricks where they are stored: vectors of 16 numbers would fill a GPU's memory."""
+    return device.info.kind == "gpu"
+
+
 def program_text(recipe: Recipe) -> FlatText:
     """The whole text of a program."""
     structs = EXTENT.c_text() if recipe.formula is None else ORBIT.c_text() + LATTICE.c_text()
@@ -162,12 +169,18 @@ def fill_recipe(
     )
 
 
-def classify_recipe(source: Source, sample: Kind) -> Recipe:
-    """`classify_bricks`: which bricks are outside or inside as a whole."""
+def classify_recipe(source: Source, sample: Kind, *, alone: bool = False) -> Recipe:
+    """`classify_bricks`: which bricks are outside or inside as a whole; `alone`: see `store_recipe`."""
     return Recipe(
         "voxels_bricks.cl",
         "classify_bricks",
-        {**_source_defines(source, sample), "NORMALS": 0, "VALUE": "uchar", "VALUE_BYTES": 1, "RADIUS": 0},
+        {
+            **_source_defines(source, sample, alone),
+            "NORMALS": 0,
+            "VALUE": "uchar",
+            "VALUE_BYTES": 1,
+            "RADIUS": 0,
+        },
         "float32",
         None,
         1,
@@ -176,17 +189,21 @@ def classify_recipe(source: Source, sample: Kind) -> Recipe:
     )
 
 
-def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int) -> Recipe:
-    """`store_bricks`: samples and gradient normals of stored bricks."""
+def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int, *, alone: bool = False) -> Recipe:
+    """`store_bricks`: samples and gradient normals of stored bricks.
+
+    `alone`: a work-item takes one x and one y of a brick, for GPUs (`kernels/voxels_alone.h`); else a brick.
+    """
+    items, group = (ALONE_ITEMS, ALONE_GROUP) if alone else (1, BRICK_GROUP)
     defines = {
-        **_source_defines(source, sample),
+        **_source_defines(source, sample, alone),
         "NORMALS": 1,
         "VALUE": C_TYPES[kept],
         "VALUE_BYTES": SAMPLE_BYTES[kept],
         "RADIUS": radius,
     }
     arguments = (*[_BUFFER] * 3, _INT, _INT, _INT, *[_BUFFER] * 3)
-    return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, 1, BRICK_GROUP, arguments)
+    return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, items, group, arguments)
 
 
 def blocks_recipe(kept: Kind) -> Recipe:
@@ -230,8 +247,9 @@ def _sample_defines(sample: Kind) -> dict[str, object]:
     return {"SAMPLE": C_TYPES[sample], "SAMPLE_BYTES": SAMPLE_BYTES[sample]}
 
 
-def _source_defines(source: Source, sample: Kind) -> dict[str, object]:
+def _source_defines(source: Source, sample: Kind, alone: bool) -> dict[str, object]:
     return {
+        "ALONE": int(alone),
         **{f"SOURCE_{name.upper()}": number for number, name in enumerate(SOURCES)},
         "SOURCE": SOURCES.index(source),
         "ALL_OUTSIDE": f"({ALL_OUTSIDE})",

@@ -161,6 +161,7 @@ def store(
             3,
             high - low,
             doing="storing the grid",
+            items=keep.items,
             group=keep.group,
             first_part=1024,
             done=partial(_tell_from, tell, "store", low, count),

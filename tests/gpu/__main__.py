@@ -27,23 +27,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MissingCompilerError as error:
         return _wrong(str(error))
     known = record.load()
-    if not asked.record and found.versions != known.versions:
+    whole_record = asked.record and asked.only == ["*"]
+    if not whole_record and found.versions != known.versions:
         return _wrong(
             f"the record is of {_said(known.versions)}, and here is {_said(found.versions)}: install the same,"
             " or make another record (--record)"
         )
-    chosen = listing.everything() if asked.all or asked.record else listing.paired()
-    programs = [
-        each
-        for each in listing.unlike(chosen)
-        if any(fnmatch.fnmatch(each.name, name) for name in asked.only)
-    ]
+    chosen = listing.unlike(listing.everything() if asked.all or asked.record else listing.paired())
+    programs = [each for each in chosen if any(fnmatch.fnmatch(each.name, name) for name in asked.only)]
     if not programs:
         return _wrong(f"no program is called {' or '.join(asked.only)}")
     print(f"{len(programs)} programs with {_said(found.versions)}", flush=True)
     measured, failures = compiled(found, programs, asked.jobs)
     if asked.record and not failures:
-        kept = {} if asked.only == ["*"] else dict(known.figures)
+        # Programs that were not asked for stay on record; those that there are no more do not.
+        still = {each.name for each in chosen} - {each.name for each in programs}
+        kept = {name: by_gpu for name, by_gpu in known.figures.items() if name.split(" | ")[0] in still}
         made = record.Record(found.versions, {**kept, **measured})
         record.save(made)
         page = table.into_page(table.PAGE.read_text(encoding="utf-8"), table.markdown(made.figures))

@@ -110,7 +110,8 @@ def paired() -> Iterator[Listed]:
             yield from _of_choice(renderer, chosen)
     for precision in PRECISIONS:
         for name, text in programs.of_others(1, precision):
-            yield Listed(f"{name} {precision}", precision, text)
+            if "alone=0" not in name:  # bricks in vectors of 16 are for processors
+                yield Listed(f"{name} {precision}", precision, text)
 
 
 def everything() -> Iterator[Listed]:

@@ -6,12 +6,13 @@ import os
 import shutil
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import pytest
 
 from clfractal.device.source import FlatText, SourceMap
 from tests.gpu import __main__ as command
-from tests.gpu import compilers, listing, record
+from tests.gpu import compilers, listing, record, table
 from tests.gpu.compilers import Compilers, MissingCompilerError, RejectedError
 from tests.gpu.figures import GPUS, Figures
 from tests.gpu.record import Record
@@ -85,6 +86,7 @@ def run(monkeypatch: pytest.MonkeyPatch, known: Record, *arguments: str) -> int:
         for precision in listing.PRECISIONS
     ]
     monkeypatch.setattr(listing, "paired", lambda: programs)
+    monkeypatch.setattr(listing, "everything", lambda: programs)
     monkeypatch.setattr(record, "load", lambda: known)
     return command.main(["--jobs", "1", *arguments])
 
@@ -115,6 +117,25 @@ def test_figures_of_other_compilers_are_not_compared(
     assert run(monkeypatch, other) == 2
     assert "the record is of clang 1.2.3, ptxas 4.5.6" in capsys.readouterr().err
     assert run(monkeypatch, known(255), "--only", "nothing") == 2
+
+
+def test_recording_some_programs_keeps_the_others_that_there_are(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    old = known(255)
+    gone = replace(old, figures={**old.figures, "gone float32 | gone": {"sm_75": Figures(9)}})
+    page = tmp_path / "page.md"
+    page.write_text(table.BEGIN + table.END, encoding="utf-8")
+    monkeypatch.setattr(record, "PATH", tmp_path / "record.json")
+    monkeypatch.setattr(table, "PAGE", page)
+    made: list[Record] = []
+    monkeypatch.setattr(record, "save", made.append)
+    assert run(monkeypatch, gone, "--record", "--only", "*32") == 0
+    (new,) = made
+    assert set(new.figures) == set(old.figures)
+    assert new.figures["small float32 | small"]["sm_75"].registers < 255
+    assert new.figures["small float64 | small"]["sm_75"].registers == 255
+    assert "| `small` | float64 | 1 | 255, 8 warps |" in page.read_text(encoding="utf-8")
 
 
 def test_without_compilers_it_says_what_to_install(

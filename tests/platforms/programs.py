@@ -88,23 +88,24 @@ def of_grids(count: int, precision: Precision) -> Iterator[Named]:
         renderer = VolumeRenderer.model_validate({"type": "volume", "normals": normals})
         recipes.append(programs.normals_recipe(chain, formula, renderer, count, precision))
     if count == 1 and precision == "float32":  # these know neither packets nor the formula
-        recipes += [
-            programs.classify_recipe("bits", "byte"),
-            programs.classify_recipe("bricks", "float"),
-            programs.store_recipe("bits", "byte", "byte", 0),
-            programs.store_recipe("bits", "byte", "byte", 1),
-            programs.store_recipe("bricks", "float", "float", 2),
-            programs.store_recipe("slab", "float", "float", 1),
-            programs.blocks_recipe("byte"),
-            programs.blocks_recipe("float"),
-        ]
+        for alone in (False, True):
+            recipes += [
+                programs.classify_recipe("bits", "byte", alone=alone),
+                programs.classify_recipe("bricks", "float", alone=alone),
+                programs.store_recipe("bits", "byte", "byte", 0, alone=alone),
+                programs.store_recipe("bits", "byte", "byte", 1, alone=alone),
+                programs.store_recipe("bricks", "float", "float", 2, alone=alone),
+                programs.store_recipe("bricks", "byte", "byte", 4, alone=alone),
+                programs.store_recipe("slab", "float", "float", 1, alone=alone),
+            ]
+        recipes += [programs.blocks_recipe("byte"), programs.blocks_recipe("float")]
     for recipe in recipes:
         yield f"{recipe.kernel} {_choices(recipe.defines)}".strip(), programs.program_text(recipe)
 
 
 def _choices(defines: Mapping[str, object]) -> str:
     """What a recipe's defines say beside the number type: `fill_kind=1 sample=float`."""
-    said = ("NORMALS", "FILL_KIND", "SOURCE", "SAMPLE", "VALUE", "RADIUS")
+    said = ("NORMALS", "FILL_KIND", "SOURCE", "SAMPLE", "VALUE", "RADIUS", "ALONE")
     return " ".join(f"{name.lower()}={defines[name]}" for name in said if name in defines)
 
 
