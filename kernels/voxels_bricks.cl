@@ -78,6 +78,36 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
 #endif
 #define REACH (RADIUS + 1)  // voxels that a normal depends on, to each side
 #define LAYERS (BRICK_SIDE + 2 * REACH)
+// Where a layer or a line is kept while others need it. One that is alone keeps them in registers, which have no places that are
+// found at run time: the newest is the last, and the others move.
+#if ALONE
+#define SLOTS (2 * REACH + 1)
+#define SLOT(number) (2 * REACH)
+#define MIDDLE_SLOT(z) REACH
+#define MOVE_ON(array) \
+    for (int place = 0; place < 2 * REACH; ++place) array[place] = array[place + 1]
+#else
+#define SLOTS LAYERS
+#define SLOT(number) (number)
+#define MIDDLE_SLOT(z) ((z) + REACH)
+#define MOVE_ON(array)
+#endif
+
+// The filter's mean of numbers `step` apart around the one in the middle, and its difference of those after and before.
+INLINE wide smoothed(const wide *middle, int step) {
+    const float weights[] = SMOOTH;
+    wide sum = weights[0] * middle[0];
+    #pragma unroll
+    for (int i = 1; i <= RADIUS; ++i) sum += weights[i] * (middle[-i * step] + middle[i * step]);
+    return sum;
+}
+INLINE wide differed(const wide *middle, int step) {
+    const float weights[] = DIFFER;
+    wide sum = (wide)(0.0f);
+    #pragma unroll
+    for (int i = 1; i <= REACH; ++i) sum += weights[i - 1] * (middle[i * step] - middle[-i * step]);
+    return sum;
+}
 
 // 1/sqrt of each; a vector of 16 is more than some compilers can take the root of.
 INLINE wide reciprocal_root(wide a) {
@@ -144,63 +174,48 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
     const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;
     __global VALUE *value = values + start;
 #if NORMALS
-    const float smooth[] = SMOOTH, differ[] = DIFFER;
-    // Filtered along x and y: the values, and their differences along x and along y.
-    wide plain[LAYERS][LINES], along_x[LAYERS][LINES], along_y[LAYERS][LINES];
-    wide_uint alpha[BRICK_SIDE][LINES];
+    __global uint *normal = normals + start;
+    // Filtered along x and y: the values, and their differences along x and along y; of each slot LINES lines.
+    wide plain[SLOTS * LINES], along_x[SLOTS * LINES], along_y[SLOTS * LINES];
+    wide_uint alpha[SLOTS * LINES];
     for (int layer = 0; layer < LAYERS; ++layer) {
-        wide rows[LINES + 2 * REACH], rows_x[LINES + 2 * REACH];
-        const int z = layer - REACH;
+        wide rows[SLOTS], rows_x[SLOTS];
+        const int z = layer - REACH, kept = SLOT(layer) * LINES;
+        MOVE_ON(plain);
+        MOVE_ON(along_x);
+        MOVE_ON(along_y);
+        MOVE_ON(alpha);
         for (int line = 0; line < LINES + 2 * REACH; ++line) {
             const int y = line - REACH;
             const row r = row_at(&n, first_line + y, z);
-            const wide middle = row_window(&r, 0);
-            wide sum = smooth[0] * middle, difference = (wide)(0.0f);
+            wide window[2 * REACH + 1];
             #pragma unroll
-            for (int i = 1; i <= REACH; ++i) {
-                const wide before = row_window(&r, -i), after = row_window(&r, i);
-                if (i <= RADIUS) sum += smooth[i] * (before + after);
-                difference += differ[i - 1] * (after - before);
-            }
-            rows[line] = sum;
-            rows_x[line] = difference;
+            for (int i = -REACH; i <= REACH; ++i) window[i + REACH] = row_window(&r, i);
+            const wide middle = window[REACH];
+            MOVE_ON(rows);
+            MOVE_ON(rows_x);
+            rows[SLOT(line)] = smoothed(window + REACH, 1);
+            rows_x[SLOT(line)] = differed(window + REACH, 1);
             if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < LINES) {
-                alpha[z][y] = middle >= extent->opaque ? (wide_uint)(255u) : (wide_uint)(0u);
+                alpha[kept + (ALONE ? 0 : y)] = middle >= extent->opaque ? (wide_uint)(255u) : (wide_uint)(0u);
                 store_values(value + BRICK_SIDE * (BRICK_SIDE * z + first_line + y) + own, middle * extent->scale);
             }
         }
         for (int y = 0; y < LINES; ++y) {
             const int line = y + REACH;
-            wide sum = smooth[0] * rows[line], sum_x = smooth[0] * rows_x[line], difference = (wide)(0.0f);
-            #pragma unroll
-            for (int i = 1; i <= REACH; ++i) {
-                if (i <= RADIUS) {
-                    sum += smooth[i] * (rows[line - i] + rows[line + i]);
-                    sum_x += smooth[i] * (rows_x[line - i] + rows_x[line + i]);
-                }
-                difference += differ[i - 1] * (rows[line + i] - rows[line - i]);
-            }
-            plain[layer][y] = sum;
-            along_x[layer][y] = sum_x;
-            along_y[layer][y] = difference;
+            plain[kept + y] = smoothed(rows + line, 1);
+            along_x[kept + y] = smoothed(rows_x + line, 1);
+            along_y[kept + y] = differed(rows + line, 1);
         }
-    }
-    __global uint *normal = normals + start;
-    for (int z = 0; z < BRICK_SIDE; ++z) {
-        const int layer = z + REACH;
-        for (int y = 0; y < LINES; ++y) {
-            wide gx = smooth[0] * along_x[layer][y], gy = smooth[0] * along_y[layer][y], gz = (wide)(0.0f);
-            #pragma unroll
-            for (int i = 1; i <= REACH; ++i) {
-                if (i <= RADIUS) {
-                    gx += smooth[i] * (along_x[layer - i][y] + along_x[layer + i][y]);
-                    gy += smooth[i] * (along_y[layer - i][y] + along_y[layer + i][y]);
-                }
-                gz += differ[i - 1] * (plain[layer + i][y] - plain[layer - i][y]);
-            }
+        // The layer that has all its neighbours now.
+        const int done = z - REACH;
+        for (int y = 0; done >= 0 && y < LINES; ++y) {
+            const int at = MIDDLE_SLOT(done) * LINES + y;
+            const wide gx = smoothed(along_x + at, LINES), gy = smoothed(along_y + at, LINES);
+            const wide gz = differed(plain + at, LINES);
             const wide_uint packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
-                                                   alpha[z][y]);
-            __global uint *out = normal + BRICK_SIDE * (BRICK_SIDE * z + first_line + y) + own;
+                                                   alpha[at]);
+            __global uint *out = normal + BRICK_SIDE * (BRICK_SIDE * done + first_line + y) + own;
 #if ALONE
             *out = packed;
 #else

@@ -37,7 +37,8 @@ class Gpu:
 
     Sources: NVIDIA, CUDA C++ Programming Guide, "Compute Capabilities"; LLVM, User Guide for AMDGPU, "Target Features"
     and the GCNSubtarget's numbers of registers. `registers`: of 32 bits for a lane, of one part of a multiprocessor (a
-    quarter: NVIDIA) or compute unit (a half, a SIMD: AMD); a warp or wave gets them by `granule`.
+    quarter: NVIDIA) or compute unit (a half, a SIMD: AMD); a warp or wave gets them by `granule`. `local`: bytes
+    of the whole.
     """
 
     name: str
@@ -46,23 +47,26 @@ class Gpu:
     granule: int
     parts: int
     most: int
+    local: int
 
     @property
     def word(self) -> str:
         """What its 32 lanes that run together are called."""
         return "warps" if self.maker == "NVIDIA" else "waves"
 
-    def occupancy(self, registers: int) -> int:
-        """Warps in a multiprocessor, or waves in a compute unit, by their registers alone."""
-        each = max(-(-registers // self.granule) * self.granule, self.granule)
-        return min(self.registers // each, self.most) * self.parts
+    def occupancy(self, figures: Figures) -> int:
+        """Warps in a multiprocessor, or waves in a compute unit, with work-groups of two."""
+        each = max(-(-figures.registers // self.granule) * self.granule, self.granule)
+        by_registers = min(self.registers // each, self.most) * self.parts
+        return min(by_registers, _GROUP * (self.local // figures.local)) if figures.local else by_registers
 
 
+_GROUP = 2  # warps or waves of the usual work-group of 64
 GPUS = (
-    Gpu("sm_75", "NVIDIA", 512, 8, 4, 8),
-    Gpu("sm_90", "NVIDIA", 512, 8, 4, 16),
-    Gpu("gfx1030", "AMD", 1024, 16, 2, 16),
-    Gpu("gfx1100", "AMD", 1536, 24, 2, 16),
+    Gpu("sm_75", "NVIDIA", 512, 8, 4, 8, 64 * 1024),
+    Gpu("sm_90", "NVIDIA", 512, 8, 4, 16, 227 * 1024),
+    Gpu("gfx1030", "AMD", 1024, 16, 2, 16, 64 * 1024),
+    Gpu("gfx1100", "AMD", 1536, 24, 2, 16, 64 * 1024),
 )
 
 _PTXAS = re.compile(

@@ -25,6 +25,7 @@ LACKING = {
     r"v(?:load|store)a?_half\w*|half\d*": "numbers of 16 bits are an extension",
     r"(?:work|sub)_group_\w+|enqueue_kernel|pipe|__?generic": "they came with OpenCL 2.0",
     r"atom_\w+": "atomics of 64 bits are an extension",
+    r"(?:read_|write_)?mem_fence|barrier": "work-items without work end at once, and all of a group must reach a barrier",
     r"__builtin_\w+": "only clang has them",
     r"asm|__asm__": "one maker's instructions",
     r"(?:__)?(?:constant|global|local)\b[^(),;{}*]*\w\[\w*\]\s*(?=[,)])": "Apple's compiler takes pointers, not arrays",

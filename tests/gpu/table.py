@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from clfractal.formulas import catalog
@@ -12,6 +12,9 @@ from tests.gpu.record import Measured
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "performance.md"
 BEGIN, END = "<!-- gpu-check: begin -->\n", "<!-- gpu-check: end -->\n"
+
+# Targets: registers of a march; and in float32 no private memory.
+MARCH_REGISTERS = {"float32": 96, "float64": 168}
 
 # Kernels that take registers on purpose, or run once for a device.
 _UNLISTED = ("peak", "probe", "structs")
@@ -36,7 +39,20 @@ def markdown(measured: Measured) -> str:
     for row in sorted(rows):
         cells = [_cell(gpu, rows[row][gpu.name]) for gpu in GPUS]
         lines.append(f"| {row[0]} | {row[1]} | {counts[row]} | {' | '.join(cells)} |")
+    above = [
+        f"{kernel} ({precision})"
+        for (kernel, precision), worst in sorted(rows.items())
+        if _above(kernel, precision, worst)
+    ]
+    lines += ["", f"Above the targets: {'; '.join(above)}." if above else "All targets are met."]
     return "\n".join(lines) + "\n"
+
+
+def _above(kernel: str, precision: str, worst: Mapping[str, Figures]) -> bool:
+    """Whether a row's most is more than the target."""
+    limit = MARCH_REGISTERS[precision] if kernel.startswith("`march") else max(gpu.registers for gpu in GPUS)
+    memory = precision == "float32" and any(each.stack or each.spilled for each in worst.values())
+    return memory or any(each.registers > limit for each in worst.values())
 
 
 def into_page(text: str, table: str) -> str:
@@ -63,10 +79,10 @@ def _row(name: str) -> tuple[str, str] | None:
 
 def _rule(program: str) -> str:
     """The rule by which a march's formula gives distances, where the program is a march's alone."""
-    words = program.split()
-    if words[0] != "march":
+    kind, formula, *_ = program.split()
+    if not kind.startswith("march") or formula not in catalog.names():
         return ""
-    return {"scalar": ", scalar rule", "jacobian": ", Jacobian"}[rule_of(catalog.load_chain(words[1]))]
+    return {"scalar": ", scalar rule", "jacobian": ", Jacobian"}[rule_of(catalog.load_chain(formula))]
 
 
 def _most(one: Figures, other: Figures) -> Figures:
@@ -80,7 +96,7 @@ def _most(one: Figures, other: Figures) -> Figures:
 
 def _cell(gpu: Gpu, figures: Figures) -> str:
     """`96, 20 warps`, and what should not be."""
-    said = [str(figures.registers), f"{gpu.occupancy(figures.registers)} {gpu.word}"]
+    said = [str(figures.registers), f"{gpu.occupancy(figures)} {gpu.word}"]
     said += [f"{figures.stack} B stack"] if figures.stack else []
     said += [f"{figures.spilled} B spilled"] if figures.spilled else []
     said += [f"{figures.local} B local"] if figures.local else []

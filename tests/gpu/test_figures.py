@@ -74,7 +74,14 @@ def test_a_kernel_without_metadata_is_noticed() -> None:
 )
 def test_how_many_fit_beside_each_other(name: str, registers: int, expected: int) -> None:
     (gpu,) = [gpu for gpu in GPUS if gpu.name == name]
-    assert gpu.occupancy(registers) == expected
+    assert gpu.occupancy(Figures(registers)) == expected
+
+
+def test_local_memory_leaves_room_for_fewer_groups() -> None:
+    by_name = {gpu.name: gpu for gpu in GPUS}
+    assert by_name["gfx1030"].occupancy(Figures(48, local=16 * 1024)) == 8
+    assert by_name["sm_90"].occupancy(Figures(48, local=16 * 1024)) == 28
+    assert by_name["sm_75"].occupancy(Figures(255, local=1)) == 8
 
 
 def test_what_is_worse() -> None:

@@ -70,6 +70,7 @@ def test_what_is_not_guaranteed_is_told(ptx: str, told: str) -> None:
         "work_group_reduce_add(a);",
         "sub_group_broadcast(a, 0);",
         "__generic int *p;",
+        "barrier(CLK_LOCAL_MEM_FENCE);",
         "atom_add(p, 1l);",
         "__builtin_fma(a, b, c);",
         "write_imagef(shown, at, color);",

@@ -51,7 +51,7 @@ def test_a_row_of_the_table_is_the_most_of_its_programs() -> None:
         f"surface {name} float32 | surface": {gpu.name: each for gpu in GPUS}
         for name, each in (("one", Figures(64, 8)), ("two", Figures(96, 0, 4)))
     }
-    rows = table.markdown(figures).splitlines()[2:]
+    rows = table.markdown(figures).splitlines()[2:-2]
     cells = "96, 20 warps, 8 B stack, 4 B spilled | 96, 20 warps, 8 B stack, 4 B spilled"
     waves = "96, 20 waves, 8 B stack, 4 B spilled | 96, 32 waves, 8 B stack, 4 B spilled"
     assert rows == [f"| `surface` | float32 | 2 | {cells} | {waves} |"]
@@ -62,10 +62,28 @@ def test_marches_are_told_apart_by_their_rule() -> None:
         f"march {name} float32 | march": {gpu.name: Figures(50) for gpu in GPUS}
         for name in ("mandelbulb", "hast")
     }
-    assert [line.split(" | ")[0] for line in table.markdown(figures).splitlines()[2:]] == [
+    assert [line.split(" | ")[0] for line in table.markdown(figures).splitlines()[2:-2]] == [
         "| `march`, Jacobian",
         "| `march`, scalar rule",
     ]
+
+
+@pytest.mark.parametrize(
+    ("name", "figures", "above"),
+    [
+        ("march hast float32 | march", Figures(96), None),
+        ("march hast float32 | march", Figures(97), "`march`, Jacobian (float32)"),
+        ("march hast float64 | march", Figures(168, 88, 8), None),
+        ("march hast float64 | march", Figures(169), "`march`, Jacobian (float64)"),
+        ("surface hast float32 | shade", Figures(255), None),
+        ("surface hast float32 | shade", Figures(20, 8), "`shade` (float32)"),
+        ("surface hast float32 | shade", Figures(20, 0, 4), "`shade` (float32)"),
+        ("surface hast float64 | shade", Figures(255, 80, 40), None),
+    ],
+)
+def test_what_is_above_the_targets(name: str, figures: Figures, above: str | None) -> None:
+    last = table.markdown({name: {gpu.name: figures for gpu in GPUS}}).splitlines()[-1]
+    assert last == (f"Above the targets: {above}." if above else "All targets are met.")
 
 
 def test_a_page_keeps_all_but_the_table() -> None:
