@@ -42,7 +42,7 @@ INLINE void batch_run(batch *b, int goal, __constant const struct March *setting
 #define REFILL (LANES > 2 ? LANES / 2 : 1)   // idle lanes that are worth a pause for new rays
 #define BATCH_RAYS (BATCH_TURNS * LANES)
 #define RAY_NUMBERS 11
-#define CROSSING_NUMBERS (MARCH_KEEPS_SURFACE ? 11 : 5)
+#define CROSSING_NUMBERS (MARCH_KEEPS_SURFACE ? 16 : 7)
 
 typedef struct {
     scalar rays[RAY_NUMBERS][BATCH_RAYS];   // turn by turn, LANES pixels each
@@ -84,13 +84,18 @@ INLINE void crossing_store(crossing c, scalar *numbers, int stride) {
     lanes_store(c.steps, numbers + 2 * stride);
     lanes_store(c.count, numbers + 3 * stride);
     lanes_store(c.bad, numbers + 4 * stride);
+    lanes_store(c.touch, numbers + 5 * stride);
+    lanes_store(c.last, numbers + 6 * stride);
 #if MARCH_KEEPS_SURFACE
-    lanes_store(c.end_surface.gradient.x, numbers + 5 * stride);
-    lanes_store(c.end_surface.gradient.y, numbers + 6 * stride);
-    lanes_store(c.end_surface.gradient.z, numbers + 7 * stride);
-    lanes_store(c.end_surface.square, numbers + 8 * stride);
-    lanes_store(c.end_surface.square_before, numbers + 9 * stride);
-    lanes_store(c.end_count, numbers + 10 * stride);
+    lanes_store(c.gradient.x, numbers + 7 * stride);
+    lanes_store(c.gradient.y, numbers + 8 * stride);
+    lanes_store(c.gradient.z, numbers + 9 * stride);
+    lanes_store(c.near.gradient.x, numbers + 10 * stride);
+    lanes_store(c.near.gradient.y, numbers + 11 * stride);
+    lanes_store(c.near.gradient.z, numbers + 12 * stride);
+    lanes_store(c.near.square, numbers + 13 * stride);
+    lanes_store(c.near.square_before, numbers + 14 * stride);
+    lanes_store(c.near_count, numbers + 15 * stride);
 #endif
 }
 
@@ -101,12 +106,15 @@ INLINE crossing crossing_load(const scalar *numbers, int stride) {
     c.steps = lanes_load(numbers + 2 * stride);
     c.count = lanes_load(numbers + 3 * stride);
     c.bad = lanes_load(numbers + 4 * stride);
+    c.touch = lanes_load(numbers + 5 * stride);
+    c.last = lanes_load(numbers + 6 * stride);
 #if MARCH_KEEPS_SURFACE
-    c.end_surface.gradient = vec_of(lanes_load(numbers + 5 * stride), lanes_load(numbers + 6 * stride),
-                                lanes_load(numbers + 7 * stride));
-    c.end_surface.square = lanes_load(numbers + 8 * stride);
-    c.end_surface.square_before = lanes_load(numbers + 9 * stride);
-    c.end_count = lanes_load(numbers + 10 * stride);
+    c.gradient = vec_of(lanes_load(numbers + 7 * stride), lanes_load(numbers + 8 * stride), lanes_load(numbers + 9 * stride));
+    c.near.gradient = vec_of(lanes_load(numbers + 10 * stride), lanes_load(numbers + 11 * stride),
+                             lanes_load(numbers + 12 * stride));
+    c.near.square = lanes_load(numbers + 13 * stride);
+    c.near.square_before = lanes_load(numbers + 14 * stride);
+    c.near_count = lanes_load(numbers + 15 * stride);
 #endif
     return c;
 }

@@ -9,6 +9,8 @@
 #include "formula.h"
 #include "orbit.h"
 #include "rays.h"
+#include "march_state.h"
+#include "proof.h"
 #include "march.h"
 
 // A packet's pixels form a block.

@@ -59,6 +59,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     const mask done = m->active & (narrows ? (bracketed & less_equal(m->high - m->low, finest)) | cut : inside);
     m->found.hit |= done;
     m->found.t = pick(done, pick(bracketed, m->low, m->t), m->found.t);
+    m->found.last = pick(done, m->found.t, m->found.last);
     m->active &= ~done;
 
     const real onward = pick(inside, fmax(m->t - m->pace, m->r.near), m->t + m->pace);

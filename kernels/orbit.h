@@ -41,6 +41,19 @@ INLINE real quick_log2(real a) {
 #endif
 }
 
+// 2**a to some 2e-7 of it, exact for whole numbers, within what normal numbers hold.
+INLINE real quick_exp2(real a) {
+#if REAL_IS_DOUBLE
+    return exp2(a);
+#else
+    const real within = clamp(a, R(-126.0), R(126.0));
+    const real whole = floor(within), part = within - whole;
+    const real mantissa = R(1.0) + part * (R(0.6931530) + part * (R(0.2401475) + part * (R(0.0558534) + part * (R(0.0089505) +
+                          part * R(0.0018956)))));
+    return mantissa * as_real((as_mask(whole + R(12582912.0)) - (0x4b400000 - 127)) << 23);  // 1.5 * 2^23 makes it whole
+#endif
+}
+
 // Distance to the solid from the last |z|, its count and the growth of |z| per scene unit, g = |J^T z / |z||, given relative
 // to |z|: `relative` = |z| / g.
 //
@@ -49,14 +62,12 @@ INLINE real quick_log2(real a) {
 // level set of G at log(bailout) / degree^iterations: subtracting it matters in the last few counts only.
 INLINE real distance_from_growth(real square, real relative, real count, __constant const struct Orbit *orbit) {
 #if LOGARITHMIC
-    real height = R(0.34657359028) * quick_log2(square);  // half of log 2
+    const real height = R(0.34657359028) * quick_log2(square);  // half of log 2
     const real counts_left = (real)((scalar)orbit->iterations) - count;
-    const mask late = less(counts_left, R(12.0));
-    if (any_lane(late)) {
-        // For each lane separately: if a ray depended on its neighbours in the packet, regions would differ from whole pictures.
-        height -= pick(late, (real)(orbit->log_bailout) * exp2(-counts_left * (real)(orbit->log2_degree)), R(0.0));
-    }
-    const real distance = R(0.5) * height * relative;
+    const real level = (real)(orbit->log_bailout) * quick_exp2(-counts_left * (real)(orbit->log2_degree)) / height;
+    const real far = height * quick_exp2(-count * (real)(orbit->log2_degree));
+    const real share = (R(1.0) - level * level) / (R(1.0) + far * (R(0.5) + R(0.0833333333) * far));
+    const real distance = R(0.5) * height * relative * share;
 #else
     const real radius = sqrt(square);
     const real distance = (R(1.0) - (real)(orbit->solid_radius) / radius) * relative;
@@ -188,6 +199,12 @@ typedef struct {
     real square;         // the last |z|^2 ...
     real square_before;  // ... and the one before it
 } surface_point;
+
+INLINE surface_point surface_pick(mask m, surface_point yes, surface_point no) {
+    const surface_point s = {vec_pick(m, yes.gradient, no.gradient), pick(m, yes.square, no.square),
+                             pick(m, yes.square_before, no.square_before)};
+    return s;
+}
 
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
 INLINE clearance orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,

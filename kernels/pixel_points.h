@@ -10,7 +10,7 @@ typedef struct {
     bits seed;
     real count;                 // points that found the surface
     real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
-    vec point, normal;
+    vec point, base, normal;
     real smooth;
     color tint;                 // sum over the points
 #if GEOMETRIC
@@ -41,6 +41,7 @@ INLINE void points_touched(pixel_points *p, crossing met, ray eye_ray, world w) 
     p->count = R(0.0);
     p->nearest = (real)(REAL_LARGEST);
     p->point = eye_ray.origin;
+    p->base = eye_ray.origin;
     p->normal = eye_ray.direction;
     p->smooth = R(0.0);
     p->tint = color_of(R(0.0), R(0.0), R(0.0));
@@ -66,7 +67,7 @@ INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, re
 #if SEARCH == SEARCH_STEPS
     r.known = p->touch_t;
 #else
-    r.near = fmax(p->touch_t - R(0.5) * p->touch_cone, R(0.0));
+    r.near = fmax(p->touch_t - R(0.0) * p->touch_cone, R(0.0));
     r.known = p->touch_t;
 #endif
     r.footprint *= (real)(w.settings->point_share);
@@ -76,7 +77,7 @@ INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, re
 
 INLINE void points_add(pixel_points *p, int turn, ray leg, crossing met, vec normal, real smooth, world w) {
     const mask found = met.hit;
-    const vec point = vec_along(leg.origin, met.t, leg.direction);
+    const vec point = vec_along(leg.origin, met.t, leg.direction), base = vec_along(leg.origin, met.touch, leg.direction);
     p->count += pick(found, R(1.0), R(0.0));
     real across, below;
     point_offset(point_of_turn(turn), p->seed, &across, &below);
@@ -84,6 +85,7 @@ INLINE void points_add(pixel_points *p, int turn, ray leg, crossing met, vec nor
     const mask nearer = found & less(offset, p->nearest);
     p->nearest = pick(nearer, offset, p->nearest);
     p->point = vec_pick(nearer, point, p->point);
+    p->base = vec_pick(nearer, base, p->base);
     p->normal = vec_pick(nearer, normal, p->normal);
     p->smooth = pick(nearer, smooth, p->smooth);
 #if COLORING_PER_POINT
@@ -91,7 +93,7 @@ INLINE void points_add(pixel_points *p, int turn, ray leg, crossing met, vec nor
     p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
 #endif
 #if GEOMETRIC
-    const vec offset_in_space = vec_sub(point, p->reference);
+    const vec offset_in_space = vec_sub(base, p->reference);
     const vec place = vec_of(vec_dot(offset_in_space, p->right), vec_dot(offset_in_space, p->up),
                              vec_dot(offset_in_space, p->toward));
     p->sums = plane_add(p->sums, found, place);
@@ -123,7 +125,7 @@ INLINE mask points_spot(const pixel_points *p, ray eye_ray, spot *here, real *co
     const mask found = less(R(0.0), p->count);
     *coverage = p->count * (R(1.0) / (real)(POINTS));
     const real share = R(1.0) / fmax(p->count, R(1.0));
-    here->point = p->point;
+    here->point = p->base;
     here->smooth = p->smooth;
     here->cone = p->touch_cone;
     here->tint = color_scale(p->tint, share);

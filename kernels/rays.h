@@ -7,12 +7,15 @@
 typedef struct {
     mask hit;
     real t;       // distance along the ray; of a hit, a point still outside the solid
+    real last;    // of a hit: the last point outside
+    real touch;   // where the cone came near the solid; beyond all if it never did
     real steps;   // points of the ray that were tried
     real count;   // formula applications of all of them
     real bad;     // steps that the distance called safe and that ended inside
 #if MARCH_KEEPS_SURFACE
-    surface_point end_surface;  // at t, with the applications there; a gradient of 0 if t was never seen from outside
-    real end_count;
+    vec gradient;        // at the last point outside; 0 if there was none
+    surface_point near;  // at the touch, with the applications there
+    real near_count;
 #endif
 } crossing;
 
@@ -20,14 +23,17 @@ INLINE crossing nothing_met(real t) {
     crossing c;
     c.hit = less(R(1.0), R(0.0));
     c.t = t;
+    c.last = t;
+    c.touch = (real)(REAL_LARGEST);
     c.steps = R(0.0);
     c.count = R(0.0);
     c.bad = R(0.0);
 #if MARCH_KEEPS_SURFACE
-    c.end_surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
-    c.end_surface.square = R(1.0);
-    c.end_surface.square_before = R(1.0);
-    c.end_count = R(0.0);
+    c.gradient = vec_of(R(0.0), R(0.0), R(0.0));
+    c.near.gradient = c.gradient;
+    c.near.square = R(1.0);
+    c.near.square_before = R(1.0);
+    c.near_count = R(0.0);
 #endif
     return c;
 }
@@ -43,14 +49,15 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
     crossing c;
     c.hit = (m & yes.hit) | (~m & no.hit);
     c.t = pick(m, yes.t, no.t);
+    c.last = pick(m, yes.last, no.last);
+    c.touch = pick(m, yes.touch, no.touch);
     c.steps = pick(m, yes.steps, no.steps);
     c.count = pick(m, yes.count, no.count);
     c.bad = pick(m, yes.bad, no.bad);
 #if MARCH_KEEPS_SURFACE
-    c.end_surface.gradient = vec_pick(m, yes.end_surface.gradient, no.end_surface.gradient);
-    c.end_surface.square = pick(m, yes.end_surface.square, no.end_surface.square);
-    c.end_surface.square_before = pick(m, yes.end_surface.square_before, no.end_surface.square_before);
-    c.end_count = pick(m, yes.end_count, no.end_count);
+    c.gradient = vec_pick(m, yes.gradient, no.gradient);
+    c.near = surface_pick(m, yes.near, no.near);
+    c.near_count = pick(m, yes.near_count, no.near_count);
 #endif
     return c;
 }

@@ -181,6 +181,7 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
             if (w.settings->light_count > 0) continue;
         } else if (stage != STAGE_LIGHT) {
             mask found = met.hit;
+            vec seen_point = here.point;
 #if POINTS > 1
             if (bounce == 0) {
                 if (stage == STAGE_EYE) {
@@ -190,10 +191,12 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
                     if (any_lane(met.hit)) continue;
                 }
                 found = points_spot(&points, eye_ray, &here, &result.coverage, w);
+                seen_point = points.point;
             } else
 #endif
             {
-                here.point = vec_along(leg.origin, met.t, leg.direction);
+                here.point = vec_along(leg.origin, met.touch, leg.direction);
+                seen_point = vec_along(leg.origin, met.t, leg.direction);
                 here.cone = leg.footprint + leg.spread * met.t;
                 here.normal = normal;
                 here.smooth = smooth;
@@ -210,12 +213,12 @@ INLINE shot take_shot(real x, real y, int sample, const int *columns, const int 
 #endif
             if (bounce == 0) {
                 result.hit = found;
-                result.point = here.point;
+                result.point = seen_point;
                 result.normal = here.normal;
                 result.smooth = here.smooth;
-                result.depth = vec_dot(vec_sub(here.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
+                result.depth = vec_dot(vec_sub(seen_point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
 #if HAS_FOG
-                const real way = vec_dot(vec_sub(here.point, eye_ray.origin), eye_ray.direction);
+                const real way = vec_dot(vec_sub(seen_point, eye_ray.origin), eye_ray.direction);
                 fog = R(1.0) - exp(-(real)(w.material->fog_density) * way);
 #endif
             } else {

@@ -38,25 +38,33 @@ INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
                      clamp(share, R(0.0), R(1.0)));
 }
 
-// The surface where a march has ended: its exact normal and escape count, and with POLISH a place that does not depend on
-// how the march came there: where the distance is half the cone, by the secant method (the slope is that of a distance, -1,
-// at first). Normals from the positions of points need it.
-INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, real *smooth, tally *cost) {
-#if MARCH_KEEPS_SURFACE
-    const surface_point surface = met->end_surface;
-    const clearance there = {R(0.0), {met->end_count, less(R(1.0), R(0.0))}};
-#elif POLISH
+// The normal of the surface where a march has ended, and its escape count. Both are taken where the ray's cone came near the
+// solid: most of these surfaces are rougher than a pixel, and there the distance has smoothed them over the pixel's footprint.
+// Where the surface is smooth its normal is the one at the hit: there both differ little for the way between them.
+#define SMOOTH R(0.009)  // radians a footprint: a smooth surface turns at most so fast ...
+#define ROUGH R(0.013)   // ... and one that turns faster is rough
+INLINE vec surface_normal(vec wide, vec fine, const crossing *met, real cone) {
+    const real way = fmax(met->last - met->touch, R(0.01) * cone);
+    const vec turn = vec_scale(vec_sub(fine, wide), R(1.0) / way);
+    const real share = clamp((ROUGH - sqrt(vec_dot(turn, turn)) * cone) / (ROUGH - SMOOTH), R(0.0), R(1.0));
+    const vec at_hit = vec_along(fine, met->t - met->last, turn);
+    return vec_normalize(vec_along(wide, share, vec_sub(at_hit, wide)));
+}
+
+#if POLISH
+// A place that does not depend on how the march came there: where the distance is half the cone, by the secant method (the
+// slope is that of a distance, -1, at first). Normals from the positions of points need it.
+INLINE surface_point surface_polished(ray r, crossing *met, mask active, world w, clearance *there, tally *cost) {
     surface_point surface;
-    clearance there;
     const real cone = (real)(w.settings->detail) * (r.footprint + r.spread * met->t);
     const real wanted = R(0.5) * cone;
-    real t = met->t, before = met->t, height_before = R(0.0);
+    real t = met->touch, before = t, height_before = R(0.0);
     for (int i = 0; i < TURNS(POLISH); ++i) {
-        there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, w.orbit, w.k, &surface);
-        cost->count += pick(active, there.end.count, R(0.0));
+        *there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, w.orbit, w.k, &surface);
+        cost->count += pick(active, there->end.count, R(0.0));
         cost->steps += pick(active, R(1.0), R(0.0));
         if (i == POLISH - 1) break;
-        const real height = there.step * (real)(w.settings->step_scale) - wanted;
+        const real height = there->step * (real)(w.settings->step_scale) - wanted;
         const real slope = (height - height_before) / (t - before);
         const mask usable = less(slope, R(0.0)) & less(R(-1e6), slope);
         const real move = i == 0 ? height : pick(usable, -height / slope, height);
@@ -64,13 +72,35 @@ INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, 
         height_before = height;
         t += clamp(move, -cone, cone);
     }
-    met->t = pick(active, t, met->t);
-#else
-    surface_point surface;
-    const clearance there = orbit_dual_distance(vec_along(r.origin, met->t, r.direction), active, w.orbit, w.k, &surface);
-    cost->count += pick(active, there.end.count, R(0.0));
+    met->touch = pick(active, t, met->touch);
+    return surface;
+}
 #endif
+
+// The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded.
+INLINE void surface_at(ray r, crossing *met, mask active, world w, vec *normal, real *smooth, tally *cost) {
+    met->touch = fmin(met->touch, met->last);
+    const real cone = (real)(w.settings->detail) * (r.footprint + r.spread * met->t);
+    clearance there;
+#if MARCH_KEEPS_SURFACE
+    const surface_point surface = met->near;
+    there.end.count = met->near_count;
+    there.end.inside = less(R(1.0), R(0.0));
+    *normal = surface_normal(vec_normalize(surface.gradient), vec_normalize(met->gradient), met, cone);
+#elif POLISH
+    const surface_point surface = surface_polished(r, met, active, w, &there, cost);
     *normal = vec_normalize(surface.gradient);
+#else
+    surface_point surface, at_hit;
+    for (int i = 0; i < TURNS(2); ++i) {
+        surface = at_hit;
+        const real t = i == 0 ? met->touch : met->last;
+        const clearance here = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, w.orbit, w.k, &at_hit);
+        if (i == 0) there = here;
+        cost->count += pick(active, here.end.count, R(0.0));
+    }
+    *normal = surface_normal(vec_normalize(surface.gradient), vec_normalize(at_hit.gradient), met, cone);
+#endif
     // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
     const mask flat = less(vec_dot(*normal, *normal), R(0.5)) | there.end.inside;
     *normal = vec_pick(flat, vec_scale(r.direction, R(-1.0)), *normal);

@@ -11,6 +11,8 @@
 #if SEARCH == SEARCH_STEPS
 #include "march_steps.h"
 #else
+#include "march_state.h"
+#include "proof.h"
 #include "march.h"
 #endif
 #include "batch.h"

@@ -111,7 +111,7 @@ _DERIVED: tuple[tuple[str, Callable[[float], bool], str], ...] = (
     ("degree", lambda v: 1 <= v <= 1000, "must be 1 to 1000"),
     ("bailout", lambda v: 0 < v <= MAX_BAILOUT, f"must be above 0 and at most {MAX_BAILOUT:g}"),
     ("distance_bailout", lambda v: 0 < v <= MAX_BAILOUT, f"must be above 0 and at most {MAX_BAILOUT:g}"),
-    ("step_scale", lambda v: 0 < v <= 1, "must be above 0 and at most 1"),
+    ("step_scale", lambda v: 0 < v <= 2, "must be above 0 and at most 2"),
 )
 
 

@@ -17,6 +17,9 @@ from clfractal.formulas.parser import parse
 MAX_PARAMETERS = 32
 MAX_LETS = 100
 
+# The step scale of a formula that tells none and has no scalar rule: a map that stretches space unevenly has distances that are
+# too long here and there.
+JACOBIAN_STEP = 0.75
 _REQUIRED = ("variables", "map", "bounds")
 _KEYS = (
     *(
@@ -95,7 +98,7 @@ class _Builder:
             distance_bailout=self._of_parameters("distance_bailout", 0)
             if "distance_bailout" in self.data
             else None,
-            step_scale=self._of_parameters("step_scale", 1),
+            step_scale=self._of_parameters("step_scale", 1 if "derivative" in self.data else JACOBIAN_STEP),
             slice=self._slice(known),
             shape=self._optional("shape", (*self.variables, *known, *(n for n, _ in let))),
             derivative=self._optional("derivative", (*everything, "dr", "added")),

@@ -342,8 +342,8 @@ def _step_scale(data: Mapping[str, Any], place: Where) -> float | None:
     value = data.get("step_scale")
     if value is None:
         return None
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 1:
-        raise FormulaError("must be above 0 and at most 1", inside(place, "step_scale"))
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= 2:
+        raise FormulaError("must be above 0 and at most 2", inside(place, "step_scale"))
     return float(value)
 
 

@@ -182,7 +182,7 @@ def march_record(scene: Scene, precision: Precision) -> Record:
     chain, renderer = scene.chain, scene.surface
     center, radius = scene.bounds
     points = renderer.used_points.count
-    point_share = 1 / math.sqrt(points)
+    point_share = 1.0
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
     half = radius / 2
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
@@ -200,7 +200,7 @@ def march_record(scene: Scene, precision: Precision) -> Record:
         "step": renderer.step if renderer.step is not None else radius / 100,
         "touch_share": max(TOUCH / renderer.detail, point_share),
         "point_share": point_share,
-        "known_reach": 1 / (point_share * renderer.detail),
+        "known_reach": 4 / (point_share * renderer.detail),
         "seed": renderer.seed,
         "bounces": renderer.bounces if scene.material.reflection > 0 else 0,
         "light_count": len(scene.lights),

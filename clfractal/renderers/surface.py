@@ -30,7 +30,7 @@ ALONG = {"view": 0, "normal": 1, "reflection": 2}
 TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
-POLISH = 5
+POLISH = 4
 
 Floats = npt.NDArray[np.float32]
 

@@ -70,7 +70,10 @@ class SurfaceRenderer(Sampled):
         1000, ge=1, le=100_000, description="maximum number of distance evaluations along a ray"
     )
     over_relaxation: float = Field(
-        1.3, ge=1, lt=2, description="factor on steps; a step is taken back where it was unsafe"
+        3.0,
+        ge=1,
+        le=4,
+        description="most that a step may exceed the distance; a step is taken back where it was unsafe",
     )
     step_scale: Annotated[float, Field(strict=True, gt=0, le=2)] | None = Field(
         None, description="factor on estimated distances; null: the formula's own"

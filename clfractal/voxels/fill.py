@@ -31,7 +31,7 @@ from clfractal.voxels.store import Evaluated, store
 SLOW_APPLICATIONS = 1e7
 # Part of a distance that is safe to march by which is safe to leave out a node by. Chosen so that of 20 grids of formulas
 # and zooms none differs from its brute fill in a voxel of a million.
-NODE_SAFETY = 0.75
+NODE_SAFETY = 0.55
 # Voxels a side of an octant of a brick.
 OCTANT = 4
 
@@ -194,7 +194,9 @@ class _Filler:
         iterations = self.scene.formula.iterations
         records: list[npt.NDArray[Any]] = [
             self.lattice.axes(precision, self.sub_points),
-            self.lattice.record(precision, self.sub_points, NODE_SAFETY * chain.step_scale).reshape(1),
+            self.lattice.record(precision, self.sub_points, NODE_SAFETY * min(chain.step_scale, 1.0)).reshape(
+                1
+            ),
             np.array(self.formula.constants, precision),
         ]
         # Watched, because one launch of long orbits may take seconds.

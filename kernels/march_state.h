@@ -1,0 +1,61 @@
+// A packet of rays on the march, and what it knows of them.
+
+#define SLOPE_AT_FIRST R(-0.5)   // of the distance along a ray, before it is known
+
+// The march of a packet towards one goal, the same for all lanes:
+//   GOAL_SURFACE  the surface: hits are proved, and lie where the solid begins
+//   GOAL_SHADOW   whether anything is in the way: a step that ended inside is a hit
+//   GOAL_TOUCH    how far a whole pixel's cone is free: the first proved touch, at a point still outside
+typedef struct {
+    ray r;
+    mask active;
+    crossing found;
+    real t;
+    real low;         // the last point known to be outside
+    real high;        // a point known to be inside
+    real slope;       // of the distance along the ray, over the last steps
+    real radius_before, step_before;
+    mask landing;     // the last step led to where the solid is expected
+#if !HAS_DERIVATIVE
+    mask proving;
+    vec probe, probe_downhill;
+    real probe_radius, probes, factor, proved_t;
+    real retry_t, retry_radius;   // the next proof is due from this t on, or below this distance
+#endif
+} march;
+
+// What an evaluation tells: at a place on the ray, or where a hit is being proved.
+typedef struct {
+    vec point, on_ray;
+    clearance here;
+    real radius, cone;
+#if !HAS_DERIVATIVE
+    surface_point surface;
+#endif
+} sight;
+
+// Lanes `fresh` begin a march along new rays; the others go on with theirs.
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+    m->r = ray_pick(fresh, r, m->r);
+    m->active |= fresh;
+    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    m->t = pick(fresh, r.near, m->t);
+    m->low = pick(fresh, r.near, m->low);
+    m->high = pick(fresh, (real)(REAL_LARGEST), m->high);
+    m->slope = pick(fresh, SLOPE_AT_FIRST, m->slope);
+    m->radius_before = pick(fresh, (real)(REAL_LARGEST), m->radius_before);
+    m->step_before = pick(fresh, R(0.0), m->step_before);
+    m->landing &= ~fresh;
+#if !HAS_DERIVATIVE
+    m->proving &= ~fresh;
+    m->probe = vec_pick(fresh, r.origin, m->probe);
+    m->probe_downhill = vec_pick(fresh, r.direction, m->probe_downhill);
+    m->probe_radius = pick(fresh, R(0.0), m->probe_radius);
+    m->probes = pick(fresh, R(0.0), m->probes);
+    m->factor = pick(fresh, R(1.0), m->factor);
+    m->proved_t = pick(fresh, R(0.0), m->proved_t);
+    m->retry_t = pick(fresh, R(0.0), m->retry_t);
+    m->retry_radius = pick(fresh, R(0.0), m->retry_radius);
+#endif
+}
+

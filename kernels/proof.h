@@ -1,0 +1,89 @@
+// Proofs of hits. A distance can be far too small where the map stretches space unevenly, and a cone that touches it is no proof
+// of a surface. With the gradient at hand a hit is proved: the touching point descends towards the solid, and counts if it
+// arrives within the pixel. Formulas with a scalar rule of their own are nearly conformal and need no proof.
+//
+// How near counts as arrived depends on the potential G: a low one means that the solid can only be near, though it may be
+// as thin as a sheet that no descent finds; where it is high a small estimate is suspect (a valley of G whose steep sides
+// pretend to a solid at its bottom), and the descent has to get much nearer.
+#define PROOF_STEPS 12
+#define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
+#define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there ...
+#define PROOF_LANDED R(0.004)    // ... and this near where the potential is high
+#define PROOF_LOW R(0.1)         // a low potential: below this part of the cone over the set's radius
+#define PROOF_REACH R(1.0)       // of the pixel's cone: how far from the ray the descent may lead
+#define PROOF_APART R(1.0)       // of the pixel's cone: how far apart two proofs are, unless ...
+#define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
+#define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
+
+#if HAS_DERIVATIVE
+INLINE mask proof_under_way(const march *m) { return m->active & ~m->active; }
+
+INLINE mask proof_step(march *m, const sight *s, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+    return m->active;
+}
+
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
+                        __constant const struct March *settings) {
+    return touched;
+}
+#else
+INLINE mask proof_under_way(const march *m) { return m->proving; }
+
+// Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
+INLINE mask proof_step(march *m, const sight *s, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+    if (!any_lane(m->proving)) return m->active;
+    const real cone = s->cone;
+    const vec offset = vec_sub(s->point, s->on_ray);
+    real arrival = PROOF_ARRIVED * cone;
+#if LOGARITHMIC
+    const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
+    arrival = pick(close, arrival, PROOF_LANDED * cone);
+#endif
+    const real along = vec_dot(offset, m->r.direction);
+    const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
+    const mask arrived = m->proving & (s->here.end.inside | less(s->radius, arrival)) & ~astray;
+    const mask failed = m->proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), m->probes));
+    m->found.hit |= arrived;
+    m->found.last = pick(arrived, m->low, m->found.last);
+    m->found.t = pick(arrived, m->proved_t, m->found.t);
+    m->active &= ~arrived;
+    m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
+    m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
+    m->t = pick(failed, m->t + PROOF_ONWARD * cone, m->t);
+    m->step_before = pick(failed, PROOF_ONWARD * cone, m->step_before);
+    m->slope = pick(failed, R(-1.0), m->slope);
+    m->landing |= failed;
+    const mask marching = m->active & ~m->proving;
+    m->proving &= ~(arrived | failed);
+    return marching;
+}
+
+// Lanes that touched the solid begin a proof, and those under way go further down. The result are hits that need no proof: a
+// bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be proved again.
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
+                        __constant const struct March *settings) {
+    mask done = touched & bracketed;
+#if POINTS > 1
+    done |= touched & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone);
+#endif
+    const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
+    if (!any_lane(m->proving | due)) return done;
+    const vec downhill = vec_scale(vec_normalize(s->surface.gradient), R(-1.0));
+    // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
+    const mask turned = less(vec_dot(downhill, m->probe_downhill), R(0.0));
+    const mask slow = less(R(0.5) * m->probe_radius, s->radius);
+    m->factor = pick(m->proving, m->factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
+    m->probes = pick(m->proving, m->probes + R(1.0), R(0.0));
+    m->proved_t = pick(due, hit_t, m->proved_t);
+    m->proving |= due;
+    real down = m->factor * fmax(s->radius, PROOF_LANDED * s->cone);
+#if POINTS > 1
+    // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
+    if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * PROOF_REACH * s->cone);
+#endif
+    m->probe = vec_pick(m->proving, vec_along(s->point, down, downhill), m->probe);
+    m->probe_downhill = downhill;
+    m->probe_radius = s->radius;
+    return done;
+}
+#endif
