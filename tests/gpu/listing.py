@@ -122,8 +122,14 @@ def everything() -> Iterator[Listed]:
             yield Listed(f"{name} {precision}", precision, text)
         for name in catalog.names():
             formula = write_formula(catalog.load_chain(name))
-            yield Listed(f"march {name} {precision}", precision, lanes.program_text(formula, 1, precision))
+            probe = lanes.program_text(formula, 1, precision)
+            yield Listed(f"march_probe {name} {precision}", precision, probe)
             yield Listed(f"points {name} {precision}", precision, points.program_text(formula, 1, precision))
+            # What knows a formula in a program of its own has figures for each of them.
+            plain = load_scene({**_scene("surface"), "formula": {"name": name}})
+            for part, text in programs.of_scene(plain, 1, precision):
+                if part.startswith("march"):
+                    yield Listed(f"{part} {name} {precision}", precision, text)
 
 
 def unlike(listed: Iterable[Listed]) -> list[Listed]:
@@ -134,14 +140,19 @@ def unlike(listed: Iterable[Listed]) -> list[Listed]:
     return list(first.values())
 
 
-def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
-    """The programs of a scene that has what is chosen of each feature."""
-    scene: dict[str, Any] = {
+def _scene(renderer: str) -> dict[str, Any]:
+    """What every scene has, without a formula."""
+    return {
         "version": 1,
         "image": {"width": 16, "height": 16},
         "camera": {"position": [0, -20, 5], "target": [0, 0, 0]},
         "renderer": {"type": renderer},
     }
+
+
+def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
+    """The programs of a scene that has what is chosen of each feature."""
+    scene = _scene(renderer)
     for feature, value in chosen.items():
         for section, content in _FEATURES[renderer].get(feature, {}).get(value, {}).items():
             known = scene.get(section)

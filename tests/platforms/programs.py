@@ -39,7 +39,10 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
     yield from of_grids(count, precision)
     yield "probe", probe.program_text(count, precision)
     for name in ("mandelbulb", "hast"):  # by a scalar rule, and by the Jacobian
-        yield f"march {name}", lanes.program_text(write_formula(catalog.load_chain(name)), count, precision)
+        yield (
+            f"march_probe {name}",
+            lanes.program_text(write_formula(catalog.load_chain(name)), count, precision),
+        )
     if count == 1:  # these know no packets
         yield "structs", FlatText(struct_layout.program_text(records.STRUCTS, precision), SourceMap())
         yield "peak", FlatText(peak.program_text(precision), SourceMap())
