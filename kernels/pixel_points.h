@@ -67,11 +67,9 @@ INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, re
 #if SEARCH == SEARCH_STEPS
     r.known = p->touch_t;
 #else
-    r.near = fmax(p->touch_t - R(0.0) * p->touch_cone, R(0.0));
+    r.near = fmax(p->touch_t - R(0.5) * p->touch_cone, R(0.0));
     r.known = p->touch_t;
 #endif
-    r.footprint *= (real)(w.settings->point_share);
-    r.spread *= (real)(w.settings->point_share);
     return r;
 }
 

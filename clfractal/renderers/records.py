@@ -56,7 +56,6 @@ MARCH = Struct(
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
         Field("step", "real", 0, "step of the search by steps, scene units"),
         Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
-        Field("point_share", "real", 0, "footprint of one of a pixel's points, in the pixel's"),
         Field("known_reach", "real", 0, "how far a proved hit proves its neighbours', in a point's cones"),
         Field("seed", "uint", 0, "chooses the places of points and rays"),
         Field("bounces", "int", 0, "most mirror reflections"),
@@ -133,6 +132,8 @@ LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
 TOUCH = 0.75
+# In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
+KNOWN_REACH = 4.0
 # Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
 EXTRA_TESTS = 64
 
@@ -181,8 +182,6 @@ def march_record(scene: Scene, precision: Precision) -> Record:
     """The settings of the march, and of the rays that a shot sends."""
     chain, renderer = scene.chain, scene.surface
     center, radius = scene.bounds
-    points = renderer.used_points.count
-    point_share = 1.0
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
     half = radius / 2
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
@@ -198,9 +197,8 @@ def march_record(scene: Scene, precision: Precision) -> Record:
         "shadow_detail": SHADOW_DETAIL,
         "max_steps": renderer.max_steps,
         "step": renderer.step if renderer.step is not None else radius / 100,
-        "touch_share": max(TOUCH / renderer.detail, point_share),
-        "point_share": point_share,
-        "known_reach": 4 / (point_share * renderer.detail),
+        "touch_share": max(TOUCH / renderer.detail, 1 / math.sqrt(renderer.used_points.count)),
+        "known_reach": KNOWN_REACH / renderer.detail,
         "seed": renderer.seed,
         "bounces": renderer.bounces if scene.material.reflection > 0 else 0,
         "light_count": len(scene.lights),
