@@ -17,8 +17,8 @@ from clfractal.formulas.parser import parse
 MAX_PARAMETERS = 32
 MAX_LETS = 100
 
-# The step scale of a formula that tells none and has no scalar rule: where a map stretches space unevenly, distances are too
-# long here and there.
+# The step scale of a formula that tells none and has no scalar rule: where a map stretches space unevenly, distances are
+# too long here and there.
 JACOBIAN_STEP = 0.75
 _REQUIRED = ("variables", "map", "bounds")
 _KEYS = (
