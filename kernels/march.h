@@ -5,7 +5,6 @@
 // or inside, which brackets the surface between two points.
 #define SLOPE_GAIN R(0.3)        // part of a newly measured slope
 #define LANDING R(1.0)           // of the cone: from this distance on the march lands
-#define NEAR R(2.2)              // of the cone: this near the surface is smooth over a footprint, and is shaded as it is there
 #define LANDING_AIM R(0.05)       // of the cone: the distance that a landing step aims at
 #define LANDING_STEP R(1.5)      // of the cone: the longest landing step
 #define LANDED R(0.6)            // of the cone: the solid expected so near ahead is hit ...
@@ -43,12 +42,13 @@ INLINE sight march_look(march *m, __constant const struct March *settings, __con
 
 // Keeps where the cone has come near the solid, and what the surface is like there and at the last point outside. The place lies
 // between two steps, so that it does not depend on how long they were.
-INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, mask measured, __constant const struct March *settings) {
-    const real height = NEAR * s->cone * (real)(settings->step_scale);
+INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __constant const struct March *settings) {
+    const real height = s->cone * (real)(settings->near);
     const mask beside = outside & less(s->radius, height);
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
-    const real back = pick(measured & beside, clamp((height - s->radius) / (m->radius_before - s->radius), R(0.0), R(1.0)), R(0.0));
-    m->found.touch = pick(first, pick(beside, m->t - back * m->step_before, (real)(REAL_LARGEST)), m->found.touch);
+    const mask between = beside & less(height, m->radius_before) & less(m->radius_before, (real)(REAL_LARGEST));
+    const real back = pick(between, (height - s->radius) / (m->radius_before - s->radius), R(0.0));
+    m->found.touch = pick(first, pick(beside, m->t - back * (m->t - m->low), (real)(REAL_LARGEST)), m->found.touch);
     m->low = pick(outside, m->t, m->low);
     m->high = pick(inside, m->t, m->high);
 #if MARCH_KEEPS_SURFACE
@@ -80,7 +80,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     const real onward = pick(overshot, back, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
-    m->radius_before = pick(marching & ~overshot & ~early, s->radius, m->radius_before);
+    m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside, s->radius, m->radius_before);
     const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
     const real narrower = fmax(R(0.5) * (m->low + m->high), fmin(m->low + s->radius, m->high - BRACKETED * s->cone));
     m->t = pick(bracketed, narrower, pick(early, m->low, pick(marching, onward, m->t)));
@@ -111,7 +111,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     const mask measured = outside & free & less(R(0.0), m->step_before) & less(m->radius_before, (real)(REAL_LARGEST));
     const real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
-    march_keep(m, &s, outside, inside, measured, settings);
+    march_keep(m, &s, outside, inside, settings);
 
     // The cone touches the solid, or the surface is bracketed. A hit at first sight waits for a landing, unless it is as near as
     // one; a pixel's points begin near the solid, and stand for each other.

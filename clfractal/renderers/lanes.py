@@ -23,7 +23,7 @@ from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
 from clfractal.formulas.catalog import load_chain
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
-from clfractal.renderers.records import MARCH, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
+from clfractal.renderers.records import MARCH, NEAR, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
 from clfractal.scene.surface import SurfaceRenderer
 
 LANES_VARIABLE = "CLFRACTAL_LANES"
@@ -283,6 +283,7 @@ def _settings(chain: Chain, precision: Precision) -> np.ndarray[Any, np.dtype[np
         "step_scale": chain.step_scale,
         "relaxation": usual.over_relaxation,
         "detail": usual.detail,
+        "near": NEAR * chain.step_scale,
         "max_steps": usual.max_steps,
         "shadow_lift": SHADOW_LIFT * usual.detail,
         "shadow_detail": SHADOW_DETAIL,

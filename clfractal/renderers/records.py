@@ -51,6 +51,7 @@ MARCH = Struct(
         Field("step_scale", "real", 0, "part of a distance that is safe to step"),
         Field("relaxation", "real", 0, "factor on steps, taken back where spheres do not touch"),
         Field("detail", "real", 0, "distance that counts as a hit, in pixel footprints"),
+        Field("near", "real", 0, "scaled distance at which light is computed, in cones"),
         Field("shadow_lift", "real", 0, "where shadow rays start, in footprints above the surface"),
         Field("shadow_detail", "real", 0, "hit distance of shadow rays, in footprints over detail"),
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
@@ -130,6 +131,8 @@ STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL)
 LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
+# In cones: the distance at which light is computed for a pixel of one sample, and at the least.
+NEAR, NEAR_LEAST = 2.2, 0.6
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
 TOUCH = 0.75
 # In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
@@ -178,6 +181,22 @@ def view_record(
     return VIEW.value(precision, values)
 
 
+def step_scale(scene: Scene) -> float:
+    """How much of a distance is safe to step."""
+    given = scene.surface.step_scale
+    return given if given is not None else scene.chain.step_scale
+
+
+def near_height(scene: Scene) -> float:
+    """The scaled distance at which light is computed, in cones.
+
+    The only sample of a pixel is smoothed over several footprints, or a rough surface would be noise. Many samples, or points, are
+    averaged, and show the surface as it is.
+    """
+    parts = scene.surface.samples * scene.surface.used_points.count
+    return step_scale(scene) * max(NEAR / parts, NEAR_LEAST)
+
+
 def march_record(scene: Scene, precision: Precision) -> Record:
     """The settings of the march, and of the rays that a shot sends."""
     chain, renderer = scene.chain, scene.surface
@@ -190,9 +209,10 @@ def march_record(scene: Scene, precision: Precision) -> Record:
     values = {
         "bounds_center": center,
         "bounds_radius": radius,
-        "step_scale": renderer.step_scale if renderer.step_scale is not None else chain.step_scale,
+        "step_scale": step_scale(scene),
         "relaxation": renderer.over_relaxation,
         "detail": renderer.detail,
+        "near": near_height(scene),
         "shadow_lift": SHADOW_LIFT * renderer.detail,
         "shadow_detail": SHADOW_DETAIL,
         "max_steps": renderer.max_steps,
