@@ -41,7 +41,7 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     return s;
 }
 
-#include "passes.h"
+#include "packets.h"
 
 __kernel void cut_plane(PASS_BUFFERS, __constant const struct PlaneSettings *settings, __constant const struct Orbit *orbit,
                         __constant const scalar *k, __constant const struct EscapeColors *colors,

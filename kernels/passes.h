@@ -1,19 +1,9 @@
 // A pass over a packet's pixels, the same for every renderer: adds samples `first` to `end` to the results of earlier passes.
 //
 // The sums of a pixel are kept on the device between passes, unchanged, so that a picture has the same bits
-// however its samples are split. A renderer defines before this file: `world`, what its shots read, and
-//   shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost)
-// which takes one shot at (across, below), in pixels from each pixel's middle.
+// however its samples are split.
 
-// The first and the last arguments of a renderer's kernel; its own stand between them. OpenCL 1.2 guarantees eight `__constant` ones:
-// lists are `__global`, and constant what all work-items read at the same time.
-#define PASS_BUFFERS                                                                                                       \
-    __global float *film, __global scalar *kept, __global uint *statistics, __global const int4 *places,                   \
-        __constant const struct View *view, __constant const struct Sampling *sampling
-#define PASS_SPAN                                                                                                          \
-    __global const int *slots, int channel_count, int kept_count, int first_packet, int end_packet, int first, int end, \
-        int mode
-#define PASS {film, kept, statistics, places, view, sampling, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode}
+#include "arguments.h"
 
 // A launch: tiles, a part of their packets, and a part of their samples.
 typedef struct {
@@ -67,56 +57,73 @@ INLINE void kept_pixel(__global scalar *kept, __global const int *slots, int wri
     kept_number(kept, slots, KEPT_STEPS, write, &p->steps);
 }
 
-// One work-item's part of a pass: LANES pixels of a tile.
-INLINE void render_packet(pass s, world w) {
-    const int packet = (int)get_global_id(0) + s.first_packet, tile = (int)get_global_id(1);
-    if (packet >= s.end_packet) return;
-    const int4 place = s.places[tile];
-    const packet_pixels at = packet_at(packet, (int2)(place.x, place.y), s.view);
-    __global scalar *kept = s.kept + place.z * s.kept_count * TILE_PIXELS + packet * LANES;
-    __global const int *kept_slots = s.slots + CHANNEL_COUNT;
-    pixel p = pixel_start();
-    if (s.first > 0) kept_pixel(kept, kept_slots, 0, &p);
-    const real shots_before = p.shots;
-    real hits = R(0.0);
-    tally cost = {R(0.0), R(0.0), R(0.0)};
-    for (int sample = s.first; sample < s.end; ++sample) {
-        // A pixel that is done has fewer shots. One that has more got them before this pass was interrupted.
-        mask active = at.in_region & ~less(p.shots, (real)((scalar)sample));
-        if (!any_lane(active)) break;
-        active &= equal(p.shots, (real)((scalar)sample));
-#if ADAPTIVE
-        // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
-        if (sample > 0 && sample >= s.sampling->min_samples && (sample & 3) == 0) {
-            active &= less((real)(s.sampling->noise), noise_of(&p, s.sampling->transparent));
-        }
-#endif
-        if (*(volatile __constant const int *)&s.sampling->cancelled) return;
-        if (!any_lane(active)) continue;
-        // One sample lies in the middle.
-        real across = R(0.0), below = R(0.0);
-        if (s.sampling->samples > 1) {
-            real u, v;
-            unit_square((bits)((uint)sample), pixel_seed(at.columns, at.rows, (uint)s.sampling->seed, PURPOSE_PIXEL), &u, &v);
-            filter_offset(u, v, s.sampling->filter, (real)(s.sampling->filter_width), &across, &below);
-        }
-        const shot found = sample_shot(&at, across, below, sample, active, w, &cost);
-        pixel_add(&p, found, active, across * across + below * below);
-        hits += pick(active & less(R(0.0), found.coverage), R(1.0), R(0.0));
-#if ADAPTIVE
-        noise_add(&p, found, active);
-#endif
-    }
-    // A shot that was told to end is worth nothing: what the packet had before stays.
-    if (*(volatile __constant const int *)&s.sampling->cancelled) return;
-    pixel_write(s.film + tile * s.channel_count * TILE_PIXELS, s.slots, at.place, &p);
-    if (s.mode & PASS_KEEP) kept_pixel(kept, kept_slots, 1, &p);
+// A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
+typedef struct {
+    int tile, packet;
+    packet_pixels at;
+    __global scalar *kept;
+    __global uint *sums;
+} place_in_pass;
 
-    __global uint *sums = s.statistics + STATISTICS * (tile * (TILE_PIXELS / LANES) + packet);
-    const int add = s.mode & PASS_ADD;
-    sums[STATISTIC_RAYS] = (add ? sums[STATISTIC_RAYS] : 0u) + (uint)lanes_sum(p.shots - shots_before);
-    sums[STATISTIC_HITS] = (add ? sums[STATISTIC_HITS] : 0u) + (uint)lanes_sum(hits);
-    sums[STATISTIC_STEPS] = (add ? sums[STATISTIC_STEPS] : 0u) + (uint)lanes_sum(cost.steps);
-    sums[STATISTIC_ITERATIONS] = (add ? sums[STATISTIC_ITERATIONS] : 0u) + (uint)lanes_sum(cost.count);
-    sums[STATISTIC_BAD_DISTANCES] = (add ? sums[STATISTIC_BAD_DISTANCES] : 0u) + (uint)lanes_sum(cost.bad);
+INLINE place_in_pass place_of_item(pass s, int tile) {
+    const int packet = (int)get_global_id(0) + s.first_packet;
+    const int4 corner = s.places[tile];
+    const place_in_pass here = {tile, packet, packet_at(packet, (int2)(corner.x, corner.y), s.view),
+                                s.kept + corner.z * s.kept_count * TILE_PIXELS + packet * LANES,
+                                s.statistics + STATISTICS * (tile * (TILE_PIXELS / LANES) + packet)};
+    return here;
+}
+
+// What the packet's pixels had before this pass.
+INLINE pixel pixel_before(pass s, const place_in_pass *here) {
+    pixel p = pixel_start();
+    if (s.first > 0) kept_pixel(here->kept, s.slots + CHANNEL_COUNT, 0, &p);
+    return p;
+}
+
+// The pixels that take this sample: one that is done has fewer shots, and one that has more got them before this pass was
+// interrupted.
+INLINE mask sample_wanted(pass s, const packet_pixels *at, const pixel *p, int sample) {
+    mask active = at->in_region & equal(p->shots, (real)((scalar)sample));
+#if ADAPTIVE
+    // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
+    if (sample > 0 && sample >= s.sampling->min_samples && (sample & 3) == 0) {
+        active &= less((real)(s.sampling->noise), noise_of(p, s.sampling->transparent));
+    }
+#endif
+    return active;
+}
+
+// Where in its pixel a sample lies, pixels from the middle. One sample lies in the middle.
+INLINE void sample_offset(pass s, const packet_pixels *at, int sample, real *across, real *below) {
+    *across = *below = R(0.0);
+    if (s.sampling->samples <= 1) return;
+    real u, v;
+    unit_square((bits)((uint)sample), pixel_seed(at->columns, at->rows, (uint)s.sampling->seed, PURPOSE_PIXEL), &u, &v);
+    filter_offset(u, v, s.sampling->filter, (real)(s.sampling->filter_width), across, below);
+}
+
+// Adds one sample to the sums of the packet's pixels; `offset`: its distance squared from the middle, pixels.
+INLINE void sample_add(pixel *p, shot found, mask active, real offset) {
+    pixel_add(p, found, active, offset);
+#if ADAPTIVE
+    noise_add(p, found, active);
+#endif
+}
+
+// Writes what the pixels have so far: means to the film, and sums for a later pass.
+INLINE void pass_write(pass s, const place_in_pass *here, pixel *p) {
+    pixel_write(s.film + here->tile * s.channel_count * TILE_PIXELS, s.slots, here->at.place, p);
+    if (s.mode & PASS_KEEP) kept_pixel(here->kept, s.slots + CHANNEL_COUNT, 1, p);
+}
+
+// Sets the count to which marches add the lanes that wait: once in a launch, unless it continues the one before.
+INLINE void count_waits_from(pass s, const place_in_pass *here) {
+    if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = 0u;
+}
+
+// Counts what the launch has done for the packet, or adds to what was counted.
+INLINE void pass_count(const place_in_pass *here, int add, real shots, real hits, tally cost) {
+    const real counts[STATISTIC_WAITS] = {shots, hits, cost.steps, cost.count, cost.bad};
+    for (int i = 0; i < STATISTIC_WAITS; ++i) here->sums[i] = (add ? here->sums[i] : 0u) + (uint)lanes_sum(counts[i]);
 }

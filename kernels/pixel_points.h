@@ -5,12 +5,11 @@
 // of the pixel's ray, in the pixel's frame: x right, y up, z to the viewer.
 #if POINTS > 1
 typedef struct {
-    mask touched;
-    real touch_t, touch_cone;   // of the shared march, and the pixel's cone there
     bits seed;
+    real cone;                  // the pixel's, where the shared march ended
     real count;                 // points that found the surface
     real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
-    vec point, base, normal;
+    vec point, base, normal;    // base: where it is shaded
     real smooth;
     color tint;                 // sum over the points
 #if GEOMETRIC
@@ -19,81 +18,58 @@ typedef struct {
     vec compass[9];             // corners, edges and middle of the grid, row by row from the top left
     mask compass_found[9];
 #endif
-#if NORMAL == NORMAL_GRADIENT
-    vec normals[POINTS];
-    real weights[POINTS];
-#endif
 } pixel_points;
 
 INLINE int point_of_turn(int turn) { return (turn + POINTS / 2) % POINTS; }
 
-INLINE pixel_points points_begin(const int *columns, const int *rows, int sample, uint seed) {
+// Each sample of a pixel has points of its own.
+INLINE bits points_seed(const packet_pixels *at, int sample, world w) {
+    return pixel_seed(at->columns, at->rows, (uint)w.settings->seed + (uint)sample * 0x9e3779b9u, PURPOSE_POINTS);
+}
+
+INLINE pixel_points points_begin(ray pixel_ray, touch touched, bits seed, world w) {
     pixel_points p;
-    // Each sample of a pixel has points of its own.
-    p.seed = pixel_seed(columns, rows, seed + (uint)sample * 0x9e3779b9u, PURPOSE_POINTS);
+    p.seed = seed;
+    p.cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
+    p.count = R(0.0);
+    p.nearest = (real)(REAL_LARGEST);
+    p.point = pixel_ray.origin;
+    p.base = pixel_ray.origin;
+    p.normal = pixel_ray.direction;
+    p.smooth = R(0.0);
+    p.tint = color_of(R(0.0), R(0.0), R(0.0));
+#if GEOMETRIC
+    p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
+    p.toward = vec_scale(pixel_ray.direction, R(-1.0));
+    const vec side = vec_splat(w.view->side);
+    p.right = vec_normalize(vec_along(side, -vec_dot(side, p.toward), p.toward));
+    p.up = vec_cross(p.toward, p.right);
+    p.sums = plane_none();
+    for (int i = 0; i < TURNS(9); ++i) {
+        p.compass[i] = vec_of(R(0.0), R(0.0), R(0.0));
+        p.compass_found[i] = less(R(1.0), R(0.0));
+    }
+#endif
     return p;
 }
 
-INLINE void points_touched(pixel_points *p, crossing met, ray eye_ray, world w) {
-    p->touched = met.hit;
-    p->touch_t = met.t;
-    p->touch_cone = eye_ray.footprint + eye_ray.spread * met.t;
-    p->count = R(0.0);
-    p->nearest = (real)(REAL_LARGEST);
-    p->point = eye_ray.origin;
-    p->base = eye_ray.origin;
-    p->normal = eye_ray.direction;
-    p->smooth = R(0.0);
-    p->tint = color_of(R(0.0), R(0.0), R(0.0));
-#if GEOMETRIC
-    p->reference = vec_along(eye_ray.origin, met.t, eye_ray.direction);
-    p->toward = vec_scale(eye_ray.direction, R(-1.0));
-    const vec side = vec_splat(w.view->side);
-    p->right = vec_normalize(vec_along(side, -vec_dot(side, p->toward), p->toward));
-    p->up = vec_cross(p->toward, p->right);
-    p->sums = plane_none();
-    for (int i = 0; i < TURNS(9); ++i) {
-        p->compass[i] = vec_of(R(0.0), R(0.0), R(0.0));
-        p->compass_found[i] = met.hit & ~met.hit;
+// Sends a ray for each point, from a little before where the pixel's cone touched on (for the search by steps: from the eye).
+INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed, world w) {
+    const real cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
+    for (int turn = 0; turn < POINTS; ++turn) {
+        real across, below;
+        point_offset(point_of_turn(turn), seed, &across, &below);
+        ray r = camera_ray(a.x + across, a.y + below, a.lens_x, a.lens_y, w.view);
+        r.near = fmax(touched.t - (real)(w.settings->point_start) * cone, R(0.0));
+        r.known = touched.t;
+        send_clipped(s, turn, r, mask_of(touched.touched), w);
     }
-#endif
 }
 
-// The ray of a point, from half a footprint before where the pixel's cone touched on.
-INLINE ray points_ray(pixel_points *p, int turn, real x, real y, real lens_x, real lens_y, world w) {
-    real across, below;
-    point_offset(point_of_turn(turn), p->seed, &across, &below);
-    ray r = camera_ray(x + across, y + below, lens_x, lens_y, w.view);
-#if SEARCH == SEARCH_STEPS
-    r.known = p->touch_t;
-#else
-    r.near = fmax(p->touch_t - R(0.5) * p->touch_cone, R(0.0));
-    r.known = p->touch_t;
-#endif
-    return r;
-}
-
-INLINE void points_add(pixel_points *p, int turn, ray leg, crossing met, vec normal, real smooth, world w) {
-    const mask found = met.hit;
-    const vec point = vec_along(leg.origin, met.t, leg.direction), base = vec_along(leg.origin, met.touch, leg.direction);
-    p->count += pick(found, R(1.0), R(0.0));
-    real across, below;
-    point_offset(point_of_turn(turn), p->seed, &across, &below);
-    const real offset = across * across + below * below;
-    const mask nearer = found & less(offset, p->nearest);
-    p->nearest = pick(nearer, offset, p->nearest);
-    p->point = vec_pick(nearer, point, p->point);
-    p->base = vec_pick(nearer, base, p->base);
-    p->normal = vec_pick(nearer, normal, p->normal);
-    p->smooth = pick(nearer, smooth, p->smooth);
-#if COLORING_PER_POINT
-    const color tint = surface_color(normal, smooth, w.material, w.palette);
-    p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
-#endif
 #if GEOMETRIC
-    const vec offset_in_space = vec_sub(base, p->reference);
-    const vec place = vec_of(vec_dot(offset_in_space, p->right), vec_dot(offset_in_space, p->up),
-                             vec_dot(offset_in_space, p->toward));
+INLINE void points_place(pixel_points *p, int turn, mask found, vec point) {
+    const vec offset = vec_sub(point, p->reference);
+    const vec place = vec_of(vec_dot(offset, p->right), vec_dot(offset, p->up), vec_dot(offset, p->toward));
     p->sums = plane_add(p->sums, found, place);
 #if POINT_PATTERN == PATTERN_GRID && POINT_SIDE % 2 == 1 && POINT_SIDE > 1
     const int column = point_of_turn(turn) % POINT_SIDE, row = point_of_turn(turn) / POINT_SIDE;
@@ -104,10 +80,32 @@ INLINE void points_add(pixel_points *p, int turn, ray leg, crossing met, vec nor
         p->compass_found[at] = found;
     }
 #endif
+}
+#endif
+
+INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, world w) {
+    const mask found = mask_of(met.hit);
+    const vec point = vec_along(r.origin, met.t, r.direction), base = vec_along(r.origin, met.touch, r.direction);
+    p->count += met.hit;
+    real across, below;
+    point_offset(point_of_turn(turn), p->seed, &across, &below);
+    const real offset = across * across + below * below;
+    const mask nearer = found & less(offset, p->nearest);
+    p->nearest = pick(nearer, offset, p->nearest);
+    p->point = vec_pick(nearer, point, p->point);
+    p->base = vec_pick(nearer, base, p->base);
+    p->normal = vec_pick(nearer, met.normal, p->normal);
+    p->smooth = pick(nearer, met.smooth, p->smooth);
+#if COLORING_PER_POINT
+    const color tint = surface_color(met.normal, met.smooth, w.material, w.palette);
+    p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
+#endif
+#if GEOMETRIC
+    points_place(p, turn, found, base);
 #endif
 #if NORMAL == NORMAL_GRADIENT
-    p->normals[turn] = normal;
-    p->weights[turn] = pick(found, R(1.0), R(0.0));
+    const facet f = {vec_pick(found, met.normal, r.direction), met.hit};
+    STATE_KEEP(s, f, STATE_FACET(turn));
 #endif
 }
 
@@ -117,54 +115,62 @@ INLINE vec points_to_space(const pixel_points *p, vec a) {
 }
 #endif
 
-// The spot that stands for the pixel. Where points are missing or lie on a line the normal is made from what is left: by least
-// squares, or else that of the middle one.
-INLINE mask points_spot(const pixel_points *p, ray eye_ray, spot *here, real *coverage, world w) {
-    const mask found = less(R(0.0), p->count);
-    *coverage = p->count * (R(1.0) / (real)(POINTS));
-    const real share = R(1.0) / fmax(p->count, R(1.0));
-    here->point = p->base;
-    here->smooth = p->smooth;
-    here->cone = p->touch_cone;
-    here->tint = color_scale(p->tint, share);
-    here->normal = p->normal;
-    here->residual = R(0.0);
-#if GEOMETRIC
-    mask usable;
-    real residual;
-    const vec plane = points_to_space(p, plane_normal(p->sums, &residual, &usable));
-    here->residual = residual / p->touch_cone;
-#endif
-#if NORMAL == NORMAL_GRADIENT
-    for (int i = 0; i < TURNS(POINTS); ++i) {
-        here->normals[i] = p->normals[i];
-        here->weights[i] = p->weights[i] * share;
-    }
-#else
-#if NORMAL == NORMAL_LEAST_SQUARES
-    here->normal = vec_pick(usable, plane, here->normal);
-#elif NORMAL == NORMAL_ONE_TRIANGLE
-    const vec triangle = triangle_normal(p->compass, p->compass_found, &usable);
-    here->normal = vec_pick(usable, points_to_space(p, triangle), here->normal);
-#else
-    const vec mean = eight_mean(p->compass, p->compass_found, &usable);
-    here->normal = vec_pick(usable, points_to_space(p, mean), here->normal);
-#endif
-    here->normals[0] = here->normal;
-    here->weights[0] = R(1.0);
 #if NORMAL == NORMAL_EIGHT_TRIANGLES_SHADING
+// Keeps the normals of the triangles whose points have all been found, or `instead` where there is none.
+INLINE void points_triangles(stage s, const pixel_points *p, vec instead) {
     vec around[8];
     mask whole[8];
     eight_normals(p->compass, p->compass_found, around, whole);
     real number = R(0.0);
-    for (int i = 0; i < TURNS(8); ++i) number += pick(whole[i], R(1.0), R(0.0));
+    for (int i = 0; i < TURNS(8); ++i) number += number_of(whole[i]);
     const mask some = less(R(0.0), number);
     for (int i = 0; i < TURNS(8); ++i) {
-        here->normals[i] = vec_pick(whole[i], points_to_space(p, around[i]), here->normal);
-        here->weights[i] = pick(some, pick(whole[i], R(1.0) / number, R(0.0)), R(0.125));
+        const facet f = {vec_pick(whole[i], points_to_space(p, around[i]), instead),
+                         pick(some, pick(whole[i], R(1.0) / number, R(0.0)), R(0.125))};
+        STATE_KEEP(s, f, STATE_FACET(i));
     }
+}
 #endif
+
+// The spot that stands for the pixel. Where points are missing or lie on a line the normal is made from what is left: by least
+// squares, or else that of the middle one.
+INLINE spot points_spot(stage s, const pixel_points *p, world w) {
+    const real share = R(1.0) / fmax(p->count, R(1.0));
+    spot here;
+    here.found = number_of(less(R(0.0), p->count));
+    here.point = p->base;
+    here.seen = p->point;
+    here.smooth = p->smooth;
+    here.cone = p->cone;
+    here.tint = color_scale(p->tint, share);
+    here.normal = p->normal;
+    here.residual = R(0.0);
+    here.quantity = R(0.0);
+#if GEOMETRIC
+    mask usable;
+    real residual;
+    const vec plane = points_to_space(p, plane_normal(p->sums, &residual, &usable));
+    here.residual = residual / p->cone;
 #endif
-    return found;
+#if NORMAL == NORMAL_LEAST_SQUARES
+    here.normal = vec_pick(usable, plane, here.normal);
+#elif NORMAL == NORMAL_ONE_TRIANGLE
+    const vec triangle = triangle_normal(p->compass, p->compass_found, &usable);
+    here.normal = vec_pick(usable, points_to_space(p, triangle), here.normal);
+#elif NORMAL != NORMAL_GRADIENT
+    const vec mean = eight_mean(p->compass, p->compass_found, &usable);
+    here.normal = vec_pick(usable, points_to_space(p, mean), here.normal);
+#endif
+#if NORMAL == NORMAL_GRADIENT
+    for (int i = 0; i < POINTS; ++i) {
+        facet f;
+        STATE_RECALL(s, f, STATE_FACET(i));
+        f.weight *= share;
+        STATE_KEEP(s, f, STATE_FACET(i));
+    }
+#elif NORMAL == NORMAL_EIGHT_TRIANGLES_SHADING
+    points_triangles(s, p, here.normal);
+#endif
+    return here;
 }
 #endif

@@ -1,7 +1,8 @@
 #include "camera.h"
 
 // A march by the Jacobian already knows the surface's normal when it arrives.
-#define MARCH_KEEPS_SURFACE (SEARCH == SEARCH_DISTANCE && !HAS_DERIVATIVE && !POLISH)
+// Not on one lane: six more numbers would cost a GPU more than to look once more at the end.
+#define MARCH_KEEPS_SURFACE (SEARCH == SEARCH_DISTANCE && !HAS_DERIVATIVE && !POLISH && LANES > 1)
 
 // The result of a march.
 typedef struct {

@@ -9,12 +9,12 @@ INLINE color limited(color c, __constant const struct March *settings) {
 
 #if HAS_SOFT_LIGHT
 // The direction to the part of a light that this ray goes to; `toward` is the direction to its middle.
-INLINE vec soft_light(vec toward, __constant const struct Light *light, int light_index, int turn, int sample,
-                      const int *columns, const int *rows, int bounce, world w) {
-    const bits seed = pixel_seed(columns, rows, (uint)w.settings->seed,
-                                 (uint)(PURPOSE_LIGHT + 16 * (1 + light_index + 64 * bounce)));
+INLINE vec soft_light(stage s, const packet_pixels *at, vec toward, int light_index, int turn, world w) {
+    __constant const struct Light *light = w.lights + light_index;
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed,
+                                 (uint)(PURPOSE_LIGHT + 16 * (1 + light_index + 64 * s.bounce)));
     real u, v;
-    unit_square((bits)((uint)(sample * light->rays + turn)), seed, &u, &v);
+    unit_square((bits)((uint)(s.sample * light->rays + turn)), seed, &u, &v);
     return cone_direction(toward, (real)(light->spread), u, v);
 }
 #endif
@@ -23,14 +23,14 @@ INLINE vec soft_light(vec toward, __constant const struct Light *light, int ligh
 // Ray `turn` of the hemisphere over a spot: the first `cosine_rays` are spread like the cosine, the others like the
 // environment's brightness. `strength` is the weight of what it brings, cosine / pi over the density of both kinds together
 // (the balance heuristic, Veach and Guibas 1995).
-INLINE incidence ambient_ray(const spot *here, int turn, int sample, const int *columns, const int *rows, int bounce, world w) {
+INLINE incidence ambient_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w) {
     const int by_cosine = turn < w.settings->cosine_rays;
     const int number = by_cosine ? w.settings->cosine_rays : w.settings->map_rays;
     const int place = by_cosine ? turn : turn - w.settings->cosine_rays;
-    const bits seed = pixel_seed(columns, rows, (uint)w.settings->seed,
-                                 (uint)((by_cosine ? PURPOSE_AMBIENT : PURPOSE_ENVIRONMENT) + 16 * bounce));
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed,
+                                 (uint)((by_cosine ? PURPOSE_AMBIENT : PURPOSE_ENVIRONMENT) + 16 * s.bounce));
     real u, v;
-    unit_square((bits)((uint)(sample * number + place)), seed, &u, &v);
+    unit_square((bits)((uint)(s.sample * number + place)), seed, &u, &v);
     incidence in;
     in.distance = (real)(w.settings->ambient_far);
     in.strength = R(0.0);
@@ -51,18 +51,74 @@ INLINE incidence ambient_ray(const spot *here, int turn, int sample, const int *
     return in;
 }
 
+// Where the weight of what a ray brings is kept, beside the ray.
+INLINE __global scalar *ambient_strength(stage s, int turn) {
+    return s.q.rays + RAY_STRENGTH * s.q.stride + turn * s.q.wave + s.slot;
+}
+
 // The light that the ray brings from the environment; the ray also counts towards the open part of the hemisphere.
-INLINE color ambient_light(const spot *here, int turn, incidence in, crossing met, world w, real *open) {
+INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, world w, real *open) {
     if (turn < w.settings->cosine_rays) {
-        const mask near = met.hit & less(met.t, (real)(w.settings->occlusion_distance));
+        const mask near = mask_of(met.hit) & less(met.t, (real)(w.settings->occlusion_distance));
         *open += pick(near, R(0.0), (real)(w.settings->occlusion_share));
     }
 #if HAS_ENVIRONMENT
-    const color bright = environment_color(in.toward, w.material, w.environment);
-    const real share = pick(met.hit, R(0.0), in.strength * (real)(w.material->diffuse));
+    const real strength = lanes_load(ambient_strength(s, turn));
+    const color bright = environment_color(queue_ray(s.q, turn, s.slot).direction, w.material, w.environment);
+    const real share = pick(mask_of(met.hit), R(0.0), strength * (real)(w.material->diffuse));
     return color_of(bright.r * here->tint.r * share, bright.g * here->tint.g * share, bright.b * here->tint.b * share);
 #else
     return color_of(R(0.0), R(0.0), R(0.0));
 #endif
 }
 #endif
+
+// The turns of the rays that leave a spot: first those into the hemisphere, then each light's.
+INLINE int hemisphere_turns(world w) { return w.settings->cosine_rays + w.settings->map_rays; }
+
+// The direction that a ray of this turn takes, and whether anything may be in its way; false for turns that a light does not need.
+INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w, incidence *in, mask *wanted) {
+#if HAS_AMBIENT
+    if (turn < hemisphere_turns(w)) {
+        *in = ambient_ray(s, at, here, turn, w);
+        return 1;
+    }
+#endif
+    const int light_index = (turn - hemisphere_turns(w)) / w.settings->light_rays;
+    const int ray_of_light = (turn - hemisphere_turns(w)) % w.settings->light_rays;
+    __constant const struct Light *light = w.lights + light_index;
+    if (ray_of_light >= light->rays) return 0;
+    *in = light_at(light, here->point);
+#if HAS_SOFT_LIGHT
+    in->toward = soft_light(s, at, in->toward, light_index, ray_of_light, w);
+#endif
+    if (!light->shadow) *wanted &= ~*wanted;
+    return 1;
+}
+
+// Sends all rays that leave a spot for its light.
+INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, int turns, world w) {
+    const mask found = mask_of(here->found);
+    for (int turn = 0; turn < turns; ++turn) {
+        incidence in;
+        mask wanted = found;
+        if (!any_lane(found) || !turn_ray(s, at, here, turn, w, &in, &wanted)) {
+            queue_skip(s.q, turn, s.slot);
+            continue;
+        }
+        wanted &= faces(s, here, in.toward);
+        ray r;
+        // Leave the surface far enough for the ray not to meet the very bump it starts from.
+        r.origin = vec_along(here->point, here->cone * (real)(w.settings->shadow_lift), here->normal);
+        r.direction = in.toward;
+        r.near = R(0.0);
+        r.far = in.distance;
+        r.footprint = here->cone * (real)(w.settings->shadow_detail);
+        r.spread = R(0.0);
+        r.known = RAY_NOTHING_KNOWN;
+        send_clipped(s, turn, r, wanted, w);
+#if HAS_ENVIRONMENT
+        if (turn < hemisphere_turns(w)) lanes_store(in.strength, ambient_strength(s, turn));
+#endif
+    }
+}

@@ -1,59 +1,135 @@
-// Entry point of the surface renderer: shaded pixels, with all data channels.
-
+// Entry points of the surface renderer that know no formula: the stages between marches. Compiled once for each set of features.
 #include "lanes.h"
 #include "numbers/real.h"
-#include "numbers/dual.h"
 #include "vectors.h"
 #include "structs.h"
-#include "formula.h"
-#include "orbit.h"
-#include "rays.h"
-#if SEARCH == SEARCH_STEPS
-#include "march_steps.h"
-#else
-#include "march_state.h"
-#include "proof.h"
-#include "march.h"
-#endif
-#include "batch.h"
+#include "camera.h"
 #include "sampling.h"
 #include "shade.h"
 #include "tiles.h"
 #include "pixel.h"
 #include "normals.h"
-#include "coloring.h"
 #if HAS_ENVIRONMENT
 #include "environment.h"
 #endif
-#if PLANES > 0
-#include "escape.h"
-#include "escape_colors.h"
 #include "planes.h"
-#endif
+#include "stage.h"
+#include "state.h"
+#include "eye.h"
 #include "spot.h"
 #include "pixel_points.h"
 #include "secondary.h"
-#include "shot.h"
+#include "lit.h"
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
-    return take_shot(at->x + across, at->y + below, sample, at->columns, at->rows, active, w, cost);
+// Sends the rays from the eye. With several points to the pixel the ray only finds out how far the pixel's whole cone is free.
+__kernel void begin_shots(STAGE_ARGUMENTS) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const place_in_pass here = place_of_item(s.span, s.tile);
+    const pixel p = sums_before(s, &here);
+    const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
+    numbers_keep((const real *)&a, AIM_NUMBERS, s.state + STATE_AIM * s.stride, s.stride);
+    if (sample == first) count_waits_from(s.span, &here);
+    ray r = eye_ray(a, w);
+    r.footprint *= (real)(w.settings->touch_share);
+    r.spread *= (real)(w.settings->touch_share);
+    send_clipped(s, 0, r, mask_of(a.wanted), w);
 }
 
-#include "passes.h"
+#if POINTS > 1
+// Sends the rays of a pixel's points, from where its cone touched.
+__kernel void send_points(STAGE_ARGUMENTS) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const place_in_pass here = place_of_item(s.span, s.tile);
+    const aim a = aim_kept(s.state, s.stride);
+    const encounter end_of_cone = queue_met(s.q, 0, s.slot);
+    tally cost = {R(0.0), R(0.0), R(0.0)};
+    tally_met(&cost, end_of_cone, 0);
+    cost.bad += end_of_cone.bad;
+    const touch touched = {end_of_cone.hit, end_of_cone.t};
+    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, touched, STATE_TOUCH);
+    points_send(s, a, touched, eye_ray(a, w), points_seed(&here.at, sample, w), w);
+}
 
-__kernel void surface(PASS_BUFFERS, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                      __constant const scalar *k, __constant const struct Material *material,
-                      __constant const struct Light *lights, __global const float *palette,
-                      __global const float *environment,
-#if PLANES > 0
-                      __global const struct CutPlane *planes, __global const float *plane_palettes,
+// The spot of a pixel with several points.
+INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, sighting *first, tally *cost, world w) {
+    touch touched;
+    STATE_RECALL(s, touched, STATE_TOUCH);
+    STATE_RECALL(s, *cost, STATE_TALLY);
+    first->steps = cost->steps;
+    pixel_points points = points_begin(pixel_ray, touched, points_seed(at, s.sample, w), w);
+    for (int turn = 0; turn < POINTS; ++turn) {
+        const encounter met = queue_met(s.q, turn, s.slot);
+        tally_met(cost, met, 1);
+        first->steps += met.steps;
+        points_add(s, &points, turn, queue_ray(s.q, turn, s.slot), met, w);
+    }
+    first->coverage = points.count * (R(1.0) / (real)(POINTS));
+    return points_spot(s, &points, w);
+}
 #endif
-                      PASS_SPAN) {
-#if PLANES > 0
-    const world w = {view, settings, orbit, k, material, lights, palette, environment, {planes, orbit, k, plane_palettes}};
-#else
-    const world w = {view, settings, orbit, k, material, lights, palette, environment};
+
+// Makes spots of what the rays along the path have met, and sends the rays that bring their light.
+__kernel void find_spots(STAGE_ARGUMENTS) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const place_in_pass here = place_of_item(s.span, s.tile);
+    const aim a = aim_kept(s.state, s.stride);
+    path so_far;
+    const ray r = path_ray(s, a, &so_far, w);
+    tally cost = {R(0.0), R(0.0), R(0.0)};
+    sighting at_first;
+    spot found;
+#if POINTS > 1
+    if (bounce == 0) {
+        found = spot_of_points(s, &here.at, r, &at_first, &cost, w);
+    } else
 #endif
-    const pass span = PASS;
-    render_packet(span, w);
+    {
+        const encounter met = queue_met(s.q, 0, s.slot);
+        if (bounce > 0) STATE_RECALL(s, cost, STATE_TALLY);
+        tally_met(&cost, met, 1);
+        at_first.coverage = met.hit;
+        at_first.steps = met.steps;
+        found = spot_of_ray(r, met, w);
+    }
+    if (bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
+    STATE_KEEP(s, cost, STATE_TALLY);
+    found.found = pick(mask_of(so_far.on_path), found.found, R(0.0));
+    if (COLORING == COLORING_RESIDUAL) found.quantity = found.residual;
+    spot_keep(&found, s.state, bounce, s.stride);
+    send_for_light(s, &here.at, &found, next_turns, w);
+}
+
+// Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
+__kernel void light_spots(STAGE_ARGUMENTS) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const aim a = aim_kept(s.state, s.stride);
+    spot found = spot_kept(s.state, bounce, s.stride);
+    tally cost;
+    STATE_RECALL(s, cost, STATE_TALLY);
+    path so_far;
+    const vec direction = path_ray(s, a, &so_far, w).direction;
+    color gathered = color_of(R(0.0), R(0.0), R(0.0));
+    if (any_lane(mask_of(found.found))) {
+#if !COLORING_PER_POINT
+        found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
+#endif
+        gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
+    }
+    const int last = bounce == settings->bounces;
+    path_add(s, &so_far, direction, a.y, &found, gathered, last, w);
+    if (!last) {
+        STATE_KEEP(s, cost, STATE_TALLY);
+        path_mirror(s, &so_far, direction, eye_ray(a, w), &found, w);
+        return;
+    }
+    end_shots(s, a, so_far.seen, &found, cost, w);
 }

@@ -23,6 +23,7 @@
 #include "escape.h"
 #include "escape_colors.h"
 #include "planes.h"
+#include "planes_seen.h"
 #endif
 
 #if VALUE_IS_FLOAT
@@ -44,7 +45,7 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     return take_shot(at->x + across, at->y + below, lens_x, lens_y, active, w, &cost->steps);
 }
 
-#include "passes.h"
+#include "packets.h"
 
 __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __constant const struct Grid *about,
                      __constant const struct Material *material, __constant const struct Light *lights,

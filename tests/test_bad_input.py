@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from clfractal.device import program, select
-from clfractal.device.source import FlatText
 from clfractal.renderers import surface
+from clfractal.renderers.kernel import ProgramText
 from tests.files.limits import file_size_limit
 from tests.shell import SCENE, InProcess, command, environment
 
@@ -329,13 +329,18 @@ def test_a_device_with_too_little_memory(
 
 
 def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    text = surface.program_text
+    texts = surface.program_texts
 
-    def broken(*arguments: object) -> FlatText:
-        flat = text(*arguments)  # type: ignore[arg-type]
-        return replace(flat, text=flat.text.replace("kernel void surface", "kernel vod surface"))
+    def broken(*arguments: object) -> list[ProgramText]:
+        def changed(text: str) -> str:
+            return text.replace("kernel void find_spots", "kernel vod find_spots")
 
-    monkeypatch.setattr(surface, "program_text", broken)
+        return [
+            replace(each, flat=replace(each.flat, text=changed(each.flat.text)))
+            for each in texts(*arguments)  # type: ignore[arg-type]
+        ]
+
+    monkeypatch.setattr(surface, "program_texts", broken)
     # However slow the machine is: a line about a long compilation is not what is tested.
     monkeypatch.setattr(program, "_REMARK_SECONDS", 600.0)
     ended = shell("render", "scene.yaml", "-o", "old.png")
@@ -364,7 +369,7 @@ def test_a_mistake_of_ours_is_one_line_too(
     def fails(*_arguments: object) -> None:
         raise IndexError("of an array\nwith two lines")
 
-    monkeypatch.setattr(surface, "program_text", fails)
+    monkeypatch.setattr(surface, "program_texts", fails)
     ended = shell("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "internal error", "IndexError: of an array with two lines")
     assert "Traceback" in shell("render", "scene.yaml", "-o", "old.png", "--verbose").err

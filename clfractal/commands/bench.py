@@ -98,7 +98,8 @@ class Row:
     """One line of the table. Times in milliseconds, medians; `ms` is the device's own time where there is one.
 
     Rays are camera rays: one for each sample of a pixel. Steps and iterations also include the rays that follow from
-    these: points, rays to the lights and into the hemisphere.
+    these: points, rays to the lights and into the hemisphere. `waiting` is the part of a packet's lanes that had no ray
+    while others marched.
     """
 
     name: str
@@ -107,6 +108,7 @@ class Row:
     rays_per_s: float | None = None
     iterations_per_s: float | None = None
     steps_per_ray: float | None = None
+    waiting: float | None = None
     fma_share: float | None = None
     lanes: int | None = None
 
@@ -163,13 +165,15 @@ def table(report: Mapping[str, Any]) -> list[str]:
     """The report as lines of text."""
     lines = [
         f"{report['device']}; {report['platform']}; FMA peak {report['peak_gflops_float32']:.0f} GFLOP/s",
-        f"{'row':24} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'of peak':>8} {'lanes':>5}",
+        f"{'row':24} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'waiting':>8} "
+        f"{'of peak':>8} {'lanes':>5}",
     ]
     for row in report["rows"]:
         cells = [
             _cell(row["rays_per_s"], 8, 2, 1e-6),
             _cell(row["iterations_per_s"], 8, 1, 1e-6),
             _cell(row["steps_per_ray"], 9, 2),
+            _cell(row["waiting"], 7, 1, 100.0, "%"),
             _cell(row["fma_share"], 7, 1, 100.0, "%"),
             _cell(row["lanes"], 5, 0),
         ]
@@ -199,6 +203,7 @@ def _render_row(name: str, scene: Scene, device: Device, peak: float, repetition
         rays_per_s=1e3 * state.rays / kernel_ms,
         iterations_per_s=1e3 * state.iterations / kernel_ms,
         steps_per_ray=state.steps_per_ray,
+        waiting=state.waiting if job.scene.renderer.type == "surface" and job.lanes > 1 else None,
         fma_share=operations / (1e-3 * kernel_ms) / (1e9 * peak),
         lanes=job.lanes,
     )

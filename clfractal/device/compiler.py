@@ -149,8 +149,8 @@ def compile_job(request: Mapping[str, Any]) -> str | None:
         program = compile_source(device, request["text"], request["flags"])
     except BuildFailureError as failure:
         return str(failure)
-    if request["warm"] is not None:
-        warm_up(device, program, Warm.from_data(request["warm"]))
+    for launch in request["warm"]:
+        warm_up(device, program, Warm.from_data(launch))
     (Path(request["folder"]) / BINARY).write_bytes(binary_of(device, program))
     return None
 

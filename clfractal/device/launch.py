@@ -37,11 +37,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Part(Generic[T]):
-    """A launch that is under way: its event, its amount of work, and data that the caller gets back with it."""
+    """A launch that is under way: its event, its amount of work, and data that the caller gets back with it.
+
+    Of a launch of several kernels `begun` is the event of the first one, and `event` that of the last one.
+    """
 
     event: cl.Event
     amount: float
     about: T
+    begun: cl.Event | None = None
 
 
 @dataclass(slots=True)
@@ -78,8 +82,15 @@ class Pace:
         self.size = float(np.clip(rate * self.seconds, self.least, largest))
 
 
-def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None = None) -> float:
-    """Waits for a launch in short sleeps, so that an interrupt is seen; gives its milliseconds on the device.
+def wait(
+    event: cl.Event,
+    device: Device,
+    doing: str,
+    token: CancelToken | None = None,
+    begun: cl.Event | None = None,
+) -> float:
+    """Waits for a launch in short sleeps, so that an interrupt is seen; gives its milliseconds on the device, from where
+    `begun` began if it is given.
 
     Raises:
         DeviceError: the launch failed.
@@ -87,7 +98,7 @@ def wait(event: cl.Event, device: Device, doing: str, token: CancelToken | None 
     """
     wait_for_copy(event, device, doing, token)
     with device.failures(doing):
-        return float(event.profile.end - event.profile.start) * 1e-6
+        return float(event.profile.end - (begun or event).profile.start) * 1e-6
 
 
 def wait_for_copy(event: cl.Event, device: Device, doing: str, token: CancelToken | None = None) -> None:
@@ -155,7 +166,7 @@ def in_launches(
         try:
             fill()
             while flying:
-                milliseconds = wait(flying[0].event, device, doing, token)
+                milliseconds = wait(flying[0].event, device, doing, token, flying[0].begun)
                 part = flying.popleft()
                 pace.learn(part.amount, milliseconds)
                 # Before the caller reads what is finished: the device must not wait for that.

@@ -22,7 +22,7 @@ from clfractal.device.structs import Precision
 BUILD_TIMEOUT_S = 600.0
 
 _REMARK_SECONDS = 1.5  # longer than a failing build takes, so that no remark precedes an error
-_FORMAT = 3  # of what is kept under a key
+_FORMAT = 4  # of what is kept under a key
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ def build(
     *,
     flags: Sequence[str],
     sources: SourceMap | None = None,
-    warm: Warm | None = None,
+    warm: Sequence[Warm] = (),
     isolated: bool = True,
     on_compile: Callable[[str], None] | None = None,
     stopped: Callable[[], bool] | None = None,
@@ -75,7 +75,7 @@ def build(
         text: the whole program, with `#line` directives (see `source.flatten`).
         flags: all compiler flags (see `math_flags`).
         sources: the texts that the `#line` directives name, for messages.
-        warm: a first launch to perform before the binary is kept, so that later runs start at once.
+        warm: first launches to perform before the binary is kept, so that later runs start at once.
         isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
             an interrupt is answered at once.
         on_compile: called with a message, from another thread, if compiling takes more than a moment.
@@ -111,7 +111,7 @@ def _built(
     key: str,
     text: str,
     flags: Sequence[str],
-    warm: Warm | None,
+    warm: Sequence[Warm],
     isolated: bool,
     on_compile: Callable[[str], None] | None,
     stopped: Callable[[], bool] | None,
@@ -145,7 +145,7 @@ def _compile(
     device: Device,
     text: str,
     flags: Sequence[str],
-    warm: Warm | None,
+    warm: Sequence[Warm],
     *,
     isolated: bool,
     stopped: Callable[[], bool] | None,
@@ -158,8 +158,8 @@ def _compile(
             return program, binary
         # A driver without binaries (or that cannot read its own): the child has shown that compiling is safe.
     program = compiler.compile_source(device, text, flags)
-    if warm is not None:
-        compiler.warm_up(device, program, warm)
+    for launch in warm:
+        compiler.warm_up(device, program, launch)
     return program, compiler.binary_of(device, program)
 
 
@@ -167,10 +167,10 @@ def _compile_in_child(
     device: Device,
     text: str,
     flags: Sequence[str],
-    warm: Warm | None,
+    warm: Sequence[Warm],
     stopped: Callable[[], bool] | None,
 ) -> bytes:
-    request = {"text": text, "flags": list(flags), "warm": None if warm is None else warm.as_data()}
+    request = {"text": text, "flags": list(flags), "warm": [launch.as_data() for launch in warm]}
 
     def attempt(folder: str) -> str | None:
         failure: str | None = isolate.run(
@@ -195,12 +195,12 @@ def _compile_in_child(
         return (Path(temporary) / compiler.BINARY).read_bytes()
 
 
-def _key(device: Device, text: str, flags: Sequence[str], warm: Warm | None) -> str:
-    # Of the first launch only what the driver generates code for: its arguments' values change from scene to
+def _key(device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]) -> str:
+    # Of the first launches only what the driver generates code for: its arguments' values change from scene to
     # scene.
-    launch = (warm.kernel, warm.local_size) if warm is not None else None
+    launches = [(launch.kernel, launch.local_size) for launch in warm]
     digest = hashlib.sha256(text.encode()).hexdigest()
-    return cache.key_of(_FORMAT, device.info.key, list(flags), launch, digest)
+    return cache.key_of(_FORMAT, device.info.key, list(flags), launches, digest)
 
 
 def _milliseconds(start: float) -> float:

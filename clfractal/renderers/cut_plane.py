@@ -14,7 +14,7 @@ from clfractal.renderers.escape_colors import (
     escape_defines,
     escape_palette,
 )
-from clfractal.renderers.kernel import KernelArgument, TileKernel, flat_text
+from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import VIEW
@@ -58,8 +58,8 @@ class CutPlaneKernel(TileKernel):
     def has_alpha(self) -> bool:
         return False
 
-    def text(self) -> FlatText:
-        return program_text(self.scene, self.plan)
+    def texts(self) -> list[ProgramText]:
+        return [ProgramText(self.name, program_text(self.scene, self.plan), (self.name,))]
 
     def own_arguments(self) -> list[KernelArgument]:
         scene, precision = self.scene, self.precision

@@ -1,14 +1,15 @@
-"""A renderer of tiles: turns a planned view into the text of a program and the program's data.
+"""A renderer of tiles: turns a planned view into the texts of programs, their data, and the order of their kernels.
 
 `kernels/passes.h` has what all their kernels have in common. A renderer does not decide
-how its kernel is launched, or where the results go.
+how many pixels a launch has, or where the results go.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any, ClassVar, TypeAlias
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy.typing as npt
 import pyopencl as cl
@@ -23,13 +24,59 @@ from clfractal.renderers.resources import Resources
 KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 
 
-class TileKernel(ABC):
-    """A kernel that renders tiles of one view. Nothing is compiled or uploaded here.
+# Numbers of a sent ray, and of what it met (`kernels/queue.h`).
+RAY_NUMBERS, MET_NUMBERS = 12, 16
+# Numbers between two columns of what is kept between stages: a power of 2 apart, all would lie in one place of a cache.
+STATE_PADDING = 80
+WAVE_NUMBERS = ("first_tile", "wave", "queue_stride", "turns", "slice")
+"""Arguments of a stage's kernel that follow from the launch, after those that every kernel has."""
+STAGE_NUMBERS = ("next_turns", "goal", "bounce", "sample")
+"""The last arguments of a stage's kernel, in the order of `kernels/arguments.h`."""
 
-    The text follows from the formula, the scene and the plan's number type and lanes, so that every executor uses the same.
+
+@dataclass(frozen=True, slots=True)
+class ProgramText:
+    """The whole text of a program, what it is for, and the names of its kernels that are launched."""
+
+    name: str
+    flat: FlatText
+    kernels: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One kernel of a launch.
+
+    Attributes:
+        kernel: its name.
+        over: what each work-item does: a packet of pixels; some rays of the queue; a packet of rays.
+        turns: rays of each pixel in the queue that it reads.
+        numbers: its last arguments, see `STAGE_NUMBERS`; 0 where they are missing.
+    """
+
+    kernel: str
+    over: Literal["pixels", "rays", "packets of rays"] = "pixels"
+    turns: int = 0
+    numbers: Mapping[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class WaveNeeds:
+    """What is kept of each pixel of a launch while it goes from stage to stage: numbers of its state, and rays."""
+
+    state: int
+    turns: int
+
+
+class TileKernel(ABC):
+    """The kernels that render tiles of one view, all with the same arguments. Nothing is compiled or uploaded here.
+
+    The texts follow from the formula, the scene and the plan's number type and lanes, so that every executor uses the same.
     """
 
     name: ClassVar[str]
+    waves: ClassVar[bool] = False
+    """Whether pixels go from stage to stage: then the kernels have the arguments of stages, too (`kernels/arguments.h`)."""
 
     def __init__(self, view: PlannedView, resources: Resources) -> None:
         self.view, self.resources = view, resources
@@ -41,8 +88,16 @@ class TileKernel(ABC):
         return self.plan.precision
 
     @abstractmethod
-    def text(self) -> FlatText:
-        """The whole text of the program."""
+    def texts(self) -> list[ProgramText]:
+        """The programs."""
+
+    def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
+        """The kernels of a launch, in order, for samples from the first up to the second."""
+        yield Stage(self.name)
+
+    def wave_needs(self) -> WaveNeeds:
+        """What pixels need between stages."""
+        return WaveNeeds(0, 0)
 
     @abstractmethod
     def own_arguments(self) -> list[KernelArgument]:

@@ -49,10 +49,15 @@ def all_planes(scene: Scene) -> Iterator[tuple[CutPlane, Placed]]:
             yield plane, moved(plane.plane.placed, normal=number * plane.spacing)
 
 
+def plane_count(scene: Scene) -> int:
+    """How many planes stand in the picture."""
+    return sum(1 for _ in all_planes(scene))
+
+
 def plane_defines(scene: Scene) -> dict[str, object]:
     """What the text of `kernels/planes.h` depends on."""
     return {
-        "PLANES": sum(1 for _ in all_planes(scene)),
+        "PLANES": plane_count(scene),
         "ESCAPE_COLORS": "__global const struct CutPlane",
         **escape_defines(scene.chain),
     }

@@ -57,6 +57,12 @@ MARCH = Struct(
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
         Field("step", "real", 0, "step of the search by steps, scene units"),
         Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
+        Field(
+            "point_start",
+            "real",
+            0,
+            "how far before that march's end the points' marches begin, in footprints",
+        ),
         Field("known_reach", "real", 0, "how far a proved hit proves its neighbours', in a point's cones"),
         Field("seed", "uint", 0, "chooses the places of points and rays"),
         Field("bounces", "int", 0, "most mirror reflections"),
@@ -137,6 +143,8 @@ NEAR, NEAR_LEAST = 2.2, 0.6
 TOUCH = 0.75
 # In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
 KNOWN_REACH = 4.0
+# In footprints: how far before the end of their pixel's march the points begin.
+POINT_START = 0.5
 # Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
 EXTRA_TESTS = 64
 
@@ -217,12 +225,18 @@ def march_record(scene: Scene, precision: Precision) -> Record:
         "shadow_detail": SHADOW_DETAIL,
         "max_steps": renderer.max_steps,
         "step": renderer.step if renderer.step is not None else radius / 100,
-        "touch_share": max(TOUCH / renderer.detail, 1 / math.sqrt(renderer.used_points.count)),
+        "touch_share": (
+            max(TOUCH / renderer.detail, 1 / math.sqrt(renderer.used_points.count))
+            if renderer.used_points.count > 1
+            else 1.0
+        ),
+        # The search by steps begins at the eye, and goes both ways from the touch.
+        "point_start": POINT_START if renderer.search == "distance" else largest,
         "known_reach": KNOWN_REACH / renderer.detail,
         "seed": renderer.seed,
-        "bounces": renderer.bounces if scene.material.reflection > 0 else 0,
+        "bounces": bounces(scene),
         "light_count": len(scene.lights),
-        "light_rays": max((light.used_rays for light in scene.lights), default=1),
+        "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
         "map_rays": rays.map,
         "ambient_far": distance if not rays.lit else largest,
@@ -231,6 +245,16 @@ def march_record(scene: Scene, precision: Precision) -> Record:
         "firefly_limit": min(limit, largest),
     }
     return MARCH.value(precision, values)
+
+
+def bounces(scene: Scene) -> int:
+    """Most mirror reflections of a path."""
+    return scene.surface.bounces if scene.material.reflection > 0 else 0
+
+
+def light_rays(scene: Scene) -> int:
+    """Most shadow rays of a shot that a light has."""
+    return max((light.used_rays for light in scene.lights), default=1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,20 +1,36 @@
-"""The surface renderer: its program, and the program's data."""
+"""The surface renderer: its programs, and their data."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.source import FlatText
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
-from clfractal.renderers.kernel import KernelArgument, TileKernel, flat_text
+from clfractal.renderers.kernel import (
+    STATE_PADDING,
+    KernelArgument,
+    ProgramText,
+    Stage,
+    TileKernel,
+    WaveNeeds,
+    flat_text,
+)
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
-from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
+from clfractal.renderers.planes import (
+    CUT_PLANE,
+    plane_count,
+    plane_defines,
+    plane_orbits,
+    plane_palettes,
+    plane_records,
+)
+from clfractal.renderers.waves import asks_formula, march_kernels, most_turns, surface_stages
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -31,49 +47,89 @@ TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 4
+# Numbers of a pixel in `kernels/state.h`, without its normals.
+STATE_NUMBERS = 111
 
 Floats = npt.NDArray[np.float32]
 
 
-def defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """The defines that determine the program's text, besides the formula."""
+def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """How the surface is searched, as far as the text of `kernels/march.cl` depends on it."""
+    renderer = scene.surface
     return {
         **pass_defines(plan),
-        "PALETTE_SIZE": PALETTE_SIZE,
-        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
-        **feature_defines(scene),
-        **coloring_defines(scene.coloring),
-        **plane_defines(scene),
-    }
-
-
-def feature_defines(scene: Scene) -> dict[str, object]:
-    """How the surface is searched and shaded, as far as the program's text depends on it."""
-    renderer = scene.surface
-    points = renderer.used_points
-    normal_counts = {"gradient": points.count, "eight_triangles_shading": 8}
-    positions = points.count > 1 and (renderer.normal != "gradient" or scene.coloring.by == "residual")
-    rays = records.hemisphere_rays(scene)
-    return {
         "SEARCH_DISTANCE": 0,
         "SEARCH_STEPS": 1,
         "SEARCH": int(renderer.search == "steps"),
+        "POINTS": several_points(scene),
+        # A binary search ends where the surface is; a march, somewhere within the point's footprint.
+        "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
+        "HAS_LENS": 0,
+    }
+
+
+def several_points(scene: Scene) -> int:
+    """2 if a pixel has several points, for programs that need not know how many."""
+    return min(scene.surface.used_points.count, 2)
+
+
+def uses_positions(scene: Scene) -> bool:
+    """Whether normals or colours are made from the places of a pixel's points."""
+    renderer = scene.surface
+    return renderer.used_points.count > 1 and (
+        renderer.normal != "gradient" or scene.coloring.by == "residual"
+    )
+
+
+def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """What is done with what the search finds, as far as the text of `kernels/surface.cl` depends on it."""
+    renderer = scene.surface
+    points = renderer.used_points
+    rays = records.hemisphere_rays(scene)
+    return {
+        **state_defines(scene, plan),
+        **coloring_defines(scene.coloring),
+        "NORMAL_COUNT": normal_count(scene),
         "POINTS": points.count,
         "POINT_PATTERN": int(points.pattern == "stochastic"),
         "POINT_SIDE": math.isqrt(points.count),
         **{f"NORMAL_{name.upper()}": number for number, name in enumerate(NORMALS)},
         "NORMAL": NORMALS.index(renderer.normal),
-        "NORMAL_COUNT": normal_counts.get(renderer.normal, 1),
-        "GEOMETRIC": int(positions),
-        # A binary search ends where the surface is; a march, somewhere within the point's footprint.
-        "POLISH": POLISH if positions and renderer.search == "distance" else 0,
-        "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
+        "GEOMETRIC": int(uses_positions(scene)),
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
         "HAS_SOFT_LIGHT": int(any(light.angular_size > 0 for light in scene.lights)),
         "HAS_FOG": int(scene.fog is not None),
         "ADAPTIVE": int(renderer.noise is not None),
     }
+
+
+def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The defines of all programs that read what is kept between stages (`kernels/state.h`)."""
+    return {
+        **pass_defines(plan),
+        "PALETTE_SIZE": PALETTE_SIZE,
+        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
+        "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
+        "ADAPTIVE": 0,
+        "POINTS": several_points(scene),
+        "NORMAL_COUNT": 1,
+        "STATE_NUMBERS": state_numbers(scene),
+        "STATE_PADDING": STATE_PADDING,
+        "PLANES": plane_count(scene),
+    }
+
+
+def normal_count(scene: Scene) -> int:
+    """Normals over which a pixel's shading is averaged."""
+    renderer = scene.surface
+    counts = {"gradient": renderer.used_points.count, "eight_triangles_shading": 8}
+    return counts.get(renderer.normal, 1)
+
+
+def state_numbers(scene: Scene) -> int:
+    """Numbers of a pixel that are kept between stages, at least; kernels check it."""
+    return STATE_NUMBERS + 4 * normal_count(scene)
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
@@ -94,9 +150,16 @@ class SurfaceKernel(TileKernel):
     """The surface of a formula's set, found by marching rays."""
 
     name = "surface"
+    waves = True
 
-    def text(self) -> FlatText:
-        return program_text(self.scene, self.plan)
+    def texts(self) -> list[ProgramText]:
+        return program_texts(self.scene, self.plan)
+
+    def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
+        return surface_stages(self.scene, self.plan, samples)
+
+    def wave_needs(self) -> WaveNeeds:
+        return WaveNeeds(state_numbers(self.scene), most_turns(self.scene))
 
     @property
     def footprint(self) -> int:
@@ -124,7 +187,11 @@ class SurfaceKernel(TileKernel):
             records.light_records(scene, precision),
             self._palette(),
             packed.data if packed is not None else np.zeros(4, np.float32),
-            *([plane_records(scene, precision), plane_palettes(scene)] if scene.cut_planes else []),
+            *(
+                [plane_records(scene, precision), plane_palettes(scene)]
+                if scene.cut_planes
+                else [np.zeros(4, np.float32)] * 2
+            ),
         ]
 
     def _palette(self) -> Floats:
@@ -139,8 +206,31 @@ class SurfaceKernel(TileKernel):
         )
 
 
-def program_text(scene: Scene, plan: Plan) -> FlatText:
-    """The whole text of the scene's program."""
+def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
+    """The texts of the scene's programs: those that know the formula, and the one that knows the scene's features."""
     formula = write_formula(scene.chain)
     generated = {"formula.h": formula.text, "structs.h": records.struct_text() + CUT_PLANE.c_text()}
-    return flat_text("surface.cl", generated=generated, defines=defines(scene, plan))
+
+    def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
+        return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
+
+    points = ("send_points",) if scene.surface.used_points.count > 1 else ()
+    texts = [
+        text("rays", "march.cl", search_defines(scene, plan), *march_kernels(plan)),
+        text(
+            "surface",
+            "surface.cl",
+            feature_defines(scene, plan),
+            "begin_shots",
+            *points,
+            "find_spots",
+            "light_spots",
+        ),
+    ]
+    if asks_formula(scene.coloring):
+        colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
+        texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
+    if scene.cut_planes:
+        planes = {**state_defines(scene, plan), **coloring_defines(Coloring()), **plane_defines(scene)}
+        texts.append(text("planes", "see_planes.cl", planes, "find_faces", "find_planes"))
+    return texts

@@ -17,7 +17,7 @@ from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
-from clfractal.renderers.kernel import KernelArgument, TileKernel, flat_text
+from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
@@ -129,8 +129,8 @@ class VolumeKernel(TileKernel):
         """
         return self.resources.kept.once(self._grid_key, self._fill)
 
-    def text(self) -> FlatText:
-        return program_text(self.scene, self.plan, self.grid)
+    def texts(self) -> list[ProgramText]:
+        return [ProgramText(self.name, program_text(self.scene, self.plan, self.grid), (self.name,))]
 
     def own_arguments(self) -> list[KernelArgument]:
         scene, grid, precision = self.scene, self.grid, self.precision

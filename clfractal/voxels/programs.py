@@ -102,7 +102,7 @@ def build_all(
             text.text,
             flags=flags,
             sources=text.sources,
-            warm=warm,
+            warm=[warm],
             on_compile=announce,
             stopped=nobody_waits,
         )

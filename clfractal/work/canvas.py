@@ -69,7 +69,7 @@ class CanvasKernels:
         buffers = (Argument("buffer", 4096),) * 4
         whole = Argument("scalar", dtype="int32")
         warm = Warm("place_tiles", (TILE, 1), ROW_GROUP, (*buffers, *(whole,) * 8))
-        self._built = program.build(device, text.text, flags=flags, sources=text.sources, warm=warm)
+        self._built = program.build(device, text.text, flags=flags, sources=text.sources, warm=[warm])
         self._place, self._enlarge = self._built.kernel("place_tiles"), self._built.kernel("enlarge")
 
     def place(

@@ -1,8 +1,10 @@
-"""One view on one device: its program, the program's data, and its launches. Data stay while they do not change."""
+"""One view on one device: its programs, their data, and its launches. Data stay while they do not change."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,22 +14,19 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
-from clfractal.device.groups import fitting
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device
-from clfractal.device.source import FlatText
 from clfractal.device.watched import Watched, is_watched
 from clfractal.pictures.tiles import TILE, TileGrid
-from clfractal.renderers.kernel import KernelArgument, TileKernel
+from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel
 from clfractal.renderers.passes import STATISTICS, kept_numbers
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Resources
+from clfractal.work.stages import CAPACITY, Span, Stages, Wave, group_of, number_count, wave_of
 
 TILE_PIXELS = TILE * TILE
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
 GROUP_PIXELS = {1: 64, 4: 256, 8: 256, 16: 256}
-# Tiles of the largest launch: 1024 of them are a megapixel.
-CAPACITY = 512
 SLOTS = 3
 """Sets of buffers for results: two launches are under way, and one is being read."""
 _ALIGNMENT = 4096
@@ -36,27 +35,6 @@ Outlet = Callable[[cl.Buffer, cl.Buffer, int], None]
 """Takes finished tiles on the device by a kernel in its queue: of the film, at these places, so many."""
 Floats = npt.NDArray[np.float32]
 Counts = npt.NDArray[np.uint64]
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """What one launch renders.
-
-    Attributes:
-        tiles: indices in the view's grid of tiles.
-        packets: first packet of each tile, and the one after the last.
-        samples: first sample of each pixel, and the one after the last.
-        mode: PASS_KEEP and PASS_ADD, as bits.
-        kept_places: of each tile, its number among those that are kept for later passes.
-        slot: which of the sets of buffers the results go into.
-    """
-
-    tiles: npt.NDArray[np.int32]
-    packets: tuple[int, int]
-    samples: tuple[int, int]
-    mode: int
-    kept_places: npt.NDArray[np.int32]
-    slot: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +54,17 @@ class OutputBuffers:
         self.device = device
         self.sizes = (0, 0, 0)
         self.sets: list[OutputSet] = []
+        self.wave: list[cl.Buffer] = []
+        self._wave_sizes: list[int] = []
+
+    def fit_wave(self, sizes: list[int]) -> None:
+        """Makes sure that what a wave keeps, in buffers of so many bytes, has room; launches come one after the other."""
+        before = self._wave_sizes or [0] * len(sizes)
+        wanted = [max(pair) for pair in zip(before, sizes, strict=True)] if sizes else before
+        if wanted != self._wave_sizes:
+            self.wave, self._wave_sizes = [], []
+            self.wave = [self.device.buffer(size, "pixels between stages") for size in wanted]
+            self._wave_sizes = wanted
 
     def fit(self, film: int, statistics: int, places: int) -> None:
         """Makes sure that each set has room for so many bytes."""
@@ -101,12 +90,13 @@ class Drawing:
         self.device, self.outputs = device, outputs
         self.view: PlannedView | None = None
         self.packets = self.group = self.capacity = 0
+        self.wave = Wave(0, 0, [])
         self.build_ms = 0.0
         self.pace = Pace(1.0)
-        self._program: program.Program | None = None
-        self._text: FlatText | None = None
+        self._stages: Stages | None = None
+        self._programs: list[program.Program] = []
+        self._texts: list[ProgramText] = []
         self._flags: tuple[str, ...] = ()
-        self._kernels: list[cl.Kernel] = []
         self._buffers: list[cl.Buffer] = []
         self._given: list[KernelArgument] = []
         self._watched: dict[int, Watched] = {}
@@ -132,24 +122,28 @@ class Drawing:
         self.packets = TILE_PIXELS // plan.lanes
         self.group = max(GROUP_PIXELS[plan.lanes] // plan.lanes, 1)
         self.capacity = max(1, min(CAPACITY, tiles))
+        self.wave = wave_of(kernel, self.device, self.capacity)
         film = self.capacity * len(plan.channels) * TILE_PIXELS * 4
         statistics = self.capacity * self.packets * 4 * len(STATISTICS)
         sizes = [_size(argument) for argument in arguments]
         self.device.check_memory(
-            SLOTS * (film + statistics) + sum(sizes), "rendering", largest=max(film, *sizes)
+            SLOTS * (film + statistics) + sum(sizes) + sum(self.wave.sizes),
+            "rendering",
+            largest=max(film, *sizes, *self.wave.sizes),
         )
         built = self._built(kernel, sizes, resources)
         self.build_ms = self.device.loaded.building.milliseconds - built_before
-        if self._program is None or built.cl_program is not self._program.cl_program:
-            self._kernels = [built.kernel(kernel.name) for _ in range(SLOTS)]
+        other = [each.cl_program for each in built] != [each.cl_program for each in self._programs]
+        if other or self.view is None or view.scene.formula.iterations > self.view.scene.formula.iterations:
             self._begin_pace()
-        elif self.view is not None and view.scene.formula.iterations > self.view.scene.formula.iterations:
-            self._begin_pace()
-        self._program, self.view = built, view
+        self._programs, self.view = built, view
         self.outputs.fit(film, statistics, self.capacity * 16)
+        self.outputs.fit_wave(self.wave.sizes)
         self._upload(arguments)
         self._kept_count = len(kept_numbers(plan, view.scene.renderer))
-        self._set_arguments()
+        self._stages = Stages(
+            self.device, kernel, self.wave, self.group, list(zip(self._texts, built, strict=True))
+        )
 
     @property
     def watched(self) -> list[Watched]:
@@ -166,8 +160,6 @@ class Drawing:
         if self._kept is None or self._kept.size < needed:
             self._kept = None
             self._kept = self.device.buffer(needed, "unfinished pixels")
-            for kernel in self._kernels:
-                kernel.set_arg(1, self._kept)
 
     def kept_bytes(self, tiles: int) -> int:
         """Memory that so many tiles need between passes."""
@@ -184,28 +176,28 @@ class Drawing:
         """Frees the data kept between passes."""
         self._kept = None
 
-    def start(self, span: Span) -> cl.Event:
-        """Enqueues a launch; its results are there when the event is complete."""
+    def start(self, span: Span) -> tuple[cl.Event, cl.Event]:
+        """Enqueues a launch: its first kernel's event, and its last one's; its results are there when that is complete."""
         assert self.view is not None
+        assert self._stages is not None
         grid = TileGrid(self.view.plan.region)
         places = np.zeros((len(span.tiles), 4), np.int32)
         places[:, 0] = (grid.first_column + span.tiles % grid.columns) * TILE
         places[:, 1] = (grid.first_row + span.tiles // grid.columns) * TILE
         places[:, 2] = span.kept_places
-        kernel, (first, end) = self._kernels[span.slot], span.packets
-        numbers = (first, end, *span.samples, span.mode)
         with self.device.failures("rendering"):
             # In the kernels' own queue, and nobody waits: while every core is at work PoCL lets a write wait for the
             # launch before. The event holds the array, and waits for the write when it is dropped: so it is kept.
-            target = self.outputs.sets[span.slot].places
-            self._places[span.slot] = cl.enqueue_copy(self.device.queue, target, places, is_blocking=False)
-            for index, number in enumerate(numbers, start=kernel.num_args - len(numbers)):
-                kernel.set_arg(index, np.int32(number))
-            count = -(-(end - first) // self.group) * self.group
-            group = fitting(self.device, kernel, (self.group, 1))
-            event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, (count, len(span.tiles)), group)
+            own = self.outputs.sets[span.slot]
+            self._places[span.slot] = cl.enqueue_copy(
+                self.device.queue, own.places, places, is_blocking=False
+            )
+            kept = self._kept if self._kept is not None else own.places  # a stand-in: nobody reads it
+            buffers = [own.film, kept, own.statistics, own.places, *self._buffers[:-1]]
+            buffers += [*self.outputs.wave[: len(self.wave.sizes)], self._buffers[-1]]
+            events = self._stages.enqueue(span, [*buffers, len(self.view.plan.channels), self._kept_count])
             self.device.queue.flush()
-        return event
+        return events
 
     def hand_over(self, span: Span, outlet: Outlet) -> None:
         """Lets an outlet take the tiles of a launch that has ended, before the launch's buffers are used again."""
@@ -224,22 +216,37 @@ class Drawing:
         statistics = found[: 4 * counts].view(np.uint32).reshape(-1, len(STATISTICS))
         return found[head:].view(np.float32).reshape(shape), statistics.sum(axis=0, dtype=np.uint64)
 
-    def _built(self, kernel: TileKernel, sizes: list[int], resources: Resources) -> program.Program:
-        """The kernel's program: the one before, if its text is the same."""
+    def _built(self, kernel: TileKernel, sizes: list[int], resources: Resources) -> list[program.Program]:
+        """The kernel's programs: those before, if their texts are the same."""
         # A volume's rays may be float32 whatever its grid was filled with: then the texts are the same, and the flags not.
-        text, flags = kernel.text(), program.math_flags(kernel.plan.precision)
-        if self._program is not None and text is self._text and flags == self._flags:
-            return self._program
-        built = program.build(
-            self.device,
-            text.text,
-            flags=flags,
-            sources=text.sources,
-            warm=self._warm(kernel.name, len(kernel.plan.channels), sizes),
-            on_compile=resources.on_compile,
-            stopped=resources.token,
-        )
-        self._text, self._flags = text, flags
+        texts, flags = kernel.texts(), program.math_flags(kernel.plan.precision)
+        if self._programs and texts == self._texts and flags == self._flags:
+            return self._programs
+
+        def build(text: ProgramText) -> program.Program:
+            return program.build(
+                self.device,
+                text.flat.text,
+                flags=flags,
+                sources=text.flat.sources,
+                warm=[self._warm(kernel, name, sizes) for name in text.kernels],
+                on_compile=resources.on_compile,
+                stopped=lambda: ended.is_set() or (resources.token is not None and resources.token()),
+            )
+
+        # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all.
+        ended = threading.Event()
+        pool = ThreadPoolExecutor(len(texts))
+        building = [pool.submit(build, text) for text in texts]
+        try:
+            built = [each.result() for each in building]
+        except BaseException:
+            ended.set()
+            raise
+        finally:
+            # After an interrupt nobody waits for a child that is just being started.
+            pool.shutdown(wait=not ended.is_set(), cancel_futures=True)
+        self._texts, self._flags = texts, flags
         return built
 
     def _begin_pace(self) -> None:
@@ -278,28 +285,21 @@ class Drawing:
             self._sending.append(cl.enqueue_copy(self.device.queue, buffer, bytes_of, is_blocking=False))
         return buffer
 
-    def _set_arguments(self) -> None:
-        assert self.view is not None
-        kept = (
-            self._kept if self._kept is not None else self.outputs.sets[0].places
-        )  # a stand-in: nobody reads it
-        counts = (len(self.view.plan.channels), self._kept_count)
-        with self.device.failures("setting arguments"):
-            for kernel, own in zip(self._kernels, self.outputs.sets, strict=True):
-                first = (own.film, kept, own.statistics, own.places)
-                for index, buffer in enumerate((*first, *self._buffers)):
-                    kernel.set_arg(index, buffer)
-                for index, number in enumerate(counts, start=4 + len(self._buffers)):
-                    kernel.set_arg(index, np.int32(number))
-
-    def _warm(self, name: str, channels: int, sizes: list[int]) -> Warm:
+    def _warm(self, kernel: TileKernel, name: str, sizes: list[int]) -> Warm:
         """A first launch that renders nothing: it ends before its first packet."""
+        channels, lanes = len(kernel.plan.channels), kernel.plan.lanes
         outputs = [TILE_PIXELS * 4 * channels, 16, self.packets * 4 * len(STATISTICS), 16]
         # A part of a large environment map is enough.
-        buffers = [*outputs, *(min(max(size, 16), 65_536) for size in sizes)]
+        constants = [min(max(size, 16), 65_536) for size in sizes]
+        waves = [16] * len(self.wave.sizes)
+        buffers = [*outputs, *constants[:-1], *waves, constants[-1]]
         arguments = [Argument("buffer", size) for size in buffers]
-        arguments += [Argument("scalar", dtype="int32", value=0.0)] * 7
-        return Warm(name, (self.packets, 1), (self.group, 1), tuple(arguments))
+        numbers = 2 + number_count(kernel)
+        arguments += [Argument("scalar", dtype="int32", value=0.0)] * numbers
+        stage = next(each for each in kernel.stages((0, 1)) if each.kernel == name)
+        group = group_of(stage, lanes, self.group)
+        size = (self.packets, 1) if stage.over == "pixels" else group
+        return Warm(name, size, group, tuple(arguments))
 
 
 def _kernel_of(renderer: str) -> type[TileKernel]:

@@ -17,9 +17,10 @@ from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.passes import PASS_ADD, PASS_KEEP, STATISTICS
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Kept, Resources
-from clfractal.work.drawing import SLOTS, Drawing, Outlet, OutputBuffers, Span
+from clfractal.work.drawing import SLOTS, Drawing, Outlet, OutputBuffers
 from clfractal.work.job import Job
 from clfractal.work.run import Result, Tally, WorkItem
+from clfractal.work.stages import Span
 
 Tiles = npt.NDArray[np.int32]
 ViewOutlet = Callable[[int, cl.Buffer, cl.Buffer, int], None]
@@ -173,11 +174,11 @@ class _Cutter:
         span = self._next(size)
         if span is None:
             return None
-        event = self.drawing.start(span)
+        begun, event = self.drawing.start(span)
         amount = (
             len(span.tiles) * (span.packets[1] - span.packets[0]) * max(span.samples[1] - span.samples[0], 1)
         )
-        return Part(event, float(amount), span)
+        return Part(event, float(amount), span, begun)
 
     def _next(self, size: float) -> Span | None:
         tiles, drawing = self.item.tiles, self.drawing
@@ -186,7 +187,7 @@ class _Cutter:
             if left == 0:
                 return None
             count = int(min(size / self.per_tile, drawing.capacity, left))
-            if count >= 1:
+            if count >= 1 and drawing.wave.packets >= drawing.packets:
                 # The last launch is not much shorter than the others: no core idles long at the end.
                 if count < left < 1.5 * count:
                     count = (left + 1) // 2
@@ -215,7 +216,7 @@ class _Cutter:
         """Packets of a tile from the first on: whole groups with all samples, one group, or a part of one."""
         group, samples = self.drawing.group, self.end - self.first
         count = max(int(size / samples) // group * group, group) if size >= group else max(int(size), 1)
-        return first, min(first + count, self.drawing.packets)
+        return first, min(first + min(count, self.drawing.wave.packets), self.drawing.packets)
 
     def _span(self, tiles: Tiles, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
         mode = 0

@@ -43,13 +43,14 @@ class WorkItem:
 @dataclass(slots=True, kw_only=True)
 class Tally:
     """Counts and times: camera rays (all samples), those of them that found anything, distance evaluations and
-    applications of all rays; times in ms."""
+    applications of all rays, and lanes that waited for others, in distance evaluations; times in ms."""
 
     rays: int = 0
     hits: int = 0
     steps: int = 0
     iterations: int = 0
     bad_distances: int = 0
+    waits: int = 0
     kernel_ms: float = 0.0
     build_ms: float = 0.0
 
@@ -60,6 +61,7 @@ class Tally:
         self.steps += other.steps
         self.iterations += other.iterations
         self.bad_distances += other.bad_distances
+        self.waits += other.waits
         self.kernel_ms += other.kernel_ms
         self.build_ms += other.build_ms
 
@@ -132,6 +134,11 @@ class Progress(Tally):
     def steps_per_ray(self) -> float:
         """Distance evaluations per camera ray, including those of shadow rays."""
         return self.steps / max(self.rays, 1)
+
+    @property
+    def waiting(self) -> float:
+        """The part of all lanes that waited for others while rays marched."""
+        return self.waits / max(self.waits + self.steps, 1)
 
 
 ProgressCallback = Callable[[Progress], None]

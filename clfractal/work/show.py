@@ -203,7 +203,7 @@ class Shower:
             text.text,
             flags=("-cl-std=CL1.2", "-cl-denorms-are-zero"),
             sources=text.sources,
-            warm=None if to_image else warm,
+            warm=[] if to_image else [warm],
         )
         self._kernel = built.kernel("show")
         with device.failures("opening the device"):

@@ -42,8 +42,8 @@ def _triples(program: Program) -> bool:
 
 
 @pytest.mark.parametrize("isolated", [False, True])
-@pytest.mark.parametrize("warm", [None, _WARM])
-def test_built_then_found(device: Device, empty_cache: Path, isolated: bool, warm: Warm | None) -> None:
+@pytest.mark.parametrize("warm", [[], [_WARM]])
+def test_built_then_found(device: Device, empty_cache: Path, isolated: bool, warm: list[Warm]) -> None:
     first = build(device, _TRIPLE, flags=_FLAGS, warm=warm, isolated=isolated)
     assert not first.cached
     assert _triples(first)
@@ -60,7 +60,7 @@ def test_a_program_in_memory_needs_no_disk(
     device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = _TRIPLE + "// as long as the program of a scene\n" * 6000
-    first = build(device, text, flags=_FLAGS, warm=_WARM, isolated=False)
+    first = build(device, text, flags=_FLAGS, warm=[_WARM], isolated=False)
 
     def fail(*_: object) -> None:
         raise AssertionError("the disk or the compiler was asked")
@@ -69,7 +69,7 @@ def test_a_program_in_memory_needs_no_disk(
         monkeypatch.setattr(cache, name, fail)
     for name in ("compile_source", "load_kept"):
         monkeypatch.setattr(compiler, name, fail)
-    again = [build(device, text, flags=_FLAGS, warm=_WARM) for _ in range(20)]
+    again = [build(device, text, flags=_FLAGS, warm=[_WARM]) for _ in range(20)]
     assert all(each.cached and each.cl_program is first.cl_program for each in again)
     assert statistics.median(each.build_ms for each in again) < 1
 
@@ -99,7 +99,7 @@ def test_a_first_launch_makes_machine_code_once(
     """PoCL generates it for a local size, and keeps it itself; other drivers have it from the start, in the binary."""
     monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path))  # of the child: this process has opened its own
     text = f"__constant long unique = {time.time_ns()};\n" + _TRIPLE
-    program = build(device, text, flags=_FLAGS, warm=_WARM)
+    program = build(device, text, flags=_FLAGS, warm=[_WARM])
     (entry,) = empty_cache.rglob("*.bin")
     if is_pocl(device.info):
         assert entry.read_bytes().endswith(compiler.KEPT_BY_DRIVER)
@@ -114,26 +114,26 @@ def test_a_driver_without_a_cache_gives_binaries(
     device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("POCL_KERNEL_CACHE", "0")
-    first = build(device, _TRIPLE, flags=_FLAGS, warm=_WARM, isolated=False)
+    first = build(device, _TRIPLE, flags=_FLAGS, warm=[_WARM], isolated=False)
     binary = compiler.binary_of(device, first.cl_program)
     assert len(binary) > 1000
     assert compiler.load_kept(device, binary, "not OpenCL", _FLAGS) is not None
     device.loaded.clear()
-    assert _triples(build(device, _TRIPLE, flags=_FLAGS, warm=_WARM, isolated=False))
+    assert _triples(build(device, _TRIPLE, flags=_FLAGS, warm=[_WARM], isolated=False))
 
 
 def test_text_flags_and_launch_are_the_key(device: Device, empty_cache: Path) -> None:
-    def cached(text: str = _TRIPLE, flags: Sequence[str] = _FLAGS, warm: Warm | None = None) -> bool:
+    def cached(text: str = _TRIPLE, flags: Sequence[str] = _FLAGS, warm: Sequence[Warm] = ()) -> bool:
         return build(device, text, flags=flags, warm=warm, isolated=False).cached
 
     assert [cached(), cached()] == [False, True]
     assert [cached(_TRIPLE + "\n"), cached(_TRIPLE + "\n")] == [False, True]
     assert [cached(flags=[*_FLAGS, "-DX"]), cached(flags=[*_FLAGS, "-DX"])] == [False, True]
-    assert [cached(warm=_WARM), cached(warm=_WARM)] == [False, True]
+    assert [cached(warm=[_WARM]), cached(warm=[_WARM])] == [False, True]
     other_values = Warm(
         "triple", (16,), (1,), (Argument("buffer", 64), Argument("scalar", 0, "float32", 9.0))
     )
-    assert cached(warm=other_values), "the values of a first launch do not change the machine code"
+    assert cached(warm=[other_values]), "the values of a first launch do not change the machine code"
 
 
 def test_another_driver_or_device_has_its_own_programs(device: Device, empty_cache: Path) -> None:
@@ -249,7 +249,7 @@ def test_a_recipe_survives_the_way_to_the_child(device: Device, empty_cache: Pat
         "__kernel void k(__global float *out, pair p, __local float *scratch) {\n"
         "    scratch[0] = p.a;\n    out[get_global_id(0)] = scratch[0] * p.b;\n}\n"
     )
-    assert not build(device, text, flags=_FLAGS, warm=recipe).cached
+    assert not build(device, text, flags=_FLAGS, warm=[recipe]).cached
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])

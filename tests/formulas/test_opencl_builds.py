@@ -51,18 +51,18 @@ def points_text(name: str, precision: Precision, lanes: int) -> str:
     ).text
 
 
-def surface_text(name: str, precision: Precision, lanes: int, coloring: str = "iterations") -> str:
+def surface_texts(name: str, precision: Precision, lanes: int, coloring: str = "iterations") -> list[str]:
+    """The renderer's programs: the march, the stages that know no formula, and what asks the formula for colours."""
     scene = load_scene(SCENE % (name, coloring))
     plan = Plan(precision, lanes, 1, Region(0, 0, 64, 64), tuple(CHANNELS))
-    text: str = surface.program_text(scene, plan).text
-    return text
+    return [each.flat.text for each in surface.program_texts(scene, plan)]
 
 
 def whole_text(name: str, precision: Precision, lanes: int) -> str:
-    """The renderer's program and, behind it, what the one for lists of points has of its own."""
+    """The march and, behind it, what the program for lists of points has of its own."""
     own = points_text(name, precision, lanes).rpartition('"kernels/points.cl"\n')[2]
     assert "__kernel void escape_counts" in own
-    return surface_text(name, precision, lanes) + own
+    return surface_texts(name, precision, lanes)[0] + own
 
 
 def together(texts: list[str]) -> str:
@@ -103,10 +103,21 @@ def test_one_lane_count_in_float64() -> None:
     build_all([whole_text(name, "float64", lanes) for name in KINDS], "float64")
 
 
-@pytest.mark.parametrize("coloring", ["solid", "normal"])
+@pytest.mark.parametrize("coloring", ["solid", "normal", "iterations", "trap"])
 def test_every_coloring(coloring: str) -> None:
     lanes = accepted_lanes(device(), "float32")[-1]
-    build(surface_text("hast", "float32", lanes, coloring), "float32")
+    for text in surface_texts("hast", "float32", lanes, coloring)[1:]:
+        build(text, "float32")
+
+
+def test_stages_that_know_no_formula_are_the_same_for_all() -> None:
+    """Their program is built once for a set of features, the march once for a formula."""
+    marches, stages = zip(*(surface_texts(name, "float32", 4)[:2] for name in KINDS), strict=True)
+    assert len(set(marches)) == len(KINDS)
+    assert len(set(stages)) == 1
+    shaded = surface_texts("hast", "float32", 4, "normal")
+    assert shaded[0] == marches[0]
+    assert shaded[1] != stages[0]
 
 
 def test_a_fault_in_one_formula_is_noticed() -> None:

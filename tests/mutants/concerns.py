@@ -16,18 +16,22 @@ kernels/show.cl: work/show viewer/display
 kernels/canvas.cl: work/canvas viewer/session
 kernels/cut_plane.cl: render/cut_plane render/cut_plane_periods
 kernels/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods
-kernels/planes.h: render/planes_in_picture render/planes_in_fog
+kernels/*planes*: render/planes_in_picture render/planes_in_fog
 kernels/environment.h: render/environment_kernel render/surface_rays
 kernels/normals.h: render/normals render/normals_properties render/pixel_points
 kernels/pixel_points.h: render/pixel_points render/normals render/normals_properties
 kernels/sampling.h: render/sampling render/filters render/surface_rays render/lens_and_fog
-kernels/coloring.h: render/coloring render/surface_light
+kernels/color[_i]*: render/coloring render/surface_light
 kernels/color.h: render/coloring render/cut_plane render/surface_samples
 kernels/camera.h: render/surface_analytic render/lens_and_fog render/stereo_views
 kernels/spot.h: render/coloring render/lens_and_fog render/normals render/surface_light
 kernels/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
 kernels/secondary.h: render/surface_rays render/surface_light
-kernels/batch.h: render/surface_rays render/pixel_points
+kernels/queue.h: render/surface_rays render/pixel_points
+kernels/eye.h: render/surface_analytic render/lens_and_fog render/surface_rays
+kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
+kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
+kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/march_steps.h: render/searches
 kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
 kernels/orbit.h: formulas/counts formulas/distance render/points render/surface_analytic

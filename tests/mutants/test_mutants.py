@@ -99,7 +99,7 @@ def test_every_file_has_tests_that_are_there() -> None:
         missing = [test for test in tests if not (CHECKOUT / test).exists()]
         assert not missing, (name, missing)
     assert concerned("clfractal/files/nrrd.py", CHECKOUT)[0].startswith("tests/files")
-    assert concerned("kernels/batch.h", CHECKOUT)[0] == "tests/render/test_surface_rays.py"
+    assert concerned("kernels/queue.h", CHECKOUT)[0] == "tests/render/test_surface_rays.py"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="ends pytest by its process group")

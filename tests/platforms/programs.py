@@ -76,7 +76,8 @@ def of_scene(
     elif scene.renderer.type == "cut_plane":
         yield "cut_plane", cut_plane.program_text(scene, plan)
     else:
-        yield "surface", surface.program_text(scene, plan)
+        for text in surface.program_texts(scene, plan):
+            yield text.name, text.flat
 
 
 def of_grids(count: int, precision: Precision) -> Iterator[Named]:

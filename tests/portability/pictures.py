@@ -64,6 +64,7 @@ _RENDERERS = {
 _MORE = {
     "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\nfog: {density: 0.05}\n",
     "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n",
+    "quaternion": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]\n",
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
 _LENSES = {"still": ", f_number: 0.5"}

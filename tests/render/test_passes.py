@@ -95,7 +95,8 @@ def test_tiles_in_parts_have_the_same_bits(
     scene = scene_with(kind, **NOISY)
     plan = plan_of(scene, device)
     spans: list[tuple[tuple[int, int], tuple[int, int]]] = []
-    from clfractal.work.drawing import Drawing, Span
+    from clfractal.work.drawing import Drawing
+    from clfractal.work.stages import Span
 
     start = Drawing.start
 

@@ -11,14 +11,14 @@ CODE = """
 import hashlib
 from clfractal.formulas import catalog
 from clfractal.renderers.plan import make_plan
-from clfractal.renderers.surface import program_text
+from clfractal.renderers.surface import program_texts
 from clfractal.scene.load import load_scene
 for name in catalog.names():
     julia = {"julia": [0.1, 0.2, 0.3, 0.4]} if name == "quaternion_julia" else {}
     scene = load_scene({"version": 1, "formula": {"name": name, **julia}, "camera": {}})
     for precision in ("float32", "float64"):
-        text = program_text(scene, make_plan(scene, precision=precision, lanes=8)).text
-        print(name, precision, hashlib.sha256(text.encode()).hexdigest())
+        for text in program_texts(scene, make_plan(scene, precision=precision, lanes=8)):
+            print(name, precision, hashlib.sha256(text.flat.text.encode()).hexdigest())
 """
 
 

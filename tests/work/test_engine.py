@@ -316,7 +316,7 @@ def test_flags_follow_the_number_type_where_the_text_does_not(
     build = program.build
 
     def noted(*arguments: Any, **settings: Any) -> program.Program:
-        if "volume" in settings["warm"].kernel:
+        if "volume" in settings["warm"][0].kernel:
             flags.append(settings["flags"])
         return build(*arguments, **settings)
 

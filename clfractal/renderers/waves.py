@@ -1,0 +1,84 @@
+"""The order of the surface renderer's stages: which kernels a launch has, and what each marches or makes.
+
+Rays of a purpose are sent by one stage, marched by another, which knows the formula, and read by a third. A sample is
+
+    begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
+
+and each mirror adds what follows `begin_shots` but for the points. See "A shot" in docs/architecture.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from clfractal.renderers.kernel import Stage
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
+from clfractal.scene.coloring import Coloring
+from clfractal.scene.model import Scene
+
+# What a march is after, as in `kernels/rays.h`.
+GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT = range(4)
+
+
+def asks_formula(coloring: Coloring) -> bool:
+    """Whether the quantity that chooses colours is found by asking the formula."""
+    return coloring.by in ("thickness", "layer_distance", "trap")
+
+
+def light_turns(scene: Scene) -> int:
+    """Rays that leave a spot for its light."""
+    rays = hemisphere_rays(scene)
+    return rays.cosine + rays.map + len(scene.lights) * light_rays(scene)
+
+
+def most_turns(scene: Scene) -> int:
+    """The most rays that a pixel sends for one purpose."""
+    return max(1, scene.surface.used_points.count, light_turns(scene))
+
+
+def march_kernels(plan: Plan) -> tuple[str, ...]:
+    """The kernels of `kernels/march.cl`: packets look at surfaces where they march."""
+    return ("march_rays", "look_at_surfaces") if plan.lanes == 1 else ("march_rays",)
+
+
+def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterator[Stage]:
+    """The stages of a launch for samples from the first up to the second."""
+    # A launch without samples only writes what pixels have.
+    for sample in range(*samples):
+        yield from _sample(scene, sample, march_kernels(plan))
+
+
+def _sample(scene: Scene, sample: int, marching: tuple[str, ...]) -> Iterator[Stage]:
+    points, after = scene.surface.used_points.count, light_turns(scene)
+    steps = scene.surface.search == "steps"
+
+    def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
+        return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
+
+    yield stage("begin_shots")
+    if scene.cut_planes:
+        yield stage("find_faces")
+    for bounce in range(bounces(scene) + 1):
+        turns = 1
+        if points > 1 and bounce == 0:
+            yield from _marched(marching, 1, GOAL_TOUCH)
+            turns = points
+            yield stage("send_points", 1)
+            yield from _marched(marching, turns, GOAL_POINT if steps else GOAL_SURFACE)
+        else:
+            yield from _marched(marching, 1, GOAL_SURFACE)
+        yield stage("find_spots", turns, bounce=bounce, next_turns=after)
+        if asks_formula(scene.coloring):
+            yield stage("color_spots", bounce=bounce)
+        if scene.cut_planes and bounce == 0:
+            yield stage("find_planes")
+        if after > 0:
+            yield from _marched(marching, after, GOAL_SHADOW)
+        yield stage("light_spots", after, bounce=bounce)
+
+
+def _marched(kernels: tuple[str, ...], turns: int, goal: int) -> Iterator[Stage]:
+    yield Stage("march_rays", "rays", turns, {"goal": goal})
+    if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
+        yield Stage("look_at_surfaces", "packets of rays", turns)

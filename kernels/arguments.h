@@ -1,0 +1,21 @@
+// Arguments of kernels that make pictures.
+
+// The first and the last arguments of a renderer's kernel; its own stand between them. OpenCL 1.2 guarantees eight `__constant` ones:
+// lists are `__global`, and constant what all work-items read at the same time.
+#define PASS_BUFFERS                                                                                                       \
+    __global float *film, __global scalar *kept, __global uint *statistics, __global const int4 *places,                   \
+        __constant const struct View *view, __constant const struct Sampling *sampling
+#define PASS_SPAN                                                                                                          \
+    __global const int *slots, int channel_count, int kept_count, int first_packet, int end_packet, int first, int end, \
+        int mode
+#define PASS {film, kept, statistics, places, view, sampling, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode}
+
+// What every stage of a surface's picture is given: one list, so that the host sets it once.
+#define STAGE_ARGUMENTS                                                                                                    \
+    PASS_BUFFERS, __constant const struct March *settings, __constant const struct Orbit *orbit,                           \
+        __constant const scalar *k, __constant const struct Material *material, __constant const struct Light *lights,     \
+        __global const float *palette, __global const float *environment, __global const struct CutPlane *planes,          \
+        __global const float *plane_palettes, __global scalar *restrict state, __global scalar *restrict rays, __global scalar *restrict met,         \
+        PASS_SPAN, int first_tile, int wave, int queue_stride, int turns, int slice, int next_turns, int goal, int bounce, int sample
+#define STAGE_QUEUE {rays, met, wave, turns, queue_stride}
+#define WAS_CANCELLED (*(volatile __constant const int *)&sampling->cancelled)

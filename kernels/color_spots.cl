@@ -1,0 +1,32 @@
+// Entry point that knows the formula: what chooses the colour of spots, where that asks the formula.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "numbers/dual.h"
+#include "vectors.h"
+#include "structs.h"
+#include "formula.h"
+#include "orbit.h"
+#include "camera.h"
+#include "sampling.h"
+#include "shade.h"
+#include "tiles.h"
+#include "pixel.h"
+#include "coloring.h"
+#include "planes.h"
+#include "stage.h"
+#include "state.h"
+#include "eye.h"
+
+__kernel void color_spots(STAGE_ARGUMENTS) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    spot here = spot_kept(s.state, bounce, s.stride);
+    const mask found = mask_of(here.found);
+    if (!any_lane(found)) return;
+    path so_far;
+    const vec direction = path_ray(s, aim_kept(s.state, s.stride), &so_far, w).direction;
+    here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
+                                      material, orbit, k);
+    spot_keep(&here, s.state, bounce, s.stride);
+}

@@ -1,0 +1,51 @@
+// Rays from the eye.
+
+// The sums of the packet's pixels before this sample.
+INLINE pixel sums_before(stage s, const place_in_pass *here) {
+    if (s.sample == s.span.first) return pixel_before(s.span, here);
+    pixel p;
+    STATE_RECALL(s, p, STATE_SUMS);
+    return p;
+}
+
+INLINE ray eye_ray(aim a, world w) { return camera_ray(a.x, a.y, a.lens_x, a.lens_y, w.view); }
+
+INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
+    real across, below;
+    sample_offset(s.span, &here->at, s.sample, &across, &below);
+    aim a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0)};
+#if HAS_LENS
+    const bits seed = pixel_seed(here->at.columns, here->at.rows, (uint)s.span.sampling->seed, PURPOSE_LENS);
+    unit_square((bits)((uint)s.sample), seed, &a.lens_x, &a.lens_y);
+    unit_disk(a.lens_x, a.lens_y, &a.lens_x, &a.lens_y);
+#endif
+    return a;
+}
+
+// Sends a ray for the part of its way that cutting planes and the bounding sphere leave.
+INLINE void send_clipped(stage s, int turn, ray r, mask wanted, world w) {
+    real face;
+    wanted &= planes_cut(&r, &face, w.planes);
+    wanted &= ray_clip(&r, w.settings->bounds_center, w.settings->bounds_radius);
+    queue_send(s.q, turn, s.slot, r, wanted);
+}
+
+// The ray that finds the next spot: from the eye, or after a bounce the mirrored one; and the light of the path so far.
+INLINE ray path_ray(stage s, aim a, path *so_far, world w) {
+    ray r = eye_ray(a, w);
+    so_far->on_path = a.wanted;
+    so_far->through = R(1.0);
+    so_far->seen = color_of(R(0.0), R(0.0), R(0.0));
+#if PLANES > 0
+    plane_face face;
+    STATE_RECALL(s, face, STATE_FACE);
+    so_far->on_path = pick(mask_of(face.bare), R(0.0), so_far->on_path);
+#endif
+    if (s.bounce == 0) return r;
+    STATE_RECALL(s, *so_far, STATE_PATH);
+    r.origin = so_far->origin;
+    r.direction = so_far->direction;
+    r.footprint = so_far->footprint;
+    r.spread = so_far->spread;
+    return r;
+}

@@ -1,0 +1,126 @@
+// Light that a spot sends along a path, and what a path has seen at its end.
+
+// The light that one light ray adds, for every normal of the spot.
+INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open, vec to_viewer,
+                    __constant const struct Light *light, __constant const struct Material *material) {
+    color sum = color_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < TURNS(facet_count(s.bounce)); ++i) {
+        const facet f = facet_of(s, here, i);
+        const color one = phong(here->tint, f.normal, to_viewer, in, lit, open, light, material);
+        sum = color_add(sum, color_scale(one, f.weight));
+    }
+    return sum;
+}
+
+// The light that the spot's rays have brought.
+INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
+    color gathered = color_of(R(0.0), R(0.0), R(0.0));
+    real open = R(1.0);
+    int turn = 0;
+#if HAS_AMBIENT
+    if (w.settings->occlusion_share > S(0.0)) open = R(0.0);
+    for (; turn < hemisphere_turns(w); ++turn) {
+        const encounter met = queue_met(s.q, turn, s.slot);
+        tally_met(cost, met, 0);
+        gathered = color_add(gathered, ambient_light(s, here, turn, met, w, &open));
+    }
+    gathered = limited(gathered, w.settings);
+#endif
+    for (; turn < s.q.turns; ++turn) {
+        const int number = turn - hemisphere_turns(w);
+        __constant const struct Light *light = w.lights + number / w.settings->light_rays;
+        if (number % w.settings->light_rays >= light->rays) continue;
+        const encounter met = queue_met(s.q, turn, s.slot);
+        tally_met(cost, met, 0);
+        incidence in = light_at(light, here->point);
+        in.toward = queue_ray(s.q, turn, s.slot).direction;
+        const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, w.material);
+        gathered = color_add(gathered, color_scale(more, (real)(light->share)));
+    }
+    return gathered;
+}
+
+// Adds the light of the path's present spot, or of the sky past it, to what the path has seen.
+INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const spot *here, color gathered, int last, world w) {
+    mask on_path = mask_of(so_far->on_path);
+    const mask found = mask_of(here->found);
+    if (s.bounce > 0) {
+        const color missed = limited(color_scale(sky(direction, picture_y, 1, w), so_far->through), w.settings);
+        so_far->seen = color_pick(on_path & ~found, color_add(so_far->seen, missed), so_far->seen);
+    }
+    on_path &= found;
+    const real own = last ? R(1.0) : R(1.0) - (real)(w.material->reflection);
+    color added = color_scale(gathered, so_far->through * own);
+    if (s.bounce > 0) added = limited(added, w.settings);
+    so_far->seen = color_pick(on_path, color_add(so_far->seen, added), so_far->seen);
+    so_far->on_path = number_of(on_path);
+}
+
+// Goes on along the mirrored ray.
+INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, const spot *here, world w) {
+    spot seen_first = *here;
+    if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
+    so_far->through *= (real)(w.material->reflection);
+    so_far->origin = vec_along(here->point, here->cone * (real)(w.settings->shadow_lift), here->normal);
+    so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);
+    so_far->footprint = here->cone;
+    so_far->spread = from_eye.spread + (from_eye.footprint / fmax(depth_of(seen_first.seen, w.view), here->cone));
+    STATE_KEEP(s, *so_far, STATE_PATH);
+    ray r = {so_far->origin, so_far->direction, R(0.0), (real)(REAL_LARGEST), so_far->footprint, so_far->spread,
+             RAY_NOTHING_KNOWN};
+    send_clipped(s, 0, r, mask_of(so_far->on_path), w);
+}
+
+// The shot at its end: what its path has seen, over the background; and what it has found first.
+INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, world w) {
+    sighting first;
+    STATE_RECALL(s, first, STATE_SIGHTING);
+    spot found = *here;
+    if (s.bounce > 0) found = spot_kept(s.state, 0, s.stride);
+    shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
+#if PLANES > 0
+    plane_face face;
+    STATE_RECALL(s, face, STATE_FACE);
+    const mask bare = mask_of(face.bare);
+    seen = color_pick(bare, face.tint, seen);
+    result.hit |= bare;
+    result.coverage = pick(bare, R(1.0), result.coverage);
+    result.point = vec_pick(bare, vec_along(from_eye.origin, face.t, from_eye.direction), result.point);
+    result.normal = vec_pick(bare, face.normal, result.normal);
+    result.smooth = pick(bare, face.count, result.smooth);
+#endif
+    result.depth = depth_of(result.point, w.view);
+    color background = sky(from_eye.direction, a.y, 0, w);
+#if HAS_FOG
+    const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
+    const color mist = color_splat(w.material->fog_color);
+    seen = color_mix(seen, mist, R(1.0) - exp(-(real)(w.material->fog_density) * way));
+    if (w.material->fog_background) background = mist;
+#endif
+    // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
+    if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
+    seen = color_pick(result.hit, seen, background);
+    result.radiance = color_mix(background, seen, result.coverage);
+#if PLANES > 0
+    plane_layers layers;
+    STATE_RECALL(s, layers, STATE_LAYERS);
+    result = planes_into(result, seen, background, layers, w.view);
+#endif
+    return result;
+}
+
+// Adds the shots to their pixels' sums; after the launch's last sample these are written.
+INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
+    const place_in_pass at = place_of_item(s.span, s.tile);
+    const mask wanted = mask_of(a.wanted);
+    const shot found = shot_of(s, a, eye_ray(a, w), seen, here, w);
+    pixel p = sums_before(s, &at);
+    sample_add(&p, found, wanted, a.offset);
+    const mask hit = wanted & less(R(0.0), found.coverage);
+    pass_count(&at, (s.span.mode & PASS_ADD) || s.sample > s.span.first, a.wanted, number_of(hit), cost);
+    if (s.sample + 1 < s.span.end) {
+        STATE_KEEP(s, p, STATE_SUMS);
+    } else {
+        pass_write(s.span, &at, &p);
+    }
+}

@@ -1,0 +1,134 @@
+// What is seen of cut planes in the picture of an object: the formula at places of them.
+// Where the formula is evaluated for a point of the picture: elsewhere if a volume is zoomed.
+INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
+    return vec_along(vec_splat(plane->zoom_origin), (real)(plane->zoom), point);
+}
+
+INLINE escaped plane_look(vec point, mask active, int i, plane_set set) {
+    return plane_escape(plane_place(point, set.planes + i), active, set.planes[i].smooth, 1, set.orbits + 1 + i, set.k);
+}
+
+// Whether the rays that begin at a cutting plane begin inside the set: faces, with their colours.
+INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tint, vec *normal, real *count) {
+    mask found = active & ~active;
+    active &= less(R(-0.5), face);
+    if (!any_lane(active)) return found;
+    const vec point = vec_along(r.origin, r.near, r.direction);
+    const mask inside = orbit_inside(plane_place(point, set.planes), active, set.orbits->iterations, set.orbits, set.k);
+    for (int i = 0; i < PLANES; ++i) {
+        const mask here = inside & active & equal(face, (real)((scalar)i));
+        if (!any_lane(here)) continue;
+        const escaped e = plane_look(point, here, i, set);
+        *tint = color_pick(here, escape_color(e, set.planes + i, set.palettes + 3 * PALETTE_SIZE * i), *tint);
+        *normal = vec_pick(here, vec_splat(set.planes[i].normal), *normal);
+        *count = pick(here, e.count, *count);
+        found |= here;
+    }
+    return found;
+}
+
+// Where a ray of the picture meets the quads, and what they are there; the largest number where it misses one.
+typedef struct {
+    real distance[PLANES], alpha[PLANES], count[PLANES];
+    color tint[PLANES];
+} plane_hits;
+
+// The nearest quad past the one at the distance `before` and place `after` in the list: of quads at one distance the list's
+// first is in front.
+typedef struct {
+    real before, after, distance, index, alpha, count;
+    color tint;
+    vec normal;
+} plane_hit;
+
+INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
+    plane_hits hits;
+    for (int i = 0; i < PLANES; ++i) {
+        __global const struct CutPlane *plane = set.planes + i;
+        const vec normal = vec_splat(plane->normal);
+        const real climb = vec_dot(r.direction, normal);
+        const vec offset = vec_sub(vec_splat(plane->center), r.origin);
+        const real t = vec_dot(offset, normal) / pick(equal(climb, R(0.0)), (real)(REAL_SMALLEST), climb);
+        const vec there = vec_sub(vec_scale(r.direction, t), offset);
+        const mask met = active & less(R(0.0), t) &
+                         less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
+                         less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
+                         less(R(0.0), (real)(fmax(plane->opacity, plane->inside_opacity)));
+        real distance = (real)(REAL_LARGEST), alpha = R(0.0), count = R(0.0);
+        color tint = color_of(R(0.0), R(0.0), R(0.0));
+        if (any_lane(met)) {
+            const escaped e = plane_look(vec_along(r.origin, t, r.direction), met, i, set);
+            distance = pick(met, t, distance);
+            alpha = pick(met, pick(e.inside, (real)(plane->inside_opacity), (real)(plane->opacity)), alpha);
+            count = e.count;
+            tint = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
+        }
+        // Places that the compiler knows: registers have no others, and few planes fit there.
+        for (int at = 0; at < PLANES; ++at) {
+            if (at != i) continue;
+            hits.distance[at] = distance;
+            hits.alpha[at] = alpha;
+            hits.count[at] = count;
+            hits.tint[at] = tint;
+        }
+    }
+    return hits;
+}
+
+INLINE plane_hit planes_next(const plane_hits *hits, real before, real after, plane_set set) {
+    plane_hit next;
+    next.before = before;
+    next.after = after;
+    next.distance = (real)(REAL_LARGEST);
+    next.index = R(-1.0);
+    next.alpha = R(0.0);
+    next.count = R(0.0);
+    next.tint = color_of(R(0.0), R(0.0), R(0.0));
+    next.normal = vec_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < PLANES; ++i) {
+        const real index = (real)((scalar)i);
+        const mask further = less(before, hits->distance[i]) | (equal(before, hits->distance[i]) & less(after, index));
+        const mask nearer = further & less(hits->distance[i], next.distance);
+        next.distance = pick(nearer, hits->distance[i], next.distance);
+        next.index = pick(nearer, index, next.index);
+        next.alpha = pick(nearer, hits->alpha[i], next.alpha);
+        next.count = pick(nearer, hits->count[i], next.count);
+        next.tint = color_pick(nearer, hits->tint[i], next.tint);
+        next.normal = vec_pick(nearer, vec_splat(set.planes[i].normal), next.normal);
+    }
+    return next;
+}
+
+// The quads along a ray of the picture, in front of and behind distance `object` (the largest number where nothing was hit).
+INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) {
+    const plane_hits hits = planes_met(r, active, set);
+    plane_layers layers;
+    layers.front = color_of(R(0.0), R(0.0), R(0.0));
+    layers.behind = layers.front;
+    layers.front_through = R(1.0);
+    layers.behind_through = R(1.0);
+    layers.nearest = (real)(REAL_LARGEST);
+    layers.normal = vec_scale(r.direction, R(-1.0));
+    layers.count = R(0.0);
+    real before = R(-1.0), after = R(-1.0);
+    for (int pass = 0; pass < PLANES; ++pass) {
+        const plane_hit next = planes_next(&hits, before, after, set);
+        if (!any_lane(less(next.distance, (real)(REAL_LARGEST)))) break;
+        before = next.distance;
+        after = next.index;
+        const mask in_front = less(next.distance, object);
+        const real front = pick(in_front, next.alpha * layers.front_through, R(0.0));
+        const real behind = pick(in_front, R(0.0), next.alpha * layers.behind_through);
+        layers.front = color_add(layers.front, color_scale(next.tint, front));
+        layers.behind = color_add(layers.behind, color_scale(next.tint, behind));
+        layers.front_through -= front;
+        layers.behind_through -= behind;
+        const mask well = in_front & less_equal(R(0.5), next.alpha) & less(next.distance, layers.nearest);
+        layers.nearest = pick(well, next.distance, layers.nearest);
+        layers.normal = vec_pick(well, next.normal, layers.normal);
+        layers.count = pick(well, next.count, layers.count);
+    }
+    const mask seen = less(layers.nearest, (real)(REAL_LARGEST));
+    layers.point = vec_along(r.origin, pick(seen, layers.nearest, R(0.0)), r.direction);
+    return layers;
+}

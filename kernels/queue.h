@@ -1,0 +1,67 @@
+// Rays that wait to be marched, and what they met. Stages that know no formula write rays down; `march.cl`, which knows
+// little else, marches them, whatever they are for.
+//
+// A wave is the pixels of one launch. Each of them may send several rays for one purpose, its turns: turn by turn stands one ray
+// of every pixel of the wave. What a ray finds depends on nothing but the ray, so the order of marching is free.
+#include "memory.h"
+
+// What a ray met.
+typedef struct {
+    real hit;                      // 1 or 0
+    real t, steps, count, bad;     // as a crossing's ...
+    real touch, last;              // ... and of a surface: where it is shaded, for one
+    vec normal;                    // of a surface: towards the viewer, length 1 ...
+    real smooth;                   // ... its escape count ...
+    real more_steps, more_count;   // ... and what finding these has cost
+    vec near;                      // see surface_at.h
+} encounter;
+
+// Places of numbers in these structs; only points of a pixel have something that is known.
+#define RAY_NEAR 6
+#define RAY_FAR 7
+#define RAY_NUMBERS (POINTS > 1 ? NUMBERS_OF(ray) : NUMBERS_OF(ray) - 1)
+#define RAY_STRENGTH NUMBERS_OF(ray)
+#define ENCOUNTER_SURFACE 5
+#define ENCOUNTER_NORMAL 7
+// What is found of a shadow: not how often a march was surprised.
+#define SHADOW_NUMBERS 4
+
+typedef struct {
+    __global scalar *rays, *met;
+    int wave, turns;   // pixels of the wave, and rays of each that were marched
+    int stride;        // from one number of a ray to its next
+} queue;
+
+// Sends one ray of each pixel of a packet, whose first pixel is number `first` of the wave. Those that are not wanted have no
+// length: nobody marches them, and they meet nothing.
+INLINE void queue_send(queue q, int turn, int first, ray r, mask wanted) {
+    r.far = pick(wanted, r.far, R(-1.0));
+    numbers_keep((const real *)&r, RAY_NUMBERS, q.rays + turn * q.wave + first, q.stride);
+}
+
+// Sends none for any pixel of a packet.
+INLINE void queue_skip(queue q, int turn, int first) {
+    __global scalar *at = q.rays + turn * q.wave + first;
+    lanes_store(R(0.0), at + RAY_NEAR * q.stride);
+    lanes_store(R(-1.0), at + RAY_FAR * q.stride);
+}
+
+INLINE ray queue_ray(queue q, int turn, int first) {
+    ray r;
+    r.known = RAY_NOTHING_KNOWN;
+    numbers_recall((real *)&r, RAY_NUMBERS, q.rays + turn * q.wave + first, q.stride);
+    return r;
+}
+
+INLINE encounter queue_met(queue q, int turn, int first) {
+    encounter e;
+    RECALL(e, q.met + turn * q.wave + first, q.stride);
+    const ray r = queue_ray(q, turn, first);
+    const mask sent = less(r.near, r.far);
+    e.hit = pick(sent, e.hit, R(0.0));
+    e.t = pick(sent, e.t, R(0.0));
+    e.steps = pick(sent, e.steps, R(0.0));
+    e.count = pick(sent, e.count, R(0.0));
+    e.bad = pick(sent, e.bad, R(0.0));
+    return e;
+}

@@ -1,0 +1,40 @@
+// A stage is a kernel that takes every pixel of a wave one step further; `clfractal/renderers/waves.py` has their order.
+#include "passes.h"
+#include "queue.h"
+
+// Where an item is none of the picture's packets.
+#define IS_BEYOND ((int)get_global_id(0) + first_packet >= end_packet || WAS_CANCELLED)
+
+// All data that stages without a formula read.
+typedef struct {
+    __constant const struct View *view;
+    __constant const struct March *settings;
+    __constant const struct Material *material;
+    __constant const struct Light *lights;
+    __global const float *palette;
+    __global const float *environment;
+    plane_set planes;
+} world;
+#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}}
+
+// A work-item's packet.
+typedef struct {
+    pass span;
+    queue q;
+    __global scalar *state;   // see state.h
+    int stride;               // from one number of it to the next
+    int tile;                 // of the launch
+    int slot;                 // number of the packet's first pixel in the wave
+    int bounce, sample;
+} stage;
+
+INLINE stage stage_of(pass span, queue q, __global scalar *state, int first_tile, int bounce, int sample) {
+    const int packets = span.end_packet - span.first_packet;
+    const int slot = ((int)get_global_id(1) * packets + (int)get_global_id(0)) * LANES;
+    const stage s = {span, q, state + slot, q.wave + STATE_PADDING, first_tile + (int)get_global_id(1), slot, bounce, sample};
+    return s;
+}
+#define STAGE_OF(name)                                                                                                     \
+    const pass span_ = PASS;                                                                                               \
+    const queue queue_ = STAGE_QUEUE;                                                                                      \
+    const stage name = stage_of(span_, queue_, state, first_tile, bounce, sample)

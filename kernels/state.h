@@ -1,0 +1,97 @@
+// What is kept of a shot between its stages, for each pixel of a wave; masks as 1 or 0.
+
+// Where the shot goes to.
+typedef struct {
+    real wanted;           // whether the pixel takes this sample
+    real x, y;             // pixels from the picture's top left corner
+    real offset;           // distance squared from the pixel's middle, pixels
+    real lens_x, lens_y;   // lens radii from its middle; kept with HAS_LENS only
+} aim;
+
+// What was found first.
+typedef struct {
+    real coverage, steps;
+} sighting;
+
+// How far the pixel's whole cone is free.
+typedef struct {
+    real touched, t;
+} touch;
+
+// A place on the surface, and how it looks.
+typedef struct {
+    real found;
+    vec point;               // where it is shaded, and rays leave it
+    vec seen;                // where the ray has met it
+    vec normal;              // the one that stands for all: shadows, reflections, channel N
+    real cone;               // the pixel's footprint there
+    real smooth;             // escape count
+    color tint;
+    real quantity;           // what chooses the colour, where that is not known at once
+    real residual;           // distance of the pixel's points from their plane, in footprints
+} spot;
+
+// One of the normals over which shading is averaged.
+typedef struct {
+    vec normal;
+    real weight;
+} facet;
+
+// A path after a bounce.
+typedef struct {
+    vec origin, direction;
+    real footprint, spread;
+    real on_path;
+    real through;   // part of what comes next that reaches the eye
+    color seen;     // light so far
+} path;
+
+// Where a cutting plane opens the set, and its face is visible.
+typedef struct {
+    real bare, t, count;
+    color tint;
+    vec normal;
+} plane_face;
+
+#define COLORING_PER_POINT \
+    (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
+// Numbers that are kept of an aim, and of a spot.
+#define AIM_NUMBERS (NUMBERS_OF(aim) - (HAS_LENS ? 0 : 2))
+#define SPOT_NUMBERS (NUMBERS_OF(spot) - (COLORING_PER_POINT ? 2 : 0))
+
+#define STATE_AIM 0
+#define STATE_SIGHTING (STATE_AIM + NUMBERS_OF(aim))
+#define STATE_TOUCH (STATE_SIGHTING + NUMBERS_OF(sighting))
+#define STATE_TALLY (STATE_TOUCH + NUMBERS_OF(touch))
+#define STATE_PATH (STATE_TALLY + NUMBERS_OF(tally))
+#define STATE_SUMS (STATE_PATH + NUMBERS_OF(path))
+// Of the first spot, and of the one after the last bounce.
+#define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))
+#define STATE_FACE (STATE_SPOT(1) + NUMBERS_OF(spot))
+#define STATE_LAYERS (STATE_FACE + NUMBERS_OF(plane_face))
+#define STATE_FACET(i) (STATE_LAYERS + NUMBERS_OF(plane_layers) + (i) * NUMBERS_OF(facet))
+// STATE_NUMBERS is what the host has made room for.
+#define FEW(type) (NUMBERS_OF(type) <= MOST_NUMBERS)
+typedef char structs_are_small[FEW(aim) && FEW(spot) && FEW(path) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
+typedef char state_has_room[STATE_FACET(NORMAL_COUNT) <= STATE_NUMBERS ? 1 : -1];
+
+#define STATE_KEEP(s, thing, number) KEEP(thing, (s).state + (number) * (s).stride, (s).stride)
+#define STATE_RECALL(s, thing, number) RECALL(thing, (s).state + (number) * (s).stride, (s).stride)
+
+INLINE aim aim_kept(__global const scalar *state, int stride) {
+    aim a;
+    a.lens_x = a.lens_y = R(0.0);
+    numbers_recall((real *)&a, AIM_NUMBERS, state + STATE_AIM * stride, stride);
+    return a;
+}
+
+INLINE spot spot_kept(__global const scalar *state, int bounce, int stride) {
+    spot here;
+    here.quantity = here.residual = R(0.0);
+    numbers_recall((real *)&here, SPOT_NUMBERS, state + STATE_SPOT(bounce) * stride, stride);
+    return here;
+}
+
+INLINE void spot_keep(const spot *here, __global scalar *state, int bounce, int stride) {
+    numbers_keep((const real *)here, SPOT_NUMBERS, state + STATE_SPOT(bounce) * stride, stride);
+}

@@ -1,0 +1,46 @@
+"""Kernels stay readable: no function above 80 lines (of files `test_layers.py` counts the lines)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from clfractal.resources import folder
+
+MOST_LINES = 80
+# Those that are longer, and how long they may be: to be split, never to grow.
+LONGER = {
+    "march.h: march_step": 140,
+    "volume_shot.h: take_shot": 150,
+    "voxels.h: solid_inside": 92,
+    "voxels_bricks.cl: store_bricks": 95,
+}
+# A function's or a kernel's name, at the left; its body begins on the same line or a few lines below.
+_HEAD = re.compile(r"^(?:INLINE|static inline|__kernel)\b[^;{]*?(\w+)\(", re.MULTILINE)
+
+
+def functions(text: str) -> Iterator[tuple[str, int]]:
+    """Names of the functions of a file, and their lines from the first of the head to the closing brace."""
+    lines = text.splitlines()
+    for head in _HEAD.finditer(text):
+        first = text.count("\n", 0, head.start())
+        if lines[first].rstrip().endswith("}"):
+            yield head[1], 1
+            continue
+        end = next(number for number in range(first, len(lines)) if lines[number].startswith("}"))
+        yield head[1], end - first + 1
+
+
+def test_no_function_of_a_kernel_is_long() -> None:
+    found = {
+        f"{path.name}: {name}": count
+        for path in folder("kernels").rglob("*.[ch]*")
+        for name, count in functions(path.read_text("utf-8"))
+    }
+    assert len(found) > 300
+    assert {name: count for name, count in found.items() if count > LONGER.get(name, MOST_LINES)} == {}
+
+
+def test_functions_are_counted() -> None:
+    text = "INLINE int one(int a) { return a; }\n\n__kernel void two(\n    int a) {\n    a = 1;\n}\n"
+    assert list(functions(text)) == [("one", 1), ("two", 4)]
