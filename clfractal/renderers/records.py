@@ -198,8 +198,8 @@ def step_scale(scene: Scene) -> float:
 def near_height(scene: Scene) -> float:
     """The scaled distance at which light is computed, in cones.
 
-    The only sample of a pixel is smoothed over several footprints, or a rough surface would be noise. Many samples, or points, are
-    averaged, and show the surface as it is.
+    The only sample of a pixel is smoothed over several footprints, or a rough surface would be noise. Many samples, or
+    points, are averaged, and show the surface as it is.
     """
     parts = scene.surface.samples * scene.surface.used_points.count
     return step_scale(scene) * max(NEAR / parts, NEAR_LEAST)
@@ -207,7 +207,7 @@ def near_height(scene: Scene) -> float:
 
 def march_record(scene: Scene, precision: Precision) -> Record:
     """The settings of the march, and of the rays that a shot sends."""
-    chain, renderer = scene.chain, scene.surface
+    renderer = scene.surface
     center, radius = scene.bounds
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
     half = radius / 2
