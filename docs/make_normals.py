@@ -1,4 +1,4 @@
-"""Measures the five normals, for docs/normals.md: its tables, and its pictures docs/pictures/normals_*.png.
+"""Measures the five normals, for docs/normals.md: its tables, and its pictures docs/pictures/normals_*.webp.
 
     python docs/make_normals.py            measures, and writes the tables into the page (a minute)
     python docs/make_normals.py --show     only prints them
@@ -183,8 +183,8 @@ def make_pictures() -> None:
     for normal in NORMALS:
         scene = figure(normal, SIZES[-1])
         film = render(scene, channels=["R", "G", "B"], region=CROP)
-        target = DOCS / "pictures" / f"normals_{normal}.png"
-        Image.fromarray(film.to_rgb8(scene.output.stops)).save(target, optimize=True)
+        target = DOCS / "pictures" / f"normals_{normal}.webp"
+        Image.fromarray(film.to_rgb8(scene.output.stops)).save(target, "WEBP", lossless=True, method=4)
         print(target)
 
 

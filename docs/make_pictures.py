@@ -5,12 +5,13 @@
 
 A picture is a row of panels (or several rows of them). Each panel is one scene of the table with some values replaced,
 rendered at the panel's size; between panels the picture is transparent. Nothing is random: the same program on the
-same device makes the same files.
+same device makes the same files. They are lossless where that is small enough, else as good as LARGEST_FILE of the
+gallery allows.
 
 Keys of the table:
 
     scenes      name: a whole scene
-    pictures    name: a picture, which becomes docs/pictures/NAME.png
+    pictures    name: a picture, which becomes docs/pictures/NAME.webp
       page      the page of docs/ that shows it
       scene     a name of `scenes`
       set       dotted key: value, replaced in every panel
@@ -24,12 +25,14 @@ Keys of the table:
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
@@ -49,7 +52,6 @@ DOCS = Path(__file__).resolve().parent
 TABLE = DOCS / "pictures.yaml"
 PICTURES = DOCS / "pictures"
 GAP = 6  # pixels between panels
-LARGEST_FILE = 300_000  # bytes
 Show = Literal["samples", "left", "right"]
 
 
@@ -88,7 +90,7 @@ class Picture:
     @property
     def path(self) -> Path:
         """Where the picture lies."""
-        return PICTURES / f"{self.name}.png"
+        return PICTURES / f"{self.name}.webp"
 
 
 def table() -> tuple[Picture, ...]:
@@ -123,7 +125,7 @@ def make_picture(picture: Picture) -> None:
     """Renders the panels of a picture and writes it.
 
     Raises:
-        ValueError: the file is larger than LARGEST_FILE; it stays, to be looked at.
+        ValueError: the file would be too large at the lowest quality; make its panels smaller.
     """
     width, height = picture.panel_size
     whole = Image.new("RGBA", picture.size)
@@ -143,13 +145,30 @@ def make_picture(picture: Picture) -> None:
         shown = shown.convert("RGBA").resize((width, height), Image.Resampling.NEAREST)
         row, column = divmod(index, picture.columns)
         whole.paste(shown, (column * (width + GAP), row * (height + GAP)))
-    whole.save(picture.path, optimize=True)
-    size = picture.path.stat().st_size
-    print(f"{picture.path.name}: {size // 1000} kB, {seconds:.1f} s", flush=True)
-    if size > LARGEST_FILE:
-        raise ValueError(
-            f"{picture.path.name} is larger than {LARGEST_FILE // 1000} kB: make its panels smaller"
-        )
+    content = small_file(whole)
+    picture.path.write_bytes(content)
+    print(f"{picture.path.name}: {len(content) // 1000} kB, {seconds:.1f} s", flush=True)
+
+
+def gallery() -> ModuleType:
+    """docs/make_gallery.py, which belongs to no package."""
+    spec = importlib.util.spec_from_file_location("make_gallery", DOCS / "make_gallery.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def small_file(whole: Image.Image) -> bytes:
+    """A WebP file, lossless if it can be as small as the gallery's pictures, else as good as that allows."""
+    maker = gallery()
+    file = io.BytesIO()
+    whole.save(file, "WEBP", lossless=True, quality=50, method=4)
+    content = file.getvalue()
+    if len(content) > maker.LARGEST_FILE:
+        content, _ = maker.small_enough(whole)
+    return content
 
 
 def _heat(values: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
