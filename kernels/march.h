@@ -6,11 +6,12 @@
 #define SLOPE_GAIN R(0.3)        // part of a newly measured slope
 #define LANDING R(1.0)           // of the cone: from this distance on the march lands
 #define LANDING_AIM R(0.05)       // of the cone: the distance that a landing step aims at
-#define LANDING_STEP R(1.5)      // of the cone: the longest landing step
+#define LANDING_STEP R(1.0)      // of the cone: the longest landing step
 #define LANDED R(0.6)            // of the cone: the solid expected so near ahead is hit ...
 #define LANDED_MOST R(0.25)      // ... at a distance of at most this part of the cone
 #define LANDED_LEAST R(0.03)     // a ray past the solid hits at this part of the cone: a smooth rim stays where it is
 #define POINT_REACH R(1.5)       // a pixel's points hit at that much more
+#define PASSED_SLOPE R(-0.1)    // what a sheet is approached with at the least
 #define BRACKETED R(0.1)         // of the cone: a bracket this narrow is the surface
 #define LEAST_SLOPE R(0.1)       // no solid is farther ahead than ten distances
 #define MOST_GROWTH R(0.5)      // of an unscaled distance for the way: that of a smooth surface grows so, being half of the true one
@@ -109,6 +110,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     // (Not where it has only just begun.)
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps), R(1.0), R(0.0));
     const mask measured = outside & free & less(R(0.0), m->step_before) & less(m->radius_before, (real)(REAL_LARGEST));
+    const mask steep = less(m->slope, PASSED_SLOPE);
     const real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
     march_keep(m, &s, outside, inside, settings);
@@ -129,9 +131,18 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
         touched &= landed;
     }
     touched &= less(radius, reach);
+    real ahead = goal == GOAL_SURFACE ? fmin(radius / fmax(-slope, R(0.01)), R(2.0) * cone) : R(0.0);
+    mask passed = outside & ~outside;
+#if !HAS_DERIVATIVE
+    // A landing that leads through a sheet thinner than all steps sees it from behind.
+    if (goal == GOAL_SURFACE) {
+        passed = outside & m->landing & steep & less(radius, cone) & less(R(0.0), vec_dot(s.surface.gradient, m->r.direction));
+        touched |= passed;
+        ahead = pick(passed, -fmin(radius, m->step_before), ahead);
+    }
+#endif
     const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, BRACKETED * cone) : inside;
-    const real ahead = goal == GOAL_SURFACE ? fmin(radius / fmax(-slope, R(0.01)), R(2.0) * cone) : R(0.0);
-    const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings);
+    const mask done = narrow | proof_begin(m, &s, touched, passed, bracketed, m->t + ahead, goal, settings);
     m->found.hit |= done;
     m->found.last = pick(done, m->low, m->found.last);
     m->found.t = pick(done, pick(bracketed, m->low, m->t + ahead), m->found.t);

@@ -59,7 +59,8 @@ INLINE real quick_exp2(real a) {
 //
 // Degree > 1: |z_n| grows like exp(G degree^n) with G the potential, so |z| log|z| / (2 g) is half of G / |grad G| (Hart,
 // Sandin, Kauffman 1989; the half makes it a lower bound for conformal maps). The solid of `iterations` applications is the
-// level set of G at log(bailout) / degree^iterations: subtracting it matters in the last few counts only.
+// level set of G at L = log(bailout) / degree^iterations. The map of a half plane that bends space most, w -> w^2, has the
+// distance (G^2 - L^2) / (2 G |grad G|). Far outside the distance is at most (1 - exp(-G)) / |grad G|, that of a ball.
 INLINE real distance_from_growth(real square, real relative, real count, __constant const struct Orbit *orbit) {
 #if LOGARITHMIC
     const real height = R(0.34657359028) * quick_log2(square);  // half of log 2

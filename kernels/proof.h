@@ -22,7 +22,7 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
     return m->active;
 }
 
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask passed, mask bracketed, real hit_t, int goal,
                         __constant const struct March *settings) {
     return touched;
 }
@@ -60,13 +60,13 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
 
 // Lanes that touched the solid begin a proof, and those under way go further down. The result are hits that need no proof: a
 // bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be proved again.
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask passed, mask bracketed, real hit_t, int goal,
                         __constant const struct March *settings) {
     mask done = touched & bracketed;
 #if POINTS > 1
     done |= touched & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone);
 #endif
-    const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
+    const mask due = touched & ~done & (passed | less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
     if (!any_lane(m->proving | due)) return done;
     const vec downhill = vec_scale(vec_normalize(s->surface.gradient), R(-1.0));
     // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.

@@ -113,7 +113,7 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
     """Estimated distance to the solid (0 inside), in scene units, and the gradient of the last potential.
 
     The solid is the set of points with |z| <= bailout after `iterations` applications. With J the Jacobian of
-    the last z and g = |J^T z/|z||: for a degree above 1 (|z| log|z| - what is left of the bailout's) / (2 g),
+    the last z and g = |J^T z/|z||: for a degree above 1 |z| log|z| / (2 g) times two factors (docs/formulas.md, Distances),
     for degree 1 (|z| - R) / g with R the chain's `solid_radius`, or the last lasting formula's `shape` over its
     own gradient. Iteration stops beyond the distance bailout. No step scale is applied.
 
@@ -140,8 +140,11 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
         elif chain.degree > 1:
             # The solid of few iterations is the level set of the potential at the bailout.
             left = (iterations - count) / chain.cycle_length
-            height = np.log(radius) - math.log(chain.bailout) * chain.degree**-left
-            result = 0.5 * radius * height / np.linalg.norm(gradient, axis=1)
+            height = np.log(radius)
+            level = math.log(chain.bailout) * chain.degree**-left / height
+            far = height * chain.degree ** (-count / chain.cycle_length)
+            share = (1 - level**2) / (1 + far / 2 + far**2 / 12)
+            result = 0.5 * radius * height * share / np.linalg.norm(gradient, axis=1)
         else:
             result = (radius - chain.solid_radius) / np.linalg.norm(gradient, axis=1)
         result = np.where(inside | ~(result > 0), 0.0, result)
