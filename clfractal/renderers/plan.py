@@ -41,6 +41,8 @@ class Plan:
         channels: what the film holds, in order.
         divider: n for a coarse picture, which has every nth pixel of the picture in each direction; the region is counted
             in these.
+        finished_samples: rays per pixel of the finished picture, where that is not `samples`; 0: it is. A coarse picture
+            looks like the finished one.
     """
 
     precision: Precision
@@ -49,6 +51,12 @@ class Plan:
     region: Region
     channels: tuple[str, ...]
     divider: int = 1
+    finished_samples: int = 0
+
+    @property
+    def averaged(self) -> int:
+        """Samples that a pixel of the finished picture averages."""
+        return self.finished_samples or self.samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +91,12 @@ class PlannedView:
         region = self.plan.region
         left, top = region.x // divider, region.y // divider
         small = Region(left, top, -(-region.right // divider) - left, -(-region.bottom // divider) - top)
-        return replace(self, plan=replace(self.plan, samples=1, region=small, divider=divider))
+        return replace(
+            self,
+            plan=replace(
+                self.plan, samples=1, region=small, divider=divider, finished_samples=self.plan.averaged
+            ),
+        )
 
 
 def finest_steps(scene: Scene, view: View) -> float:

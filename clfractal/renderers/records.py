@@ -195,18 +195,18 @@ def step_scale(scene: Scene) -> float:
     return given if given is not None else scene.chain.step_scale
 
 
-def near_height(scene: Scene) -> float:
+def near_height(scene: Scene, samples: int) -> float:
     """The scaled distance at which light is computed, in cones.
 
     The only sample of a pixel is smoothed over several footprints, or a rough surface would be noise. Many samples, or
     points, are averaged, and show the surface as it is.
     """
-    parts = scene.surface.samples * scene.surface.used_points.count
+    parts = samples * scene.surface.used_points.count
     return step_scale(scene) * max(NEAR / parts, NEAR_LEAST)
 
 
-def march_record(scene: Scene, precision: Precision) -> Record:
-    """The settings of the march, and of the rays that a shot sends."""
+def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record:
+    """The settings of the march, and of the rays that a shot sends; a pixel averages `samples` shots."""
     renderer = scene.surface
     center, radius = scene.bounds
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
@@ -220,7 +220,7 @@ def march_record(scene: Scene, precision: Precision) -> Record:
         "step_scale": step_scale(scene),
         "relaxation": renderer.over_relaxation,
         "detail": renderer.detail,
-        "near": near_height(scene),
+        "near": near_height(scene, samples),
         "shadow_lift": SHADOW_LIFT * renderer.detail,
         "shadow_detail": SHADOW_DETAIL,
         "max_steps": renderer.max_steps,

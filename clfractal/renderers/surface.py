@@ -175,7 +175,7 @@ class SurfaceKernel(TileKernel):
         if surroundings is not None:
             packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
         return [
-            records.march_record(scene, precision),
+            records.march_record(scene, precision, self.plan.averaged),
             np.stack(
                 [
                     records.orbit_record(scene.chain, scene.formula.iterations, precision),
