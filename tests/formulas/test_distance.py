@@ -28,13 +28,18 @@ def points(count: int, size: float, seed: int = 1) -> Float:
 
 
 def test_the_ball_has_hubbard_and_douadys_estimate() -> None:
-    # |z_n| = |p|^(2^n), so the potential is log|p| and |z| log|z| / (2 g) = |p| log|p| / 2 after any count;
-    # the level set of 20 applications at the bailout 4 lies log(4) / 2^20 lower.
+    # |z_n| = |p|^(2^n), so the potential G is log|p| and |z| log|z| / (2 g) = |p| log|p| / 2 after any count. The solid of 20
+    # applications is the level set at L = log(4) / 2^20, and the distance is bounded by a half plane's near it, a ball's far off.
     p = points(500, 2)
     r = np.linalg.norm(p, axis=1)
     got, gradient = distance(catalog.load_chain(BALL), p, 20)
-    expected = np.maximum(0.5 * r * (np.log(r) - math.log(4) / 2**20), 0)
+    potential, level = np.log(r), math.log(4) / 2**20
+    share = (1 - (level / potential) ** 2) / (1 + potential / 2 + potential**2 / 12)
+    expected = np.where(r > math.exp(level), 0.5 * r * potential * share, 0)
     np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-12)
+    exact = np.maximum(r - math.exp(level), 0)
+    np.testing.assert_array_less(got, exact + 1e-12)
+    np.testing.assert_allclose(2 * got, exact, rtol=0.01, atol=1e-5)
     outside = r > 1.001
     normal = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
     np.testing.assert_allclose(normal[outside], (p / r[:, None])[outside], atol=1e-12)

@@ -143,10 +143,12 @@ def test_what_touches_a_pixel_is_proved(device: Device) -> None:
     )
     hit = shoot(by_distance, device, channels=("A",))["A"] > 0
     covered = shoot(by_steps, device, channels=("A",), samples=64)["A"] > 0
+    middle = shoot(by_steps, device, channels=("A",))["A"] > 0
     assert covered.sum() > 1400
-    assert not (covered & ~hit).any()
-    # At rims a ray may pass within `detail` of the solid, beside all 64: 88 pixels; 153 if nothing had to be proved.
-    assert (hit & ~covered).sum() < 0.075 * covered.sum()
+    # A pixel's own ray sees what it meets.
+    assert not (middle & ~hit).any()
+    # At rims a ray may pass within `detail` of the solid, beside all 64: 71 pixels.
+    assert (hit & ~covered).sum() < 0.06 * covered.sum()
 
 
 def test_the_search_for_inside_points(device: Device) -> None:
