@@ -62,7 +62,7 @@ def build_in_child(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         folder = tmp_path / "job"
         folder.mkdir(exist_ok=True)
         launch = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
-        request = {"text": text, "flags": list(math_flags(recipe.precision)), "warm": launch.as_data()}
+        request = {"text": text, "flags": list(math_flags(recipe.precision)), "warm": [launch.as_data()]}
         isolate.end_children()
         failure = isolate.run(
             "clfractal.device.compiler:compile_job",
