@@ -31,7 +31,7 @@ CAPACITY = 512
 # processor the next stage should find them in the caches; a GPU wants many pixels at a time.
 WAVE_BYTES = {"cpu": 6 << 20, "gpu": 512 << 20}
 # Rays that a work-item marches: a packet of lanes, which take them in turn, or one lane.
-PACKET_RAYS, LANE_RAYS = 256, 4
+PACKET_RAYS, LANE_RAYS = 1024, 4
 _RAY_GROUP = {1: 64}
 # Numbers that every kernel is given last, or before those of waves: the packets and samples of a launch, and its mode.
 _SPAN_NUMBERS = 5
@@ -166,5 +166,5 @@ class Stages:
         lanes = self.kernel.plan.lanes
         if lanes == 1:
             return LANE_RAYS
-        share = rays // (8 * max(self.device.info.compute_units, 1))
+        share = rays // (3 * max(self.device.info.compute_units, 1))
         return min(max(share // lanes, 1) * lanes, PACKET_RAYS)
