@@ -26,14 +26,15 @@ INLINE vec surface_normal(vec wide, vec fine, const encounter *met, real cone) {
     return vec_normalize(vec_along(wide, share, vec_sub(at_hit, wide)));
 }
 
+#define POLISH_HEIGHT R(0.16667)
 #if POLISH
-// A place that does not depend on how the march came there: where the distance is half the cone, by the secant method (the
+// A place that does not depend on how the march came there: where the distance is a sixth of the cone, by the secant method (the
 // slope is that of a distance, -1, at first). Normals from the positions of points need it.
 INLINE surface_point surface_polished(ray r, encounter *met, mask active, __constant const struct March *settings,
                                       __constant const struct Orbit *orbit, __constant const scalar *k, clearance *there) {
     surface_point surface;
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
-    const real wanted = R(0.5) * cone;
+    const real wanted = POLISH_HEIGHT * cone;
     real t = met->touch, before = t, height_before = R(0.0);
     for (int i = 0; i < TURNS(POLISH); ++i) {
         *there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, orbit, k, &surface);

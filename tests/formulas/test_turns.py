@@ -187,7 +187,7 @@ TWO_BALLS: list[dict[str, Any]] = [
 
 def test_a_member_of_count_2_has_its_degree_twice_in_distances() -> None:
     # After k cycles |z| = |p|^(4^k). The solid of 6 applications is |p| <= 4^(1/16), and that is where the
-    # estimate |p| (log|p| - log(4) / 16) / 2 is 0; with a degree of 2 in place of 4 it would be elsewhere.
+    # estimate is 0, a Newton step from its surface; with a degree of 2 in place of 4 it would be elsewhere.
     both = chain(*TWO_BALLS, bailout=4)
     r = np.linspace(1.05, 1.5, 400)
     points = r[:, None] * np.array([0.6, 0.0, 0.8])
@@ -195,7 +195,9 @@ def test_a_member_of_count_2_has_its_degree_twice_in_distances() -> None:
     count, _ = escape(both, points, 30, bailout=both.distance_bailout)
     exact = count % 3 == 0
     assert exact.sum() > 40
-    expected = np.maximum(0.5 * r * (np.log(r) - math.log(4) / 16), 0)
+    potential, level = np.log(r), math.log(4) / 16
+    share = (1 - (level / potential) ** 2) / (1 + potential / 2 + potential**2 / 12)
+    expected = np.maximum(0.5 * r * potential * share, 0)
     np.testing.assert_allclose(got[exact], expected[exact], rtol=1e-9, atol=1e-12)
     assert (got[r < 4 ** (1 / 16) - 1e-9] == 0).all()
 
