@@ -1,8 +1,8 @@
 #include "camera.h"
 
-// A march by the Jacobian already knows the surface's normal when it arrives.
-// Not on one lane: six more numbers would cost a GPU more than to look once more at the end.
-#define MARCH_KEEPS_SURFACE (SEARCH == SEARCH_DISTANCE && !HAS_DERIVATIVE && !POLISH && LANES > 1)
+// A march by the Jacobian knows gradients where it arrives, but six more numbers would cost a GPU more than to look again at the
+// end, and all lane counts have to look the same.
+#define MARCH_KEEPS_SURFACE 0
 
 // The result of a march.
 typedef struct {

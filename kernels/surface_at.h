@@ -15,14 +15,15 @@ INLINE encounter encounter_of(crossing c) {
 
 // The normal of the surface where a march has ended, and its escape count. Both are taken where the ray's cone came near the
 // solid: most of these surfaces are rougher than a pixel, and there the distance has smoothed them over the pixel's footprint.
-// Where the surface is smooth its normal is the one at the hit: there both differ little for the way between them.
+// Where the surface is smooth light is computed at the hit: there both normals differ little for the way between them.
 #define SMOOTH R(0.009)  // radians a footprint: a smooth surface turns at most so fast ...
 #define ROUGH R(0.013)   // ... and one that turns faster is rough
-INLINE vec surface_normal(vec wide, vec fine, const encounter *met, real cone) {
+INLINE vec surface_normal(vec wide, vec fine, encounter *met, real cone) {
     const real way = fmax(met->last - met->touch, R(0.01) * cone);
     const vec turn = vec_scale(vec_sub(fine, wide), R(1.0) / way);
     const real share = clamp((ROUGH - sqrt(vec_dot(turn, turn)) * cone) / (ROUGH - SMOOTH), R(0.0), R(1.0));
     const vec at_hit = vec_along(fine, met->t - met->last, turn);
+    met->touch += share * (met->t - met->touch);
     return vec_normalize(vec_along(wide, share, vec_sub(at_hit, wide)));
 }
 

@@ -35,6 +35,7 @@ from tests.render.shots import (
 )
 
 SIDE, DETAIL = 48, 0.01
+RIM = 0.1  # of DETAIL: how much wider the ball looks
 RGB = ("R", "G", "B")
 
 
@@ -112,20 +113,20 @@ def test_samples_by_noise(
     """Sample by sample: the standard error of what is seen, light or coverage, is what stops a pixel."""
     samples = 128
     film = shoot(adaptive(noise, samples, least, white, transparent), device)
-    # The distance is half the true one near the ball, so that rays hit where it is smaller than half of DETAIL.
+    # A ray past the ball hits where the distance, half the true one there, is below 0.03 of DETAIL.
     hit_distance = DETAIL * 2.6 / SIDE
-    sure = (np.abs(passing(samples) - BALL_RADIUS - 2 * hit_distance) > 0.15 * hit_distance).all(-1)
-    hits = passing(samples) < BALL_RADIUS + 2 * hit_distance
+    sure = (np.abs(passing(samples) - BALL_RADIUS - RIM * hit_distance) > 0.2 * hit_distance).all(-1)
+    hits = passing(samples) < BALL_RADIUS + RIM * hit_distance
     count, mean = judged(hits.astype(float), noise, least or 16)
     taken, first = film["samples"], 4 * -(-(least or 16) // 4)
     assert taken.min() == first
     assert taken.max() <= samples
-    assert (sure & (count > first)).sum() > 60
+    assert (sure & (count > first)).sum() > 45
     np.testing.assert_array_equal(taken[sure], count[sure])
     np.testing.assert_allclose(film["A"][sure], mean[sure], atol=1e-6)
     np.testing.assert_allclose(film["R"], film["A"] if white else 0, atol=1e-6)
     # The error is below what was asked for, but where samples ran out or the first ones were all alike by chance.
-    exact = (passing() < BALL_RADIUS + 2 * hit_distance).mean(-1)
+    exact = (passing() < BALL_RADIUS + RIM * hit_distance).mean(-1)
     error = film["A"] - exact
     alike = (film["A"] == 0) | (film["A"] == 1)
     assert np.abs(error[alike]).max() < 1.5 / first
@@ -139,8 +140,8 @@ def test_samples_by_the_noise_of_greys(device: Device) -> None:
     ball, sky, noise, samples = 0.09, 0.36, 0.0191, 64
     film = shoot(adaptive(noise, samples, None, True, False, (ball, sky)), device)
     hit_distance = DETAIL * 2.6 / SIDE
-    sure = (np.abs(passing(samples) - BALL_RADIUS - 2 * hit_distance) > 0.15 * hit_distance).all(-1)
-    hits = passing(samples) < BALL_RADIUS + 2 * hit_distance
+    sure = (np.abs(passing(samples) - BALL_RADIUS - RIM * hit_distance) > 0.2 * hit_distance).all(-1)
+    hits = passing(samples) < BALL_RADIUS + RIM * hit_distance
     count, _ = judged(np.where(hits, ball**0.5, sky**0.5), noise, 16)
     # The roots differ by 0.3, the luminances by 0.27: neither these nor others would stop at the same samples.
     assert len(np.unique(count[sure])) > 5
@@ -170,7 +171,7 @@ def sun_scene(folder: Path, sun: float, limit: float | None, **sections: Any) ->
     size = (32, 16)
     bands = [{name: sky[..., i] for i, name in enumerate(RGB)}]
     write_exr(path, bands, display=size, region=(0, 0, *size), channels=RGB, half=())
-    renderer = {"firefly_limit": limit, "bounces": 1, **sections.pop("renderer", {})}
+    renderer = {"firefly_limit": limit, "bounces": 1, "detail": 0.05, **sections.pop("renderer", {})}
     return load_scene(
         {
             "version": 1,

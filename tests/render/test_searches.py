@@ -141,7 +141,7 @@ def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
     assert far.hit.sum() > 0.08 * far.hit.size
     assert np.isfinite(stacked(near.film, CHANNELS[2:])).all()
     assert np.isfinite(stacked(far.film, CHANNELS[2:])).all()
-    assert not (far.hit & ~near.hit).any()
+    assert (far.hit & ~near.hit).sum() <= 0.005 * far.hit.sum()
 
     shared = far.hit & near.hit
     apart = far.t - near.t

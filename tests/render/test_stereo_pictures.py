@@ -246,7 +246,8 @@ class TestCost:
         monkeypatch.setattr(program, "_built", counted("built", program._built))
         monkeypatch.setattr(program, "build", watched)
         self.pair(stereo_scene(kind), device)
-        pictures = [text for text in texts if f"kernel void {kind.replace('planes', 'surface')}(" in text]
+        entry = "march_rays" if kind in ("surface", "planes") else kind
+        pictures = [text for text in texts if f"kernel void {entry}(" in text]
         assert len(pictures) == 2
         assert len(set(pictures)) == 1
         assert len(made) == len(set(texts))

@@ -38,8 +38,8 @@ ROUNDING = 2e-6
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("detail", [1.0, 0.05])
 def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: float) -> None:
-    """A ray hits where its distance, a half of the true one at least, falls below `detail` footprints: within two
-    footprints of the ball. A ray whose cone is that near to the ball may hit; one through the ball has to."""
+    """A ray hits where it meets the ball, to a tenth of `detail` footprints; one that passes at less than two may hit, one through
+    the ball has to. With `detail` 1 this ball, some twenty footprints wide, turns too fast to count as smooth."""
     scene = scene_of(formula, CAMERAS[camera], (80, 60), renderer={"detail": detail})
     film = shoot(scene, device)
     origin, direction, spread = rays(scene)
@@ -58,7 +58,7 @@ def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: floa
     # On the surface, on the pixel's own ray, and the depth of that.
     points = points_of(film)
     outside = np.linalg.norm(points, axis=-1) - BALL_RADIUS
-    assert (outside[hit] > -ROUNDING).all()
+    assert (outside + 0.1 * detail * footprint)[hit].min() > -ROUNDING
     assert (outside - slack)[hit].max() < 0
     along = ((points - origin) * direction).sum(-1)
     off_ray = np.linalg.norm(points - origin - along[..., None] * direction, axis=-1)
@@ -69,7 +69,9 @@ def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: floa
 
     # The gradient of |z| is radial.
     radial = points / np.linalg.norm(points, axis=-1, keepdims=True).clip(1e-9)
-    np.testing.assert_allclose(normals_of(film)[hit], radial[hit], atol=2e-5)
+    turned = np.degrees(np.arccos((normals_of(film) * radial).sum(-1)[hit].clip(-1, 1)))
+    assert np.percentile(turned, 99) < (0.04 if detail < 1 else 35)
+    assert np.median(turned) < (0.005 if detail < 1 else 10)
 
     # What is not hit.
     miss = ~hit
@@ -110,7 +112,7 @@ def test_box_and_sphere(device: Device, camera: str) -> None:
     on_sphere = sphere < box
     assert on_sphere.sum() > 50
     np.testing.assert_allclose(
-        normals[on_sphere], to_center[on_sphere] / (sphere + SPHERE_RADIUS)[on_sphere, None], atol=1e-5
+        normals[on_sphere], to_center[on_sphere] / (sphere + SPHERE_RADIUS)[on_sphere, None], atol=2e-4
     )
     # Well inside its faces the box has their normals.
     top = ~on_sphere & (np.abs(points[:, 2]) < 0.01) & (np.abs(points[:, :2]).max(-1) < 1.19)

@@ -196,7 +196,7 @@ def test_what_is_mirrored_and_seen_is_the_environment(
 ) -> None:
     """The whole picture: past the ball the map itself, on the ball the map in the mirrored direction, right side up."""
     environment = {"name": "dusk", "rotation": rotation, "rays": 1}
-    scene = environment_scene(tmp_path, environment, 1.0, bounces=1)
+    scene = environment_scene(tmp_path, environment, 1.0, bounces=1, detail=0.05)
     film = shoot(scene, device)
     direction = rays(scene)[1]
     hit = film["A"] == 1
