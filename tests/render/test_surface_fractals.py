@@ -54,7 +54,9 @@ def test_normals_and_counts(device: Device, name: str) -> None:
     """The normal is the direction in which |z| of the last application grows fastest; the smooth count is
     n - log(log|z| / log R) / log d at the first n where |z| exceeds R, 1000 or less for high degrees d."""
     formula, step, degree = CASES[name]
-    scene = scene_of(formula, CAMERA, (96, 72), lights=[], coloring={"by": COLORING[name]}, renderer={"detail": 0.02})
+    scene = scene_of(
+        formula, CAMERA, (96, 72), lights=[], coloring={"by": COLORING[name]}, renderer={"detail": 0.02}
+    )
     film = shoot(scene, device)
     hit = film["A"] > 0
     assert hit.sum() > 800
