@@ -28,8 +28,9 @@ def points(count: int, size: float, seed: int = 1) -> Float:
 
 
 def test_the_ball_has_hubbard_and_douadys_estimate() -> None:
-    # |z_n| = |p|^(2^n), so the potential G is log|p| and |z| log|z| / (2 g) = |p| log|p| / 2 after any count. The solid of 20
-    # applications is the level set at L = log(4) / 2^20, and the distance is bounded by a half plane's near it, a ball's far off.
+    # |z_n| = |p|^(2^n), so the potential G is log|p| and |z| log|z| / (2 g) = |p| log|p| / 2 after any count. The
+    # solid of 20 applications is the level set at L = log(4) / 2^20, and the distance is bounded by a half plane's
+    # near it, a ball's far off.
     p = points(500, 2)
     r = np.linalg.norm(p, axis=1)
     got, gradient = distance(catalog.load_chain(BALL), p, 20)

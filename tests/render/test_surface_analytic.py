@@ -38,8 +38,9 @@ ROUNDING = 2e-6
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("detail", [1.0, 0.05])
 def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: float) -> None:
-    """A ray hits where it meets the ball, to a tenth of `detail` footprints; one that passes at less than two may hit, one through
-    the ball has to. With `detail` 1 this ball, some twenty footprints wide, turns too fast to count as smooth."""
+    """A ray hits where it meets the ball, to a tenth of `detail` footprints; one that passes at less than two may hit,
+    one through the ball has to. With `detail` 1 this ball, some twenty footprints wide, turns too fast to count as
+    smooth."""
     scene = scene_of(formula, CAMERAS[camera], (80, 60), renderer={"detail": detail})
     film = shoot(scene, device)
     origin, direction, spread = rays(scene)
