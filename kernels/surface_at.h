@@ -50,7 +50,7 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
         height_before = height;
         t += clamp(move, -cone, cone);
     }
-    met->touch = pick(active, t, met->touch);
+    met->touch = met->t = pick(active, t, met->t);
     return surface;
 }
 #endif

@@ -73,8 +73,8 @@ def test_the_page_is_whole() -> None:
     times = printed("Time")
     assert times["one_triangle"][0] > 1
     for normal in NORMALS:
-        assert f"](pictures/normals_{normal}.png)" in page
-        with Image.open(DOCS / "pictures" / f"normals_{normal}.png") as picture:
+        assert f"](pictures/normals_{normal}.webp)" in page
+        with Image.open(DOCS / "pictures" / f"normals_{normal}.webp") as picture:
             assert picture.size == maker().CROP[2:]
 
 

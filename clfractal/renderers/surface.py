@@ -46,7 +46,7 @@ ALONG = {"view": 0, "normal": 1, "reflection": 2}
 TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
-POLISH = 4
+POLISH = 5
 # Numbers of a pixel in `kernels/state.h`, without its normals.
 STATE_NUMBERS = 111
 
