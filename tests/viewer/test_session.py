@@ -201,8 +201,8 @@ def test_a_region_is_refined_alone(device: Device) -> None:
     inside[y : y + height, x : x + width] = True
     for name in CHANNELS:
         np.testing.assert_array_equal(found[name][inside], whole[name][inside])
-    # Outside is one sample, with the places of the scene with one (its light is smoothed as that of sixteen), not the picture
-    # that was shown before.
+    # Outside is one sample, with the places of the scene with one (its light is smoothed as that of sixteen), not the
+    # picture that was shown before.
     np.testing.assert_array_equal(found["Z"][~inside], one["Z"][~inside])
     assert (found["R"][~inside] != whole["R"][~inside]).any()
 
