@@ -21,8 +21,6 @@
 
 // Idle lanes that are worth a pause for new rays. The steps of the search by steps are too cheap, and those of neighbours too alike.
 #define REFILL (SEARCH == SEARCH_STEPS ? LANES : LANES >= 16 ? 2 : 1)
-// Of an encounter: what a march finds itself. One by the Jacobian puts what it knows of the surface into the rest.
-#define FOUND_NUMBERS (MARCH_KEEPS_SURFACE ? NUMBERS_OF(encounter) : ENCOUNTER_NORMAL)
 
 // The rays that one work-item marches: `next`, and every one that is `hop` further, before `end`.
 typedef struct {
@@ -31,12 +29,12 @@ typedef struct {
 
 // Lanes that are done put down what they found, and take the next rays. `places`: the number of each lane's ray, or -1.
 INLINE void lanes_refill(march *m, slice_left *left, int *places, queue q, int goal, __constant const struct March *settings) {
-    scalar busy[LANES], starts[LANES], found[NUMBERS_OF(encounter)][LANES], rays[RAY_NUMBERS][LANES];
+    scalar busy[LANES], starts[LANES], found[ENCOUNTER_NORMAL][LANES], rays[RAY_NUMBERS][LANES];
     const encounter now = encounter_of(m->found);
-    for (int i = 0; i < FOUND_NUMBERS; ++i) lanes_store(((const real *)&now)[i], found[i]);
+    for (int i = 0; i < ENCOUNTER_NORMAL; ++i) lanes_store(((const real *)&now)[i], found[i]);
     for (int i = 0; i < RAY_NUMBERS; ++i) lanes_store(((const real *)&m->r)[i], rays[i]);
     lanes_store(number_of(m->active), busy);
-    const int count = goal == GOAL_SHADOW ? SHADOW_NUMBERS : FOUND_NUMBERS;
+    const int count = goal == GOAL_SHADOW ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
     __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
     for (int lane = 0; lane < LANES; ++lane) {
         starts[lane] = S(0.0);
@@ -66,7 +64,7 @@ INLINE void look_at(queue q, int at, __constant const struct March *settings, __
     const mask hit = mask_of(e.hit);
     if (!any_lane(hit)) return;
     surface_at(queue_ray(q, 0, at), &e, hit, settings, orbit, k);
-    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE - NUMBERS_OF(vec),
+    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,
                  q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
 }
 

@@ -5,16 +5,18 @@
 // or inside, which brackets the surface between two points.
 #define SLOPE_GAIN R(0.3)        // part of a newly measured slope
 #define LANDING R(1.0)           // of the cone: from this distance on the march lands
-#define LANDING_AIM R(0.05)       // of the cone: the distance that a landing step aims at
+#define LANDING_AIM R(0.05)      // of the cone: the distance that a landing step aims at
 #define LANDING_STEP R(1.0)      // of the cone: the longest landing step
 #define LANDED R(0.6)            // of the cone: the solid expected so near ahead is hit ...
 #define LANDED_MOST R(0.25)      // ... at a distance of at most this part of the cone
 #define LANDED_LEAST R(0.03)     // a ray past the solid hits at this part of the cone: a smooth rim stays where it is
 #define POINT_REACH R(1.5)       // a pixel's points hit at that much more
-#define PASSED_SLOPE R(-0.1)    // what a sheet is approached with at the least
+#define PASSED_SLOPE R(-0.1)     // what a sheet is approached with at the least
 #define BRACKETED R(0.1)         // of the cone: a bracket this narrow is the surface
-#define LEAST_SLOPE R(0.1)       // no solid is farther ahead than ten distances
-#define MOST_GROWTH R(0.5)      // of an unscaled distance for the way: that of a smooth surface grows so, being half of the true one
+#define LEAST_SLOPE R(0.1)       // no landing step is longer than ten distances ...
+#define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
+#define GRAZING_MOST R(2.0)      // ... at most so much of the cone
+#define MOST_GROWTH R(0.5)       // of an unscaled distance for the way: where a surface is smooth it is half of the true one
 #define CREEP R(0.25)            // of the cone: the least step by the Jacobian
 #define BACK_STEPS R(4.5)        // a point's evaluations inside, before it counts as hit where it begins
 
@@ -32,8 +34,7 @@ INLINE sight march_look(march *m, __constant const struct March *settings, __con
     const mask free = less_equal((real)(REAL_LARGEST), m->high) & ~m->proving;
 #endif
     s.cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    // A distance grows no faster than one moves: where the estimate says otherwise it has met a point at which the
-    // derivative vanishes, and means nothing.
+    // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing.
     s.radius = s.here.step * (real)(settings->step_scale);
     s.radius = pick(free, fmin(s.radius, m->radius_before + MOST_GROWTH * (real)(settings->step_scale) * m->step_before), s.radius);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
@@ -41,8 +42,7 @@ INLINE sight march_look(march *m, __constant const struct March *settings, __con
     return s;
 }
 
-// Keeps where the cone has come near the solid, and what the surface is like there and at the last point outside. The place lies
-// between two steps, so that it does not depend on how long they were.
+// Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
 INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __constant const struct March *settings) {
     const real height = s->cone * (real)(settings->near);
     const mask beside = outside & less(s->radius, height);
@@ -52,14 +52,6 @@ INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __co
     m->found.touch = pick(first, pick(beside, m->t - back * (m->t - m->low), (real)(REAL_LARGEST)), m->found.touch);
     m->low = pick(outside, m->t, m->low);
     m->high = pick(inside, m->t, m->high);
-#if MARCH_KEEPS_SURFACE
-    const vec up = vec_normalize(s->surface.gradient);
-    m->found.near.gradient = vec_pick(first, vec_along(up, back, vec_sub(m->found.gradient, up)), m->found.near.gradient);
-    m->found.near.square = pick(first, s->surface.square, m->found.near.square);
-    m->found.near.square_before = pick(first, s->surface.square_before, m->found.near.square_before);
-    m->found.near_count = pick(first, s->here.end.count, m->found.near_count);
-    m->found.gradient = vec_pick(outside, up, m->found.gradient);
-#endif
 }
 
 // The next place of the lanes that march, which went `overshot` or not and have `slope` now.
@@ -131,10 +123,10 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
         touched &= landed;
     }
     touched &= less(radius, reach);
-    real ahead = goal == GOAL_SURFACE ? fmin(radius / fmax(-slope, R(0.01)), R(2.0) * cone) : R(0.0);
+    real ahead = goal == GOAL_SURFACE ? fmin(radius / fmax(-slope, GRAZING_SLOPE), GRAZING_MOST * cone) : R(0.0);
     mask passed = outside & ~outside;
 #if !HAS_DERIVATIVE
-    // A landing that leads through a sheet thinner than all steps sees it from behind.
+    // A landing that led through a sheet thinner than all steps sees it from behind.
     if (goal == GOAL_SURFACE) {
         passed = outside & m->landing & steep & less(radius, cone) & less(R(0.0), vec_dot(s.surface.gradient, m->r.direction));
         touched |= passed;

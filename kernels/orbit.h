@@ -201,12 +201,6 @@ typedef struct {
     real square_before;  // ... and the one before it
 } surface_point;
 
-INLINE surface_point surface_pick(mask m, surface_point yes, surface_point no) {
-    const surface_point s = {vec_pick(m, yes.gradient, no.gradient), pick(m, yes.square, no.square),
-                             pick(m, yes.square_before, no.square_before)};
-    return s;
-}
-
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
 INLINE clearance orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
                                      surface_point *surface) {

@@ -8,12 +8,11 @@
 // What a ray met.
 typedef struct {
     real hit;                      // 1 or 0
-    real t, steps, count, bad;     // as a crossing's ...
+    real steps, count, t, bad;     // as a crossing's ...
     real touch, last;              // ... and of a surface: where it is shaded, for one
     vec normal;                    // of a surface: towards the viewer, length 1 ...
     real smooth;                   // ... its escape count ...
     real more_steps, more_count;   // ... and what finding these has cost
-    vec near;                      // see surface_at.h
 } encounter;
 
 // Places of numbers in these structs; only points of a pixel have something that is known.
@@ -21,8 +20,8 @@ typedef struct {
 #define RAY_FAR 7
 #define RAY_NUMBERS (POINTS > 1 ? NUMBERS_OF(ray) : NUMBERS_OF(ray) - 1)
 #define RAY_STRENGTH NUMBERS_OF(ray)
-#define ENCOUNTER_SURFACE 5
-#define ENCOUNTER_NORMAL 7
+#define ENCOUNTER_SURFACE 3
+#define ENCOUNTER_NORMAL 7  // what a march finds itself ends there
 // What is found of a shadow: not how often a march was surprised.
 #define SHADOW_NUMBERS 4
 

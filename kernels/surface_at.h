@@ -1,15 +1,7 @@
 // What a march has found, as the stages after it read it.
 INLINE encounter encounter_of(crossing c) {
     const vec none = {R(0.0), R(0.0), R(0.0)};
-    encounter e = {number_of(c.hit), c.t, c.steps, c.count, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0), none};
-#if MARCH_KEEPS_SURFACE
-    // For `surface_at`.
-    e.normal = c.gradient;
-    e.smooth = c.near.square;
-    e.more_steps = c.near.square_before;
-    e.more_count = c.near_count;
-    e.near = c.near.gradient;
-#endif
+    const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0)};
     return e;
 }
 
@@ -27,8 +19,8 @@ INLINE vec surface_normal(vec wide, vec fine, encounter *met, real cone) {
     return vec_normalize(vec_along(wide, share, vec_sub(at_hit, wide)));
 }
 
-#define POLISH_HEIGHT R(0.16667)
 #if POLISH
+#define POLISH_HEIGHT R(0.16667)
 // A place that does not depend on how the march came there: where the distance is a sixth of the cone, by the secant method (the
 // slope is that of a distance, -1, at first). Normals from the positions of points need it.
 INLINE surface_point surface_polished(ray r, encounter *met, mask active, __constant const struct March *settings,
@@ -50,7 +42,8 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
         height_before = height;
         t += clamp(move, -cone, cone);
     }
-    met->touch = met->t = pick(active, t, met->t);
+    met->touch = pick(active, t, met->touch);
+    met->t = pick(active, t, met->t);
     return surface;
 }
 #endif
@@ -62,17 +55,11 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
     clearance there;
     vec normal;
-#if MARCH_KEEPS_SURFACE
-    const surface_point surface = {met->near, met->smooth, met->more_steps};
-    there.end.count = met->more_count;
-    there.end.inside = less(R(1.0), R(0.0));
-    normal = surface_normal(vec_normalize(surface.gradient), vec_normalize(met->normal), met, cone);
-#endif
     met->more_steps = met->more_count = R(0.0);
-#if !MARCH_KEEPS_SURFACE && POLISH
+#if POLISH
     const surface_point surface = surface_polished(r, met, active, settings, orbit, k, &there);
     normal = vec_normalize(surface.gradient);
-#elif !MARCH_KEEPS_SURFACE
+#else
     surface_point surface, at_hit;
     for (int i = 0; i < TURNS(2); ++i) {
         surface = at_hit;

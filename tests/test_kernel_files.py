@@ -10,7 +10,6 @@ from clfractal.resources import folder
 MOST_LINES = 80
 # Those that are longer, and how long they may be: to be split, never to grow.
 LONGER = {
-    "march.h: march_step": 140,
     "volume_shot.h: take_shot": 150,
     "voxels.h: solid_inside": 92,
     "voxels_bricks.cl: store_bricks": 95,

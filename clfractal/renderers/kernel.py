@@ -25,7 +25,7 @@ KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 
 
 # Numbers of a sent ray, and of what it met (`kernels/queue.h`).
-RAY_NUMBERS, MET_NUMBERS = 12, 16
+RAY_NUMBERS, MET_NUMBERS = 12, 13
 # Numbers between two columns of what is kept between stages: a power of 2 apart, all would lie in one place of a cache.
 STATE_PADDING = 80
 WAVE_NUMBERS = ("first_tile", "wave", "queue_stride", "turns", "slice")
