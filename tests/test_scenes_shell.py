@@ -120,9 +120,10 @@ def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
     assert Path("first.yaml").read_text("utf-8") == text
 
 
-def test_a_set_that_fills_its_bounds_is_seen_from_within(clf: InProcess) -> None:
+@pytest.mark.parametrize("formula", ["apollonian", "kaliset"])
+def test_a_set_that_fills_its_bounds_is_seen_from_within(clf: InProcess, formula: str) -> None:
     """Elsewhere one sees but the ball in which it was cut off."""
-    ended = clf("new", "hall", "--formula", "pseudo_kleinian")
+    ended = clf("new", "hall", "--formula", formula)
     assert ended.status == 0, ended
     scene = load_scene(Path("hall.yaml"))
     center, radius = scene.bounds

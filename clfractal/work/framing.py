@@ -34,8 +34,9 @@ SIZE = (1280, 720)
 _LOOK = (192, 108)
 # From where the set is looked at: azimuth and elevation, degrees.
 _PLACES = ((35, 25), (-40, 20), (10, 35), (75, 15), (150, 30), (-100, 30), (25, 60))
-# A set fills its bounds if that much of what is seen lies on them, where it was only cut off (parts of the radius).
-_CUT_SHARE, _CUT_NEAR = 0.15, 0.001
+# A set fills its bounds if that much of what is seen within wider ones (parts of the radius) lies beyond them: there it was
+# only cut off. Of the library's formulas those that do have 0.17 and more, the others 0.08 and less.
+_CUT_SHARE, _WIDER = 0.12, 1.1
 # Such a set is looked at from among it: azimuth, elevation, and the distance from the middle in parts of the radius.
 _INSIDE = ((0, 12), (40, 15), (80, 10), (130, 15), (-50, 20), (-100, 12))
 _INSIDE_DISTANCES = (0.56, 0.4)
@@ -194,9 +195,10 @@ class _Finder:
 
     def is_cut(self, iterations: int, camera: Mapping[str, Any]) -> bool:
         """Whether the set goes on beyond its bounds, so that what is seen of them is a cut."""
-        points = self._points(self.scene(iterations, camera))
-        away = np.linalg.norm(points - np.array(self.center), axis=1) / self.radius
-        return bool(len(points)) and float((away > 1 - _CUT_NEAR).mean()) > _CUT_SHARE
+        wider = {"bounds": {"center": list(self.center), "radius": _WIDER * self.radius}}
+        points = self._points(self.scene(iterations, camera, renderer=wider))
+        away = np.linalg.norm(points - np.array(self.center), axis=1)
+        return bool(len(points)) and float((away > self.radius).mean()) > _CUT_SHARE
 
     def inside(self) -> tuple[int, dict[str, Any]] | None:
         """The best view from within the bounds, and its iterations; None if there is no room for a camera."""
