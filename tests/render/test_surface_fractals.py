@@ -125,7 +125,7 @@ def test_smooth_counts_have_no_jumps(device: Device) -> None:
 def last(
     step: Map, points: Floats, name: str, limit: float, count: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """How many applications it takes until |z| > `limit` and |z| then, 0 if it never is; or |z| after `count` applications."""
+    """How many applications it takes until |z| > `limit`, and |z| then (0: never); or |z| after `count` of them."""
     if name == "quaternion_julia":
         z = np.concatenate([points, np.zeros((len(points), 1))], axis=-1)
         done = 0
