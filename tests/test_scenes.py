@@ -38,9 +38,16 @@ BLOCK = 6
 # Another processor's estimates of roots, and other lane counts, change whole pixels, but few: at most 1.6 % of a scene's
 # (octahedral_ifs), none in a half of all scenes. The others have the same bits, so a faint change everywhere is found.
 SHARE_LIMIT = 0.03
-# Scenes that lie nearer to such limits, with their own (mean, share): lattices whose rims are everywhere, and grids that
-# another processor fills with other roundings. Measured on AMD's processors against pictures made on Intel's.
-OWN_LIMITS = {"vicsek_cross": (1.0, SHARE_LIMIT), "stereo_volume": (MEAN_LIMIT, 0.10)}
+# Scenes that lie nearer to such limits, with their own (mean, block, share): lattices whose rims are everywhere, and grids
+# that another processor fills with other roundings, measured on AMD's processors against pictures made on Intel's; cut
+# planes whose border 200 iterations make chaotic, so that three pixels of a block may turn white or black with 16 lanes
+# instead of 8.
+OWN_LIMITS = {
+    "vicsek_cross": (1.0, BLOCK_LIMIT, SHARE_LIMIT),
+    "stereo_volume": (MEAN_LIMIT, BLOCK_LIMIT, 0.10),
+    "figure9": (MEAN_LIMIT, 30.0, 0.005),
+    "figure10": (MEAN_LIMIT, 30.0, 0.005),
+}
 
 SCENES = scene_paths()
 THESIS_FIGURES = {
@@ -167,8 +174,8 @@ def test_it_looks_as_it_did(path: Path) -> None:
     picture, golden = small_picture(path), read_picture(golden_path(path))
     mean, block = mean_difference(picture, golden), worst_block(picture, golden)
     share = share_changed(picture, golden)
-    mean_limit, share_limit = OWN_LIMITS.get(path.stem, (MEAN_LIMIT, SHARE_LIMIT))
-    if mean > mean_limit or block > BLOCK_LIMIT or share > share_limit:
+    limits = OWN_LIMITS.get(path.stem, (MEAN_LIMIT, BLOCK_LIMIT, SHARE_LIMIT))
+    if mean > limits[0] or block > limits[1] or share > limits[2]:
         kept = keep_failure(path.stem, picture, golden)
         told = f"mean difference {mean:.2f}, worst block {block:.1f} levels, {share:.1%} of pixels changed"
         pytest.fail(f"{path.stem}: {told}; see {kept}")
