@@ -35,7 +35,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test window soak lint locks lowest bench truth mutate gpu-check portability install clean
+.PHONY: demo view test combinations window soak lint locks lowest bench truth mutate gpu-check portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -49,7 +49,11 @@ view: $(VENV)/.viewer
 install: $(VENV)/.installed
 
 test: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window $(PARALLEL) $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window -m "not combination" $(PARALLEL) $(ARGUMENTS)
+
+# Every formula, number type, lane count and normal that the usual tests show by examples.
+combinations: $(VENV)/.tested-with $(STAGE)/.linked
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window -m combination $(PARALLEL) $(ARGUMENTS)
 
 # Windows show what they show in time only if nothing else keeps the cores busy: so one test at a time. A screen, a window
 # manager and a hand on the mouse are programs of their own, so what fails is tried once more before it counts.

@@ -1,8 +1,8 @@
 """docs/normals.md against what its script measures: on a ball, and on figure 13 at one size.
 
 Both ways of eight triangles have the same normal, so one of them is measured; and on the ball, where each takes a program
-that nothing else needs, the worst and the most usual one (test_pixel_points.py has them all). The times on the page are
-those of one machine, and are not compared.
+that nothing else needs, the worst and the most usual one: the others are combinations. The times on the page are those of
+one machine, and are not compared.
 """
 
 from __future__ import annotations
@@ -45,7 +45,17 @@ def printed(heading: str) -> dict[str, list[float]]:
     return {name: [float(cell) for cell in cells.split("|")] for name, cells in rows}
 
 
-@pytest.mark.parametrize("normal", ["one_triangle", "least_squares"])
+@pytest.mark.parametrize(
+    "normal",
+    [
+        "one_triangle",
+        "least_squares",
+        *(
+            pytest.param(name, marks=pytest.mark.combination)
+            for name in ("eight_triangles_normal", "gradient")
+        ),
+    ],
+)
 def test_errors_on_a_ball(normal: str) -> None:
     errors = list(maker().ball_errors(normal).values())
     assert printed("On a ball")[normal] == pytest.approx(errors, rel=RELATIVE, abs=ABSOLUTE)

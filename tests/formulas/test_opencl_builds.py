@@ -1,4 +1,6 @@
-"""The whole programs of every library formula build, without a warning, in single lanes and packets; some at every width.
+"""The whole programs of every library formula build, without a warning, in single lanes and packets.
+
+A packet's width is only a number, so those between are usually tried with a few formulas.
 
 All formulas of an entry point share one build: what stands before the generated text is the same for all,
 and what comes after it gets a number. Only the front end of the driver's compiler is asked (no optimiser);
@@ -8,6 +10,7 @@ that the code it makes runs is the matter of the other tests.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 
 import pytest
@@ -87,20 +90,29 @@ def build(text: str, precision: Precision) -> None:
     compiler.compile_source(device(), text, flags)
 
 
+def build_formulas(names: Sequence[str], precision: Precision, lanes: int) -> None:
+    build_all([whole_text(name, precision, lanes) for name in names], precision)
+
+
 def test_single_lanes_and_the_widest_packets_in_float32() -> None:
-    """Every formula. A packet's width is only a number, so those between are tried with a few."""
+    """Every formula."""
     tried = accepted_lanes(device(), "float32")
     for lanes in tried:
-        names = catalog.names() if lanes in (tried[0], tried[-1]) else KINDS
-        build_all([whole_text(name, "float32", lanes) for name in names], "float32")
+        build_formulas(catalog.names() if lanes in (tried[0], tried[-1]) else KINDS, "float32", lanes)
 
 
 def test_one_lane_count_in_float64() -> None:
     """That of every formula compiles, test_opencl.py shows."""
-    if not has_float64(device().info):
-        return
-    lanes = accepted_lanes(device(), "float64")[-1]
-    build_all([whole_text(name, "float64", lanes) for name in KINDS], "float64")
+    if has_float64(device().info):
+        build_formulas(KINDS, "float64", accepted_lanes(device(), "float64")[-1])
+
+
+@pytest.mark.combination
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_every_formula_at_every_lane_count(precision: Precision) -> None:
+    if precision == "float32" or has_float64(device().info):
+        for lanes in accepted_lanes(device(), precision):
+            build_formulas(catalog.names(), precision, lanes)
 
 
 @pytest.mark.parametrize("coloring", ["solid", "normal", "iterations", "trap"])

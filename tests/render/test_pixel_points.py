@@ -1,7 +1,7 @@
 """`renderer.points`: several points of a pixel, their coverage, normals and colours, on a ball over a box.
 
 Pictures are compared with the five normals of `normals_oracle` over the exact places. Both searches and both patterns meet
-every normal, though not in all pairs: normals are made of what was found, however that was.
+every normal; pairs that are missing here are combinations: normals are made of what was found, however that was.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
+from clfractal.scene.surface import GRID_NORMALS
 from tests.render import normals_oracle as oracle
 from tests.render.point_rays import (
     CAMERAS,
@@ -54,7 +55,19 @@ def _compiled(device: Device) -> None:
     )
 
 
-every = pytest.mark.parametrize("variant", VARIANTS, ids=" ".join)
+NORMALS = ("gradient", *GRID_NORMALS, "least_squares")
+# The other pairs of search and normal.
+COMBINATIONS: list[Variant] = [
+    (search, normal, "grid")
+    for search in ("distance", "steps")
+    for normal in NORMALS
+    if all((search, normal) != variant[:2] for variant in VARIANTS)
+]
+every = pytest.mark.parametrize(
+    "variant",
+    [*VARIANTS, *(pytest.param(variant, marks=pytest.mark.combination) for variant in COMBINATIONS)],
+    ids=" ".join,
+)
 both = pytest.mark.parametrize("camera", CAMERAS)
 
 

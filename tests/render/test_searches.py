@@ -17,6 +17,7 @@ import pytest
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.formulas.backends import NumpyBackend
+from clfractal.formulas.catalog import names
 from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.language import Chain
 from clfractal.formulas.reference import apply, constant_of, space_to_state
@@ -57,7 +58,7 @@ ITERATIONS = {
 }
 USUAL_ITERATIONS = 4
 # One of each kind: an inside by escape, with Jacobians or a scalar derivative, in three dimensions or four, of a chain, and
-# one of folded boxes; and a shape, whose inside is the last one's. tests/test_scenes.py renders all formulas.
+# one of folded boxes; and a shape, whose inside is the last one's. The others are combinations.
 KINDS = (
     "hast",
     "mandelbulb",
@@ -66,6 +67,10 @@ KINDS = (
     "mandelbox",
     "sierpinski_tetrahedron",
     "kaleidoscopic_ifs",
+)
+every_formula = pytest.mark.parametrize(
+    "name",
+    [*KINDS, *(pytest.param(name, marks=pytest.mark.combination) for name in names() if name not in KINDS)],
 )
 EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 
@@ -133,7 +138,7 @@ def both(device: Device, name: str) -> tuple[Found, Found]:
     return found_by(device, scenes[0]), found_by(device, scenes[1])
 
 
-@pytest.mark.parametrize("name", KINDS)
+@every_formula
 def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
     """Where steps hits, distance hits too. Depths agree to a footprint and a step, or else distance has stopped earlier:
     within a footprint of the solid, of which that ray crosses no part that is longer than a step."""
@@ -156,7 +161,7 @@ def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
     assert longest_crossing(near, far, early) <= 1.05 * far.step
 
 
-@pytest.mark.parametrize("name", KINDS)
+@every_formula
 def test_steps_end_at_the_boundary(device: Device, name: str) -> None:
     """The point found is the last one outside: bisecting the inside test from there on ends where it began, but for the
     rounding of a number of float32 (of the point, and of an orbit of a few applications)."""
@@ -164,7 +169,7 @@ def test_steps_end_at_the_boundary(device: Device, name: str) -> None:
     check_boundary(far, "float32")
 
 
-@pytest.mark.parametrize("name", ["hast"])
+@pytest.mark.parametrize("name", ["hast", pytest.param("menger_sponge", marks=pytest.mark.combination)])
 def test_steps_in_float64(device: Device, name: str) -> None:
     """As precise as float32 channels tell: half of their last digit."""
     if not has_float64(device.info):

@@ -214,10 +214,11 @@ def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float
             close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
 
 
-def test_float64_shows_the_same(device: Device) -> None:
+@pytest.mark.parametrize("name", ["hast", pytest.param("mandelbulb", marks=pytest.mark.combination)])
+def test_float64_shows_the_same(device: Device, name: str) -> None:
     """Of few iterations: folds of hast are finer than float32 soon."""
     if has_float64(device.info):
-        scene = scene_of({"name": "hast", "iterations": 4}, CAMERA, SIZE, lights=LIGHTS)
+        scene = scene_of({"name": name, "iterations": 4}, CAMERA, SIZE, lights=LIGHTS)
         close(stacked(shoot(scene, device, "float64")), stacked(shoot(scene, device)))
 
 

@@ -86,7 +86,15 @@ def test_tiles_and_regions(
     assert same(stacked(shoot(scene, device, budget_seconds=1e-9)), whole)
 
 
-@pytest.mark.parametrize(("name", "counts"), [("surface", {1}), ("fog", {4, 8, 16})])
+@pytest.mark.parametrize(
+    ("name", "counts"),
+    [
+        ("surface", {1}),
+        ("fog", {4, 8, 16}),
+        pytest.param("surface", {4, 8, 16}, marks=pytest.mark.combination),
+        pytest.param("fog", {1}, marks=pytest.mark.combination),
+    ],
+)
 def test_other_lane_counts(
     device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str, counts: set[int]
 ) -> None:
@@ -102,9 +110,11 @@ def test_float64_shows_the_same(device: Device, wholes: dict[str, npt.NDArray[np
         close(stacked(shoot(SCENES["surface"], device, "float64")), wholes["surface"])
 
 
-def test_a_grid_in_several_pools(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Larger than the device's largest buffer: values and normals come from the right one of four parts."""
-    parts = 4
+@pytest.mark.parametrize("parts", [2, 4])
+def test_a_grid_in_several_pools(
+    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, parts: int
+) -> None:
+    """Larger than the device's largest buffer: values and normals come from the right part."""
     values = np.random.default_rng(5).uniform(0, 255, (33, 41, 50)).astype(np.uint8)
     values[:12] //= 16
     keep(tmp_path / "a.nrrd", values, [-1.2, -1, -0.8], [0.05] * 3)
