@@ -58,9 +58,6 @@ class TiledStore(Picture, Protocol):
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""
 
-    def put(self, tile_index: int, array: Floats) -> None:
-        """Stores a tile: float32 of shape (channels, rows, columns), cut to the region as `grid.tile` is."""
-
 
 def check_tile(array: Floats, tile: Tile, channels: Sequence[str]) -> None:
     """Raises ValueError if an array does not fit its tile: a mistake of the program, not of the user."""

@@ -205,10 +205,6 @@ class CanvasStore:
         """Counts finished tiles; `film` holds none of them."""
         self._done[indices] = True
 
-    def put(self, tile_index: int, array: Floats) -> None:
-        """Not for canvases, which tiles reach on the device alone."""
-        raise NotImplementedError
-
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""
         self.header[key] = value

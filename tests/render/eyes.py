@@ -9,7 +9,7 @@ import numpy as np
 from clfractal.pictures.compose import eye_regions
 from clfractal.pictures.film import Film
 from clfractal.pictures.modes import eye_size, picture_size
-from clfractal.pictures.tiled import TiledStore
+from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiles import Region
 from clfractal.scene.stereo import Stereo
 
@@ -33,7 +33,7 @@ def eyes(size: tuple[int, int], seed: int = 5) -> tuple[dict[str, np.ndarray], d
     return left, right
 
 
-def filled(store: TiledStore, planes: dict[str, np.ndarray]) -> Any:
+def filled(store: Film | JournalFilm, planes: dict[str, np.ndarray]) -> Any:
     """The store with its part of the planes, which are of the whole picture."""
     for index in range(store.grid.count):
         tile = store.grid.tile(index)

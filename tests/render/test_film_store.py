@@ -45,7 +45,7 @@ def tile_content(store: TiledStore, index: int) -> np.ndarray:
     return np.random.default_rng(index).random(shape, dtype=np.float32)
 
 
-def fill(store: TiledStore, indices: range | None = None) -> None:
+def fill(store: Film | JournalFilm, indices: range | None = None) -> None:
     for index in indices or range(store.grid.count):
         store.put(index, tile_content(store, index))
 
