@@ -25,19 +25,18 @@ Keys of the table:
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import json
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import yaml
+from make_gallery import LARGEST_FILE, PICTURES, small_enough
 from PIL import Image
 
 from clfractal.api import load_scene, render
@@ -50,7 +49,6 @@ from clfractal.scene.palettes import table as table_of
 
 DOCS = Path(__file__).resolve().parent
 TABLE = DOCS / "pictures.yaml"
-PICTURES = DOCS / "pictures"
 GAP = 6  # pixels between panels
 Show = Literal["samples", "left", "right"]
 
@@ -150,24 +148,13 @@ def make_picture(picture: Picture) -> None:
     print(f"{picture.path.name}: {len(content) // 1000} kB, {seconds:.1f} s", flush=True)
 
 
-def gallery() -> ModuleType:
-    """docs/make_gallery.py, which belongs to no package."""
-    spec = importlib.util.spec_from_file_location("make_gallery", DOCS / "make_gallery.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def small_file(whole: Image.Image) -> bytes:
     """A WebP file, lossless if it can be as small as the gallery's pictures, else as good as that allows."""
-    maker = gallery()
     file = io.BytesIO()
     whole.save(file, "WEBP", lossless=True, quality=50, method=4)
     content = file.getvalue()
-    if len(content) > maker.LARGEST_FILE:
-        content, _ = maker.small_enough(whole)
+    if len(content) > LARGEST_FILE:
+        content, _ = small_enough(whole)
     return content
 
 

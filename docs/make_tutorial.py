@@ -8,34 +8,22 @@ blocks too. The picture `pictures/tutorial_NAME.webp` is then the reader's own N
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
+from make_gallery import PICTURES, WIDTH, picture, reduced, small_enough
 from PIL import Image
 
 DOCS = Path(__file__).resolve().parent
 PAGE = DOCS / "tutorial.md"
-PICTURES = DOCS / "pictures"
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE_NAME = re.compile(r"# ([\w/]+\.yaml)\n")
 SHOWN = re.compile(r"\]\(pictures/tutorial_(\w+)\.webp\)")
-
-
-def gallery() -> ModuleType:
-    """docs/make_gallery.py, which belongs to no package."""
-    spec = importlib.util.spec_from_file_location("make_gallery", DOCS / "make_gallery.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def follow(desk: Path) -> None:
@@ -63,18 +51,17 @@ def follow(desk: Path) -> None:
 
 def main() -> None:
     """Makes all pictures of the page."""
-    maker = gallery()
     with tempfile.TemporaryDirectory() as folder:
         follow(Path(folder))
         for name in SHOWN.findall(PAGE.read_text("utf-8")):
             with Image.open(Path(folder) / f"{name}.png") as read:
                 shown = read.convert("RGB")
-            if shown.width > maker.WIDTH:
+            if shown.width > WIDTH:
                 srgb = np.asarray(shown, np.float32) / 255
                 linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-                small = maker.reduced(linear.astype(np.float32), maker.WIDTH)
-                shown = maker.picture(small, np.ones_like(small[..., :1]))
-            content, quality = maker.small_enough(shown)
+                small = reduced(linear.astype(np.float32), WIDTH)
+                shown = picture(small, np.ones_like(small[..., :1]))
+            content, quality = small_enough(shown)
             (PICTURES / f"tutorial_{name}.webp").write_bytes(content)
             print(f"tutorial_{name}.webp: {len(content) // 1000} kB, quality {quality}")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 from pathlib import Path
 from typing import Any
@@ -11,18 +10,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+from tests.makers import DOCS, maker
 
 
-@pytest.fixture(scope="module")
-def maker() -> Any:
-    """docs/make_gallery.py, which belongs to no package."""
-    spec = importlib.util.spec_from_file_location("make_gallery", DOCS / "make_gallery.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+@pytest.fixture(name="maker", scope="module")
+def gallery() -> Any:
+    """docs/make_gallery.py"""
+    return maker("make_gallery")
 
 
 def noise(amount: float, size: tuple[int, int] = (720, 1280), components: int = 3) -> Any:

@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
 from PIL import Image
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+from tests.makers import DOCS, maker
 
-
-def maker() -> ModuleType:
-    """docs/make_pictures.py, which belongs to no package."""
-    spec = importlib.util.spec_from_file_location("make_pictures", DOCS / "make_pictures.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their module up there
-    spec.loader.exec_module(module)
-    return module
-
-
-MAKER = maker()
-each_picture = pytest.mark.parametrize("picture", MAKER.table(), ids=lambda picture: str(picture.name))
+each_picture = pytest.mark.parametrize(
+    "picture", maker("make_pictures").table(), ids=lambda picture: str(picture.name)
+)
 
 
 @each_picture
 def test_it_is_there_and_small(picture: Any) -> None:
-    assert picture.path.stat().st_size <= MAKER.gallery().LARGEST_FILE == 200_000
+    assert picture.path.stat().st_size <= maker("make_gallery").LARGEST_FILE == 200_000
     with Image.open(picture.path) as shown:
         assert shown.size == picture.size
 

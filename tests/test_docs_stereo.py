@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-import sys
 from fractions import Fraction
 from pathlib import Path
-from types import ModuleType
 from typing import cast, get_args
 
 import numpy as np
@@ -32,20 +29,10 @@ from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
+from tests.makers import maker
 from tests.test_docs_content import DOCS, code, table, text
 
 WIDTH, HEIGHT = 640, 360
-
-
-def drawings() -> ModuleType:
-    """docs/make_drawings.py, which belongs to no package."""
-    spec = importlib.util.spec_from_file_location("make_drawings", DOCS / "make_drawings.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def stereo_of(**keys: object) -> Stereo:
@@ -139,12 +126,12 @@ def test_the_angle_that_keeps_the_camera() -> None:
 
 
 def test_drawings_are_there_and_as_they_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    maker = drawings()
-    monkeypatch.setattr(maker, "PICTURES", tmp_path)
-    maker.main([])
-    for name in maker.DRAWINGS:
+    drawings = maker("make_drawings")
+    monkeypatch.setattr(drawings, "PICTURES", tmp_path)
+    drawings.main([])
+    for name in drawings.DRAWINGS:
         kept = DOCS / "pictures" / f"{name}.png"
-        assert kept.stat().st_size <= maker.LARGEST_FILE
+        assert kept.stat().st_size <= drawings.LARGEST_FILE
         assert f"](pictures/{name}.png)" in text("stereo.md")
         with Image.open(kept) as there, Image.open(tmp_path / f"{name}.png") as made:
             assert there.size == made.size

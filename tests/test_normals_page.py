@@ -7,34 +7,19 @@ one machine, and are not compared.
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from functools import cache
-from pathlib import Path
-from types import ModuleType
 
 import pytest
 from PIL import Image
 
 from clfractal.device.select import choose, has_float64
+from tests.makers import DOCS, maker
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
 NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares", "gradient")
 # Of the printed figure, for its two digits and another device's rounding; and degrees.
 RELATIVE, ABSOLUTE = 0.15, 0.006
 SIZE = 512
 MEASURED = tuple(name for name in NORMALS if name != "eight_triangles_shading")
-
-
-@cache
-def maker() -> ModuleType:
-    """docs/make_normals.py"""
-    spec = importlib.util.spec_from_file_location("make_normals", DOCS / "make_normals.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def printed(heading: str) -> dict[str, list[float]]:
@@ -57,25 +42,25 @@ def printed(heading: str) -> dict[str, list[float]]:
     ],
 )
 def test_errors_on_a_ball(normal: str) -> None:
-    errors = list(maker().ball_errors(normal).values())
+    errors = list(maker("make_normals").ball_errors(normal).values())
     assert printed("On a ball")[normal] == pytest.approx(errors, rel=RELATIVE, abs=ABSOLUTE)
 
 
 def test_errors_on_the_mandelbulb() -> None:
     if not has_float64(choose().info):
         return  # nothing true to compare with
-    true, whole = maker().true_normals(SIZE)
+    true, whole = maker("make_normals").true_normals(SIZE)
     assert whole.mean() > 0.9
     table = printed("On the Mandelbulb")
-    place = 2 * maker().SIZES.index(SIZE)
+    place = 2 * maker("make_normals").SIZES.index(SIZE)
     for normal in MEASURED:
-        errors = maker().fractal_errors(normal, SIZE, true, whole)
+        errors = maker("make_normals").fractal_errors(normal, SIZE, true, whole)
         assert table[normal][place : place + 2] == pytest.approx(errors, rel=RELATIVE, abs=ABSOLUTE)
 
 
 def test_the_page_is_whole() -> None:
     page = (DOCS / "normals.md").read_text("utf-8")
-    assert maker().NORMALS == NORMALS
+    assert maker("make_normals").NORMALS == NORMALS
     for heading in ("On a ball", "On the Mandelbulb"):
         table = printed(heading)
         assert tuple(table) == NORMALS
@@ -85,11 +70,11 @@ def test_the_page_is_whole() -> None:
     for normal in NORMALS:
         assert f"](pictures/normals_{normal}.webp)" in page
         with Image.open(DOCS / "pictures" / f"normals_{normal}.webp") as picture:
-            assert picture.size == maker().CROP[2:]
+            assert picture.size == maker("make_normals").CROP[2:]
 
 
 def test_numbers_have_two_digits() -> None:
-    number = maker().number
+    number = maker("make_normals").number
     assert [number(value) for value in (0.0, 0.0004, 0.00512, 0.0351, 0.298, 2.54, 12.4)] == [
         "0", "0", "0.005", "0.035", "0.30", "2.5", "12",
     ]  # fmt: skip

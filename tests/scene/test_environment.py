@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -20,9 +18,9 @@ from clfractal.scene.environment import names
 from clfractal.scene.lighting import Environment
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
+from tests.makers import maker
 from tests.shell import SCENE, InProcess, process
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
 OUR_OWN = ("dusk", "overcast", "studio")
 
 
@@ -200,17 +198,6 @@ def test_a_scene_without_one() -> None:
 # --- the program's own ---
 
 
-@pytest.fixture(scope="module")
-def maker() -> ModuleType:
-    """docs/make_environment.py"""
-    spec = importlib.util.spec_from_file_location("make_environment", DOCS / "make_environment.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_their_names() -> None:
     assert names() == OUR_OWN
 
@@ -234,11 +221,11 @@ def test_they_travel_light(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", OUR_OWN)
-def test_they_are_what_their_maker_makes(maker: ModuleType, name: str) -> None:
+def test_they_are_what_their_maker_makes(name: str) -> None:
     """At an eighth of the size: the same means, but for lamps' and hills' edges."""
     shipped = read_environment(resources.folder("environments") / f"{name}.exr")
     small = shipped.reshape(32, 8, 64, 8, 3).mean(axis=(1, 3))
-    made = maker.picture(name, 64, finer=4)
+    made = maker("make_environment").picture(name, 64, finer=4)
     difference = np.abs(np.log((small + 0.01) / (made + 0.01)))
     assert np.median(difference) < 0.01
     assert (difference < 0.25).mean() > 0.95

@@ -1,0 +1,17 @@
+"""The programs docs/make_*.py, for tests. They belong to no package, and import each other by name as when they are run."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def maker(name: str) -> ModuleType:
+    """The program docs/NAME.py as a module, such as `make_gallery`; the same one for all who ask."""
+    if str(DOCS) not in sys.path:
+        sys.path.append(str(DOCS))
+    return importlib.import_module(name)
