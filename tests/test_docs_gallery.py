@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -94,3 +95,18 @@ def test_the_page_is_made_of_the_scenes(maker: Any) -> None:
             assert file.stat().st_size <= maker.LARGEST_FILE
             with Image.open(file) as shown:
                 assert shown.width == maker.WIDTH
+
+
+def test_the_showcase_tells_how_each_print_is_made() -> None:
+    page = (DOCS / "showcase.md").read_text("utf-8")
+    parts = page.split("\n## ")[1:]
+    assert len(parts) >= 3
+    for part in parts:
+        (scene,) = re.findall(r"\]\(\.\./scenes/(\w+)\.yaml\)", part)
+        assert (DOCS.parent / "scenes" / f"{scene}.yaml").is_file()
+        assert f"](pictures/{scene}.webp)" in part
+        (command,) = re.findall(r"```text\n(.*)\n```", part)
+        told = re.fullmatch(rf"clfractal render scenes/{scene}\.yaml -o \w+\.png --size (\d+)x(\d+)", command)
+        assert told, command
+        assert int(told[1]) >= 3840
+        assert int(told[2]) >= 2160
