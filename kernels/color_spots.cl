@@ -17,7 +17,7 @@
 #include "state.h"
 #include "eye.h"
 
-__kernel void color_spots(STAGE_ARGUMENTS) {
+STAGE(color_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;

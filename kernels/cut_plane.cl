@@ -48,5 +48,5 @@ __kernel void cut_plane(PASS_BUFFERS, __constant const struct PlaneSettings *set
                         __global const float *palette, PASS_SPAN) {
     const world w = {view, settings, orbit, k, colors, palette};
     const pass span = PASS;
-    render_packet(span, w);
+    render_packet((int)get_global_id(0) + first_packet, (int)get_global_id(1), span, w);
 }

@@ -96,6 +96,15 @@ typedef JOIN(int, LANES) mask;
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
+// What a kernel does, as a function that its kernel calls with the place of its work-item. PoCL makes three functions of a kernel,
+// and inlines into each of them all that it does: what is called instead is compiled once. Functions that ask for the work-item's
+// place themselves PoCL inlines always.
+#ifdef DIRECT_BUILT_INS
+#define BODY static __attribute__((noinline))
+#else
+#define BODY INLINE
+#endif
+
 // The count of a loop whose body copies structs. Where a driver loses such copies when it unrolls the loop, the count is one that
 // its compiler cannot know. (COUNTS_AT_RUN_TIME is defined for such a driver: see `loses_copies_when_unrolling` in
 // clfractal/device/select.py. The number of dimensions is 1, 2 or 3.)

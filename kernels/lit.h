@@ -111,7 +111,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.
 INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
-    const place_in_pass at = place_of_item(s.span, s.tile);
+    const place_in_pass at = place_of_packet(s.span, s.packet, s.tile);
     const mask wanted = mask_of(a.wanted);
     const shot found = shot_of(s, a, eye_ray(a, w), seen, here, w);
     pixel p = sums_before(s, &at);

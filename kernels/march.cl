@@ -70,9 +70,9 @@ INLINE void look_at(queue q, int at, __constant const struct March *settings, __
 
 // Marches all rays of a queue, each work-item some: a packet's lanes share `slice` rays in a row, and a lane that is done
 // takes the next of them; single lanes take rays that are far apart, so that neighbours read neighbouring memory.
-__kernel void march_rays(STAGE_ARGUMENTS) {
+STAGE(march_rays) {
     const queue q = STAGE_QUEUE;
-    const int item = (int)get_global_id(0), total = q.turns * q.wave, begin = LANES == 1 ? item : item * slice;
+    const int total = q.turns * q.wave, begin = LANES == 1 ? item : item * slice;
     if (begin >= total || WAS_CANCELLED) return;
     slice_left left = {begin, LANES == 1 ? total : min(begin + slice, total), LANES == 1 ? (int)get_global_size(0) : 1};
     march m = {0};
@@ -96,9 +96,9 @@ __kernel void march_rays(STAGE_ARGUMENTS) {
 }
 
 #if LANES == 1
-__kernel void look_at_surfaces(STAGE_ARGUMENTS) {
+STAGE(look_at_surfaces) {
     const queue q = STAGE_QUEUE;
-    const int at = (int)get_global_id(0);
+    const int at = item;
     if (at < q.turns * q.wave && !WAS_CANCELLED) look_at(q, at, settings, orbit, k);
 }
 #endif

@@ -4,9 +4,9 @@
 #include "passes.h"
 
 // One work-item's part of a pass by a renderer whose kernel takes its shots from beginning to end.
-INLINE void render_packet(pass s, world w) {
-    if ((int)get_global_id(0) + s.first_packet >= s.end_packet) return;
-    const place_in_pass here = place_of_item(s, (int)get_global_id(1));
+BODY void render_packet(int packet, int tile, pass s, world w) {
+    if (packet >= s.end_packet) return;
+    const place_in_pass here = place_of_packet(s, packet, tile);
     pixel p = pixel_before(s, &here);
     const real shots_before = p.shots;
     real hits = R(0.0);

@@ -65,8 +65,7 @@ typedef struct {
     __global uint *sums;
 } place_in_pass;
 
-INLINE place_in_pass place_of_item(pass s, int tile) {
-    const int packet = (int)get_global_id(0) + s.first_packet;
+INLINE place_in_pass place_of_packet(pass s, int packet, int tile) {
     const int4 corner = s.places[tile];
     const place_in_pass here = {tile, packet, packet_at(packet, (int2)(corner.x, corner.y), s.view),
                                 s.kept + corner.z * s.kept_count * TILE_PIXELS + packet * LANES,

@@ -20,7 +20,7 @@
 #include "eye.h"
 
 // Finds where a cutting plane opens the set: there its face is visible, and no ray goes on.
-__kernel void find_faces(STAGE_ARGUMENTS) {
+STAGE(find_faces) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
@@ -41,7 +41,7 @@ __kernel void find_faces(STAGE_ARGUMENTS) {
 }
 
 // Finds the planes in front of and behind the first spots.
-__kernel void find_planes(STAGE_ARGUMENTS) {
+STAGE(find_planes) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;

@@ -3,7 +3,7 @@
 #include "queue.h"
 
 // Where an item is none of the picture's packets.
-#define IS_BEYOND ((int)get_global_id(0) + first_packet >= end_packet || WAS_CANCELLED)
+#define IS_BEYOND (item + first_packet >= end_packet || WAS_CANCELLED)
 
 // All data that stages without a formula read.
 typedef struct {
@@ -23,18 +23,17 @@ typedef struct {
     queue q;
     __global scalar *state;   // see state.h
     int stride;               // from one number of it to the next
-    int tile;                 // of the launch
+    int packet, tile;         // of the tile, and of the launch
     int slot;                 // number of the packet's first pixel in the wave
     int bounce, sample;
 } stage;
 
-INLINE stage stage_of(pass span, queue q, __global scalar *state, int first_tile, int bounce, int sample) {
-    const int packets = span.end_packet - span.first_packet;
-    const int slot = ((int)get_global_id(1) * packets + (int)get_global_id(0)) * LANES;
-    const stage s = {span, q, state + slot, q.wave + STATE_PADDING, first_tile + (int)get_global_id(1), slot, bounce, sample};
+INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *state, int first_tile, int bounce, int sample) {
+    const int slot = (row * (span.end_packet - span.first_packet) + item) * LANES;
+    const stage s = {span, q, state + slot, q.wave + STATE_PADDING, item + span.first_packet, first_tile + row, slot, bounce, sample};
     return s;
 }
 #define STAGE_OF(name)                                                                                                     \
     const pass span_ = PASS;                                                                                               \
     const queue queue_ = STAGE_QUEUE;                                                                                      \
-    const stage name = stage_of(span_, queue_, state, first_tile, bounce, sample)
+    const stage name = stage_of(item, row, span_, queue_, state, first_tile, bounce, sample)

@@ -22,11 +22,11 @@
 #include "lit.h"
 
 // Sends the rays from the eye. With several points to the pixel the ray only finds out how far the pixel's whole cone is free.
-__kernel void begin_shots(STAGE_ARGUMENTS) {
+STAGE(begin_shots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const place_in_pass here = place_of_item(s.span, s.tile);
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const pixel p = sums_before(s, &here);
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
     numbers_keep((const real *)&a, AIM_NUMBERS, s.state + STATE_AIM * s.stride, s.stride);
@@ -39,11 +39,11 @@ __kernel void begin_shots(STAGE_ARGUMENTS) {
 
 #if POINTS > 1
 // Sends the rays of a pixel's points, from where its cone touched.
-__kernel void send_points(STAGE_ARGUMENTS) {
+STAGE(send_points) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const place_in_pass here = place_of_item(s.span, s.tile);
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
     const encounter end_of_cone = queue_met(s.q, 0, s.slot);
     tally cost = {R(0.0), R(0.0), R(0.0)};
@@ -74,11 +74,11 @@ INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, sigh
 #endif
 
 // Makes spots of what the rays along the path have met, and sends the rays that bring their light.
-__kernel void find_spots(STAGE_ARGUMENTS) {
+STAGE(find_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const place_in_pass here = place_of_item(s.span, s.tile);
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
     path so_far;
     const ray r = path_ray(s, a, &so_far, w);
@@ -107,7 +107,7 @@ __kernel void find_spots(STAGE_ARGUMENTS) {
 }
 
 // Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
-__kernel void light_spots(STAGE_ARGUMENTS) {
+STAGE(light_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;

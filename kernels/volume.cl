@@ -66,5 +66,5 @@ __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __c
 #endif
     };
     const pass span = PASS;
-    render_packet(span, w);
+    render_packet((int)get_global_id(0) + first_packet, (int)get_global_id(1), span, w);
 }

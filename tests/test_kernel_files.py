@@ -15,7 +15,9 @@ LONGER = {
     "voxels_bricks.cl: store_bricks": 95,
 }
 # A function's or a kernel's name, at the left; its body begins on the same line or a few lines below.
-_HEAD = re.compile(r"^(?:INLINE|static inline|__kernel)\b[^;{]*?(\w+)\(", re.MULTILINE)
+_HEAD = re.compile(
+    r"^(?:(?:INLINE|BODY|static inline|__kernel)\b[^;{]*?(?=\b\w+\()|STAGE\()(\w+)", re.MULTILINE
+)
 
 
 def functions(text: str) -> Iterator[tuple[str, int]]:
