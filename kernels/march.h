@@ -36,6 +36,8 @@ INLINE sight march_look(march *m, __constant const struct March *settings, __con
     s.cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
     // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing.
     s.radius = s.here.step * (real)(settings->step_scale);
+    // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
+    s.radius = pick(less(s.radius, (real)(REAL_LARGEST)), s.radius, (real)(settings->step));
     s.radius = pick(free, fmin(s.radius, m->radius_before + MOST_GROWTH * (real)(settings->step_scale) * m->step_before), s.radius);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s.here.end.count, R(0.0));
