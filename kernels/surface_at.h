@@ -5,18 +5,53 @@ INLINE encounter encounter_of(crossing c) {
     return e;
 }
 
-// The normal of the surface where a march has ended, and its escape count. Both are taken where the ray's cone came near the
-// solid: most of these surfaces are rougher than a pixel, and there the distance has smoothed them over the pixel's footprint.
-// Where the surface is smooth light is computed at the hit: there both normals differ little for the way between them.
-#define SMOOTH R(0.009)  // radians a footprint: a smooth surface turns at most so fast ...
-#define ROUGH R(0.013)   // ... and one that turns faster is rough
-INLINE vec surface_normal(vec wide, vec fine, encounter *met, real cone) {
-    const real way = fmax(met->last - met->touch, R(0.01) * cone);
-    const vec turn = vec_scale(vec_sub(fine, wide), R(1.0) / way);
-    const real share = clamp((ROUGH - sqrt(vec_dot(turn, turn)) * cone) / (ROUGH - SMOOTH), R(0.0), R(1.0));
-    const vec at_hit = vec_along(fine, met->t - met->last, turn);
-    met->touch += share * (met->t - met->touch);
-    return vec_normalize(vec_along(wide, share, vec_sub(at_hit, wide)));
+// Light is computed where the ray's cone came near the solid: most of these surfaces are rougher than a pixel, and there the
+// distance has smoothed them over the pixel's footprint. Where the surface is smooth, light is computed at the hit. It is smooth
+// where the gradient at the hit is the one straight above it too. (Before the hit, on the ray, it is that of a place beside it.)
+#define LIKE R(0.04)      // radians between these gradients: up to this far apart they are alike ...
+#define UNLIKE R(0.08)    // ... and from here on they are not
+#define PLACED R(0.01)    // below this, shadows begin at the hit too ...
+#define UNPLACED R(0.02)  // ... and from here on at the place before it: rough surfaces shadow themselves
+#define BESIDE R(0.375)   // radians between the hit's gradient and that before it, up to which they may be of one body ...
+#define ASTRAY R(0.5)     // ... and from here on they are not
+
+// How much of something counts that is `a` from what it should be: all below `most`, nothing from `none` on.
+INLINE real share_below(vec a, real most, real none) {
+    return clamp((none - sqrt(vec_dot(a, a))) / (none - most), R(0.0), R(1.0));
+}
+
+// The surface where a march has ended: how far it is before it, at `touch`, and its normal, which may be that at the hit.
+INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant const struct March *settings,
+                                 __constant const struct Orbit *orbit, __constant const scalar *k, clearance *there, vec *normal) {
+    const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
+    surface_point surface, found;
+    vec wide, at_hit, place = vec_along(r.origin, met->touch, r.direction);
+    mask asked = active;
+    for (int i = 0; i < TURNS(3); ++i) {
+        if (!any_lane(asked)) break;
+        const clearance here = orbit_dual_distance(place, asked, orbit, k, &found);
+        met->more_count += pick(asked, here.end.count, R(0.0));
+        const vec gradient = vec_normalize(found.gradient);
+        if (i == 0) {
+            *there = here;
+            surface = found;
+            wide = *normal = gradient;
+            place = vec_along(r.origin, met->last, r.direction);
+        } else if (i == 1) {
+            const real way = fmax(met->last - met->touch, R(0.01) * cone);
+            at_hit = vec_normalize(vec_along(gradient, (met->t - met->last) / way, vec_sub(gradient, wide)));
+            asked &= less(R(0.0), share_below(vec_sub(at_hit, wide), BESIDE, ASTRAY));
+            const real height = (met->touch - met->t) * vec_dot(wide, r.direction);
+            place = vec_along(vec_along(r.origin, met->t, r.direction), fmax(height, R(0.0)), wide);
+        } else {
+            asked &= ~here.end.inside & less(R(0.5), vec_dot(gradient, gradient));
+            const vec apart = vec_sub(gradient, at_hit), turned = vec_sub(at_hit, wide);
+            const real share = share_below(apart, LIKE, UNLIKE) * share_below(turned, BESIDE, ASTRAY);
+            *normal = vec_pick(asked, vec_normalize(vec_along(wide, share, turned)), wide);
+            met->touch += pick(asked, share_below(apart, PLACED, UNPLACED) * (met->t - met->touch), R(0.0));
+        }
+    }
+    return surface;
 }
 
 #if POLISH
@@ -52,7 +87,6 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
 INLINE void surface_at(ray r, encounter *met, mask active, __constant const struct March *settings,
                        __constant const struct Orbit *orbit, __constant const scalar *k) {
     met->touch = fmin(met->touch, met->last);
-    const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
     clearance there;
     vec normal;
     met->more_steps = met->more_count = R(0.0);
@@ -60,15 +94,7 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     const surface_point surface = surface_polished(r, met, active, settings, orbit, k, &there);
     normal = vec_normalize(surface.gradient);
 #else
-    surface_point surface, at_hit;
-    for (int i = 0; i < TURNS(2); ++i) {
-        surface = at_hit;
-        const real t = i == 0 ? met->touch : met->last;
-        const clearance here = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, orbit, k, &at_hit);
-        if (i == 0) there = here;
-        met->more_count += pick(active, here.end.count, R(0.0));
-    }
-    normal = surface_normal(vec_normalize(surface.gradient), vec_normalize(at_hit.gradient), met, cone);
+    const surface_point surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
 #endif
     // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.end.inside;
