@@ -204,7 +204,7 @@ def test_a_picture_by_the_other_search_meets_the_sphere(camera: str, engine: Eng
 @pytest.mark.parametrize("name", ["mandelbulb", "hast_above"])
 def test_half_a_pixel_on_is_half_a_pixel(name: str) -> None:
     scene = noise.scenes()[name]
-    moved = scene_view(noise.half_a_pixel_on(scene))
+    moved = scene_view(noise.moved(scene, 0.5, 0.5))
     point = np.array([*scene.camera.target, 1.0]) @ moved.world_to_ndc()
     width, height = scene.image.width, scene.image.height
     assert point[:2] / point[3] * [width, height] == pytest.approx(
@@ -215,9 +215,9 @@ def test_half_a_pixel_on_is_half_a_pixel(name: str) -> None:
 def test_figures_are_held_against_those_on_record() -> None:
     assert Steps("row", 7.4, 10.0, 0.0, 0.0).met
     assert not Steps("row", 7.6, 10.0, 0.0, 0.0).met
-    assert Noise("scene", 10.0, 20.0, (10.0, 20.0)).met
-    assert not Noise("scene", 10.2, 20.0, (10.0, 20.0)).met
-    assert not Noise("scene", 10.0, 20.5, (10.0, 20.0)).met
+    assert Noise("scene", 10.0, 20.0, 9.0, (10.0, 20.0, 8.0)).met
+    assert not Noise("scene", 10.2, 20.0, 9.0, (10.0, 20.0, 8.0)).met
+    assert not Noise("scene", 10.0, 20.5, 9.0, (10.0, 20.0, 8.0)).met
     record = steps.record()
     assert set(record["steps"]) == set(steps.rows()) <= set(bench.ROWS)
     assert set(record["formulas"]) <= set(subjects.names())

@@ -123,11 +123,14 @@ def rows(report: Report, engine: Engine, options: argparse.Namespace) -> None:
 
 def flicker(report: Report, engine: Engine, options: argparse.Namespace) -> None:
     """Noise and flicker of six scenes."""
-    report.say(f"\n{'one sample, codes':22} {'noise':>8} {'before':>8} {'flicker':>8} {'before':>8}")
+    titles = " ".join(f"{title:>8} {'before':>8}" for title in ("noise", "flicker", "within"))
+    report.say(f"\n{'one sample, codes':22} {titles}")
     for one in noise.measure_noise(engine, steps.record().get("noise", {}), options.set):
         report.keep("noise", one)
-        before = ("-", "-") if one.before is None else tuple(f"{figure:.2f}" for figure in one.before)
-        report.say(f"{one.scene:22} {one.noise:8.2f} {before[0]:>8} {one.flicker:8.2f} {before[1]:>8}")
+        before = ("-",) * 3 if one.before is None else tuple(f"{figure:.2f}" for figure in one.before)
+        now = (one.noise, one.flicker, one.within)
+        cells = " ".join(f"{a:8.2f} {b:>8}" for a, b in zip(now, before, strict=True))
+        report.say(f"{one.scene:22} {cells}")
         if not one.met:
             report.missed.append(
                 f"noise: {one.scene}: noise {one.noise:.2f} and flicker {one.flicker:.2f},"

@@ -1,4 +1,9 @@
-"""Noise of pictures with one sample to a pixel, and their flicker when they move by half a pixel, in display light."""
+"""Noise of pictures with one sample to a pixel, and their flicker when they move by half a pixel, in display light.
+
+A picture is held against the mean of pictures of the same kind, each moved by part of a pixel: what a camera would see whose
+pixels gather the light of all their places. (A picture of many samples is not that: it shows light nearer to the set than
+one of a single sample.)
+"""
 
 from __future__ import annotations
 
@@ -19,9 +24,9 @@ from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
 
 SLACK = 1.01
-"""Figures may be so many times those on record: the converged pictures have some noise of their own."""
-SAMPLES = 36
-"""Samples to a pixel of a picture that counts as converged."""
+"""Figures may be so many times those on record: the means have some noise of their own."""
+SIDE = 6
+"""A mean is of so many by so many pictures, moved to places spread evenly over a pixel."""
 _SIZE = (320, 180)
 _SCENES = Path(__file__).with_name("noise.yaml")
 
@@ -32,20 +37,22 @@ class Noise:
 
     Attributes:
         scene: its name.
-        noise: one sample to a pixel beside many.
-        flicker: how much more than the picture of many samples one of one sample changes when it moves by half a pixel
-            in both directions.
-        before: noise and flicker on record; None if there are none.
+        noise: one sample to a pixel beside the mean of such pictures over the pixel.
+        flicker: how much more than the mean the picture changes when the scene moves by half a pixel in both directions.
+        within: the noise of those pixels alone that the set covers wholly. Outlines of a sharper surface are rougher, and
+            a ray either meets the set or not, so elsewhere nothing but more samples helps.
+        before: noise, flicker and what is within, as on record; None if there are none.
     """
 
     scene: str
     noise: float
     flicker: float
-    before: tuple[float, float] | None
+    within: float
+    before: tuple[float, float, float] | None
 
     @property
     def met(self) -> bool:
-        """Whether both are no worse than on record."""
+        """Whether noise and flicker are no worse than on record."""
         if self.before is None:
             return True
         return self.noise <= SLACK * self.before[0] and self.flicker <= SLACK * self.before[1]
@@ -60,31 +67,30 @@ def scenes(overrides: Sequence[str] = ()) -> Mapping[str, Scene]:
 
 def measure_noise(
     engine: Engine,
-    before: Mapping[str, tuple[float, float]],
+    before: Mapping[str, tuple[float, float, float]],
     overrides: Sequence[str] = (),
     *,
-    samples: int = SAMPLES,
+    side: int = SIDE,
 ) -> Iterator[Noise]:
-    """Renders every scene four times: still and moved, with one sample and with many."""
+    """Renders every scene, still and half a pixel on, in its place and in `side` x `side` others around that."""
     for name, scene in scenes(overrides).items():
-        moved = half_a_pixel_on(scene)
-        one, many = (engine.render(scene, samples=count) for count in (1, samples))
-        one_moved, many_moved = (engine.render(moved, samples=count) for count in (1, samples))
-        shown = (many["A"] > 0) & (many_moved["A"] > 0)
-        error, error_moved = _codes(one) - _codes(many), _codes(one_moved) - _codes(many_moved)
+        error, coverage = _error(scene, engine, side)
+        error_moved, coverage_moved = _error(moved(scene, 0.5, 0.5), engine, side)
+        shown = (coverage > 0) & (coverage_moved > 0)
         recorded = before.get(name)
         yield Noise(
             name,
             _rms(error[shown]),
             _rms((error_moved - error)[shown]),
-            None if recorded is None else (recorded[0], recorded[1]),
+            _rms(error[coverage == 1]),
+            None if recorded is None else (recorded[0], recorded[1], recorded[2]),
         )
 
 
-def half_a_pixel_on(scene: Scene) -> Scene:
-    """The scene whose picture shows everything half a pixel farther to the left and the bottom."""
+def moved(scene: Scene, left: float, down: float) -> Scene:
+    """The scene whose picture shows everything so many pixels farther to the left and the bottom."""
     view = scene_view(scene)
-    shift = 0.5 * view.pixel_size(scene.image.height) * (view.side + view.up)
+    shift = view.pixel_size(scene.image.height) * (left * view.side + down * view.up)
     camera = scene.camera
     place = {"target": tuple((np.array(camera.target) + shift).tolist())}
     if view.eye is None:
@@ -92,9 +98,23 @@ def half_a_pixel_on(scene: Scene) -> Scene:
     return scene.model_copy(update={"camera": camera.model_copy(update=place)})
 
 
-def _codes(film: Film) -> Floats:
-    """A film as a screen shows it, shape (height, width, 3), without rounding."""
-    return 255 * encode(np.clip(np.asarray(film, np.float64), 0.0, 1.0))
+def _error(scene: Scene, engine: Engine, side: int) -> tuple[Floats, Floats]:
+    """A picture minus the mean of it over a pixel, shape (height, width, 3), and which share of that shows the set."""
+    places = (np.arange(side) + 0.5) / side - 0.5
+    around = [engine.render(moved(scene, x, y), samples=1) for y in places for x in places]
+    mean = np.mean([_light(film) for film in around], axis=0)
+    coverage: Floats = np.mean([film["A"] > 0 for film in around], axis=0)
+    return _codes(_light(engine.render(scene, samples=1))) - _codes(mean), coverage
+
+
+def _light(film: Film) -> Floats:
+    """A film's light as a screen can show it, shape (height, width, 3)."""
+    return np.clip(np.asarray(film, np.float64), 0.0, 1.0)
+
+
+def _codes(light: Floats) -> Floats:
+    """Light as codes of sRGB, without rounding."""
+    return 255 * encode(light)
 
 
 def _rms(error: Floats) -> float:
