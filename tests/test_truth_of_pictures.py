@@ -1,7 +1,7 @@
-"""Pictures show the set where it is: the targets of `benchmarks.truth`, which measures them over every formula, on a few.
+"""Pictures show the set where it is: some of the targets of `benchmarks.truth`, which measures all of them.
 
-The sphere, hits and losses are held to the benchmark's own limits, but for hast's hits, which see. That hast from above hangs
-together, and shows every pixel of the Mandelbrot set, is tested in `tests/render/test_hast_above.py`.
+The sphere, hits and losses are held to the benchmark's own limits, but for hast's hits, which see. That hast from above
+hangs together, and shows the pixels of the Mandelbrot set, is tested in `tests/render/test_hast_above.py`.
 """
 
 from __future__ import annotations
@@ -55,9 +55,7 @@ def solid_of(subject: Subject, engine: Engine) -> Solid:
 
 def hits_of(formula: str, engine: Engine) -> Hits:
     subject = subject_of(formula)
-    found = measure_hits(
-        see(subject.scene, engine), solid_of(subject, engine), 200, np.random.default_rng(3)
-    )
+    found = measure_hits(see(subject.scene, engine), solid_of(subject, engine), 200, np.random.default_rng(3))
     assert found.tested == 200
     assert found.fat
     return found
@@ -78,8 +76,8 @@ def test_the_set_is_within_a_pixel_of_hits(formula: str, engine: Engine) -> None
 
 
 def test_hast_is_near_its_hits(engine: Engine) -> None:
-    """Missed: seen from above, 97 % of its hits have an inside point within a pixel's width, not 98 %. It is full of valleys
-    of the potential."""
+    """Missed: seen from above, 97 % of its hits have an inside point within a pixel's width, not 98 %. It is full of
+    valleys of the potential."""
     found = hits_of("hast", engine)
     assert found.within[0] >= 0.965
     assert found.within[2] >= 0.985

@@ -1,8 +1,15 @@
 """Noise of pictures with one sample to a pixel, and their flicker when they move by half a pixel, in display light.
 
-A picture is held against the mean of pictures of the same kind, each moved by part of a pixel: what a camera would see whose
-pixels gather the light of all their places. (A picture of many samples is not that: it shows light nearer to the set than
-one of a single sample.)
+A picture is held against the mean of pictures of the same kind, each moved by part of a pixel: what a camera would see
+whose pixels gather the light of all their places. (A picture of many samples is not that: it shows light nearer to the
+set than one of a single sample.)
+
+The figures on record are those of the commit before the march landed on the set, by this very measure:
+
+    git worktree add ../before 4e9a3c2
+    cp benchmarks/truth/*.py benchmarks/truth/noise.yaml ../before/benchmarks/truth/
+    cd ../before
+    python -m benchmarks.truth --part noise
 """
 
 from __future__ import annotations
