@@ -16,6 +16,7 @@ from tests.render import normals_oracle as oracle
 from tests.render.point_rays import (
     CAMERAS,
     COUNT,
+    DETAIL,
     LAMP,
     Variant,
     degrees,
@@ -32,6 +33,7 @@ from tests.render.shots import (
     SPHERE_RADIUS,
     normals_of,
     points_of,
+    rays,
     scene_of,
     shoot,
     stacked,
@@ -82,8 +84,9 @@ def test_normals_of_a_ball(device: Device, variant: Variant, camera: str) -> Non
     normals = normals_of(taken.film)[inner]
     off = degrees(normals, true[inner])
     if kind == "gradient":
-        # That of the point nearest to the middle: exact, but in another place.
-        assert degrees(normals, unit(points_of(taken.film)[inner] - SPHERE_CENTER)).max() < 1e-3
+        # That of the point nearest to the middle: exact, but in another place. (The march lands a little before the hit.)
+        most = 2e-3 if variant[0] == "distance" else 1e-3
+        assert degrees(normals, unit(points_of(taken.film)[inner] - SPHERE_CENTER)).max() < most
         assert off.max() < 3
         return
     # The march ends half a hit distance before the surface, on a ball that much larger.
@@ -102,8 +105,8 @@ def test_normals_of_a_ball(device: Device, variant: Variant, camera: str) -> Non
 @both
 @every
 def test_normals_of_a_plane(device: Device, variant: Variant, camera: str) -> None:
-    """The box's top: any three points tell it. Half a hit distance before it is another plane in perspective, where
-    footprints grow with the distance: by DETAIL / 6 of a footprint per unit, a hundredth of a degree."""
+    """The box's top: any three points tell it. Points lie where a scaled distance is a sixth of the hit distance. In
+    perspective, where footprints grow with the distance, that is another plane, a hundredth of a degree apart."""
     taken = shot(device, variant, camera)
     origin, way = taken.origin, taken.way
     on_top = origin - (origin[..., 2:] / way[..., 2:]) * way
@@ -111,7 +114,8 @@ def test_normals_of_a_plane(device: Device, variant: Variant, camera: str) -> No
     inner = ((np.abs(on_top[..., :2]) < 1.15).all(-1) & (nearest > SPHERE_RADIUS + 0.02)).all(-1)
     assert inner.sum() > 600
     off = degrees(normals_of(taken.film), np.array([0.0, 0, 1]))[inner]
-    assert off.max() < (0.02 if (variant[0], camera) == ("distance", "perspective") else 1e-3)
+    leaning = np.degrees(DETAIL / 6 / taken.scene.chain.step_scale * rays(taken.scene)[2].max())
+    assert off.max() < (leaning if (variant[0], camera) == ("distance", "perspective") else 1e-3)
 
 
 @both
@@ -121,7 +125,7 @@ def test_coverage_is_the_share_of_the_points(device: Device, variant: Variant, c
     may hit or not. The search by steps looks where the middle's ray meets something."""
     taken = shot(device, variant, camera)
     by_distance = variant[0] == "distance"
-    fewest = taken.meets(-taken.reach() if by_distance else -5e-3).sum(-1)
+    fewest = taken.meets(-1e-5 if by_distance else -5e-3).sum(-1)
     most = taken.meets(taken.reach()).sum(-1)
     coverage = taken.film["A"] * COUNT
     assert np.abs(coverage - np.round(coverage)).max() < 1e-5
@@ -130,12 +134,15 @@ def test_coverage_is_the_share_of_the_points(device: Device, variant: Variant, c
         middle = coverage > 0
         assert middle[most == COUNT].all()
         fewest = np.where(middle, fewest, 0)
-    # A point that looks past a rim may still land beyond it.
-    within = (fewest <= coverage) & (coverage <= most)
-    assert within.mean() > (0.97 if by_distance else 0.9999)
+    assert (fewest <= coverage).all()
+    if by_distance:
+        # A march that is about to land, and passes a rim, may take it for a sheet up to a hit distance beside the ray.
+        assert (coverage <= most).mean() > 0.985
+        most = taken.meets(3 * taken.reach()).sum(-1)
+    assert (coverage <= most).all()
     assert ((coverage > 0) & (coverage < COUNT)).sum() > 40
     if by_distance:
-        assert (fewest == most).mean() > 0.97
+        assert (fewest == taken.meets(taken.reach()).sum(-1)).mean() > 0.97
 
 
 @both
@@ -163,7 +170,7 @@ def test_silhouette(device: Device, variant: Variant, camera: str) -> None:
         made = made_of(variant[1], taken.middle()[1][rim], places)
         expected = np.where(np.isnan(made), expected, made)
     normals = normals_of(taken.film)[rim]
-    assert degrees(normals, expected).max() < (2 if variant[0] == "distance" else 0.01)
+    assert degrees(normals, expected).max() < (1 if variant[0] == "distance" else 0.01)
     if variant[2] == "grid":
         part = unit(np.nanmean(places - SPHERE_CENTER, axis=1))
         assert degrees(normals, part).max() < 12
@@ -247,7 +254,7 @@ def test_nine_points_cost_less_than_nine_rays(device: Device) -> None:
     assert points["steps"].sum() < 0.25 * many["steps"].sum()
     share = many["A"].astype(float).reshape(32, 3, 32, 3).mean((1, 3))
     errors = [np.abs(film["A"] - share).mean() for film in (points, one)]
-    assert errors[0] < 0.9 * errors[1]
+    assert errors[0] < min(0.05, 0.85 * errors[1])
     assert share.mean() - 0.005 < points["A"].mean() < one["A"].mean()
     assert (points["A"][share == 1] == 1).mean() > 0.99
     middle = stacked(many, ("A", "P.X", "P.Y", "P.Z"))[1::3, 1::3].astype(float)

@@ -76,6 +76,9 @@ every_formula = pytest.mark.parametrize(
     "name",
     [*KINDS, *(pytest.param(name, marks=pytest.mark.combination) for name in names() if name not in KINDS)],
 )
+# The share of pixels whose solid distance may miss. Of KINDS only the Mengerbulb misses some: stretches of at most 0.4
+# footprints, where its step scale of 1.3 is too long for so few applications (0.8 misses none, in a quarter more steps).
+SLIPS, MISSED = 0.005, ("mengerbulb",)
 EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 
 
@@ -150,13 +153,14 @@ def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
     assert name in THIN or far.hit.sum() > 0.08 * far.hit.size
     assert np.isfinite(stacked(near.film, CHANNELS[2:])).all()
     assert np.isfinite(stacked(far.film, CHANNELS[2:])).all()
-    assert (far.hit & ~near.hit).sum() <= 0.005 * far.hit.sum()
+    missed = 0.0 if name in KINDS and name not in MISSED else SLIPS
+    assert (far.hit & ~near.hit).sum() <= missed * far.hit.sum()
 
     shared = far.hit & near.hit
     apart = far.t - near.t
     slack = near.footprint + far.step
     # Nothing that a step would see is passed by distances.
-    assert (apart[shared] > -slack[shared]).mean() > 0.995
+    assert (apart[shared] <= -slack[shared]).mean() <= missed
     # What distance alone sees: thin, or beside the ray.
     early = near.hit & (~far.hit | (apart > slack))
     if name not in THIN:

@@ -62,9 +62,7 @@ LIGHTS: dict[str, list[dict[str, Any]]] = {
 @pytest.mark.parametrize("lights", LIGHTS)
 def test_equation_5(device: Device, formula: dict[str, Any], lights: str) -> None:
     """A ball shadows no point that faces the light, so every hit pixel has Eq. 5 with s = 1: no acne at any angle."""
-    scene = scene_of(
-        formula, PERSPECTIVE, lights=LIGHTS[lights], material=MATERIAL, renderer={"detail": 0.05}
-    )
+    scene = scene_of(formula, PERSPECTIVE, lights=LIGHTS[lights], material=MATERIAL, renderer={"detail": 0.1})
     film = shoot(scene, device)
     hit = film["A"] == 1
     points = points_of(film)
