@@ -17,15 +17,20 @@
         __global const float *palette, __global const float *environment, __global const struct CutPlane *planes,          \
         __global const float *plane_palettes, __global scalar *restrict state, __global scalar *restrict rays, __global scalar *restrict met,         \
         PASS_SPAN, int first_tile, int wave, int queue_stride, int turns, int slice, int next_turns, int goal, int bounce, int sample
+// The head of a stage's kernel, whose work-item is number ITEM along the first dimension and ROW along the second.
+#ifdef DIRECT_BUILT_INS
 #define STAGE_GIVEN                                                                                                         \
     film, kept, statistics, places, view, sampling, settings, orbit, k, material, lights, palette, environment, planes,     \
         plane_palettes, state, rays, met, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode,     \
         first_tile, wave, queue_stride, turns, slice, next_turns, goal, bounce, sample
-// A stage's kernel, and the head of the function that does it for the work-item number `item` along the first dimension and `row`
-// along the second.
 #define STAGE(name)                                                                                                        \
-    BODY void name##_item(int item, int row, STAGE_ARGUMENTS);                                                             \
+    CALLED void name##_item(int ITEM, int ROW, STAGE_ARGUMENTS);                                                           \
     __kernel void name(STAGE_ARGUMENTS) { name##_item((int)get_global_id(0), (int)get_global_id(1), STAGE_GIVEN); }         \
-    BODY void name##_item(int item, int row, STAGE_ARGUMENTS)
+    CALLED void name##_item(int ITEM, int ROW, STAGE_ARGUMENTS)
+#else
+#define ITEM ((int)get_global_id(0))
+#define ROW ((int)get_global_id(1))
+#define STAGE(name) __kernel void name(STAGE_ARGUMENTS)
+#endif
 #define STAGE_QUEUE {rays, met, wave, turns, queue_stride}
 #define WAS_CANCELLED (*(volatile __constant const int *)&sampling->cancelled)

@@ -25,7 +25,8 @@ STAGE(color_spots) {
     const mask found = mask_of(here.found);
     if (!any_lane(found)) return;
     path so_far;
-    const vec direction = path_ray(s, aim_kept(s.state, s.stride), &so_far, w).direction;
+    const aim a = aim_kept(s.state, s.stride);
+    const vec direction = path_ray(s, eye_ray(a, view), a.wanted, &so_far).direction;
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);
     spot_keep(&here, s.state, bounce, s.stride);

@@ -23,7 +23,7 @@ INLINE void environment_place(vec direction, __constant const struct Material *m
 
 // The light that comes from a direction: pixels blended linearly, around the sides too; above the middle of the top row and
 // below the middle of the last row they are constant.
-INLINE color environment_color(vec direction, __constant const struct Material *m, __global const float *map) {
+CALLED color environment_color(vec direction, __constant const struct Material *m, __global const float *map) {
     const int width = m->environment_width, height = m->environment_height;
     const int rows = m->environment_rows, columns = m->environment_columns;
     __global const float *pixels = map + 2 * (rows + 1) + rows * (2 * columns + 1);

@@ -8,7 +8,9 @@ INLINE pixel sums_before(stage s, const place_in_pass *here) {
     return p;
 }
 
-INLINE ray eye_ray(aim a, world w) { return camera_ray(a.x, a.y, a.lens_x, a.lens_y, w.view); }
+CALLED ray eye_ray(aim a, __constant const struct View *view) {
+    return camera_ray(a.x, a.y, a.lens_x, a.lens_y, view);
+}
 
 INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     real across, below;
@@ -30,10 +32,9 @@ INLINE void send_clipped(stage s, int turn, ray r, mask wanted, world w) {
     queue_send(s.q, turn, s.slot, r, wanted);
 }
 
-// The ray that finds the next spot: from the eye, or after a bounce the mirrored one; and the light of the path so far.
-INLINE ray path_ray(stage s, aim a, path *so_far, world w) {
-    ray r = eye_ray(a, w);
-    so_far->on_path = a.wanted;
+// The ray that finds the next spot: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
+INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
+    so_far->on_path = wanted;
     so_far->through = R(1.0);
     so_far->seen = color_of(R(0.0), R(0.0), R(0.0));
 #if PLANES > 0

@@ -96,13 +96,13 @@ typedef JOIN(int, LANES) mask;
 #define INLINE static inline __attribute__((always_inline))
 #endif
 
-// What a kernel does, as a function that its kernel calls with the place of its work-item. PoCL makes three functions of a kernel,
-// and inlines into each of them all that it does: what is called instead is compiled once. Functions that ask for the work-item's
-// place themselves PoCL inlines always.
+// Of functions that are called on a processor, and so compiled once: what a kernel does, since PoCL makes three functions of each
+// kernel and inlines into all of them what it does; and long work for a packet that several kernels do. Functions that ask for the
+// place of the work-item are inlined by PoCL in spite of it.
 #ifdef DIRECT_BUILT_INS
-#define BODY static __attribute__((noinline))
+#define CALLED static __attribute__((noinline))
 #else
-#define BODY INLINE
+#define CALLED INLINE
 #endif
 
 // The count of a loop whose body copies structs. Where a driver loses such copies when it unrolls the loop, the count is one that

@@ -72,7 +72,7 @@ INLINE void look_at(queue q, int at, __constant const struct March *settings, __
 // takes the next of them; single lanes take rays that are far apart, so that neighbours read neighbouring memory.
 STAGE(march_rays) {
     const queue q = STAGE_QUEUE;
-    const int total = q.turns * q.wave, begin = LANES == 1 ? item : item * slice;
+    const int total = q.turns * q.wave, begin = LANES == 1 ? ITEM : ITEM * slice;
     if (begin >= total || WAS_CANCELLED) return;
     slice_left left = {begin, LANES == 1 ? total : min(begin + slice, total), LANES == 1 ? (int)get_global_size(0) : 1};
     march m = {0};
@@ -98,7 +98,7 @@ STAGE(march_rays) {
 #if LANES == 1
 STAGE(look_at_surfaces) {
     const queue q = STAGE_QUEUE;
-    const int at = item;
+    const int at = ITEM;
     if (at < q.turns * q.wave && !WAS_CANCELLED) look_at(q, at, settings, orbit, k);
 }
 #endif

@@ -4,19 +4,29 @@
 #define KEEP(thing, to, stride) numbers_keep((const real *)&(thing), NUMBERS_OF(thing), to, stride)
 #define RECALL(thing, from, stride) numbers_recall((real *)&(thing), NUMBERS_OF(thing), from, stride)
 
-// Written out: a loop over a struct's numbers would keep compilers for GPUs from holding the struct in registers.
+// Does something for each number below a count of at most MOST_NUMBERS. Where it is written out compilers hold the struct in
+// registers; a loop takes them less time.
 #define MOST_NUMBERS 20
-#define EACH_NUMBER(DO) DO(0) DO(1) DO(2) DO(3) DO(4) DO(5) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12) DO(13) DO(14) DO(15) \
-    DO(16) DO(17) DO(18) DO(19)
+#define WRITTEN_OUT(count, DO)                                                                                              \
+    IF_BELOW(0, count, DO) IF_BELOW(1, count, DO) IF_BELOW(2, count, DO) IF_BELOW(3, count, DO) IF_BELOW(4, count, DO)      \
+    IF_BELOW(5, count, DO) IF_BELOW(6, count, DO) IF_BELOW(7, count, DO) IF_BELOW(8, count, DO) IF_BELOW(9, count, DO)      \
+    IF_BELOW(10, count, DO) IF_BELOW(11, count, DO) IF_BELOW(12, count, DO) IF_BELOW(13, count, DO) IF_BELOW(14, count, DO) \
+    IF_BELOW(15, count, DO) IF_BELOW(16, count, DO) IF_BELOW(17, count, DO) IF_BELOW(18, count, DO) IF_BELOW(19, count, DO)
+#define IF_BELOW(i, count, DO) if (i < (count)) { DO(i) }
+#if LANES == 1
+#define FOR_NUMBERS(count, DO) WRITTEN_OUT(count, DO)
+#else
+#define FOR_NUMBERS(count, DO) _Pragma("unroll 1") for (int i = 0; i < (count); ++i) { DO(i) }
+#endif
 
 INLINE void numbers_keep(const real *numbers, int count, __global scalar *to, int stride) {
-#define KEEP_NUMBER(i) if (i < count) lanes_store(numbers[i], to + i * stride);
-    EACH_NUMBER(KEEP_NUMBER)
+#define KEEP_NUMBER(i) lanes_store(numbers[i], to + i * stride);
+    WRITTEN_OUT(count, KEEP_NUMBER)
 }
 
 INLINE void numbers_recall(real *numbers, int count, __global const scalar *from, int stride) {
-#define RECALL_NUMBER(i) if (i < count) numbers[i] = lanes_load(from + i * stride);
-    EACH_NUMBER(RECALL_NUMBER)
+#define RECALL_NUMBER(i) numbers[i] = lanes_load(from + i * stride);
+    WRITTEN_OUT(count, RECALL_NUMBER)
 }
 
 INLINE real number_of(mask m) { return pick(m, R(1.0), R(0.0)); }

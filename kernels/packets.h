@@ -4,7 +4,7 @@
 #include "passes.h"
 
 // One work-item's part of a pass by a renderer whose kernel takes its shots from beginning to end.
-BODY void render_packet(int packet, int tile, pass s, world w) {
+CALLED void render_packet(int packet, int tile, pass s, world w) {
     if (packet >= s.end_packet) return;
     const place_in_pass here = place_of_packet(s, packet, tile);
     pixel p = pixel_before(s, &here);

@@ -34,27 +34,10 @@ INLINE void kept_number(__global scalar *kept, __global const int *slots, int nu
     }
 }
 
+// All of them; KEPT numbers them in the order of `pixel`.
 INLINE void kept_pixel(__global scalar *kept, __global const int *slots, int write, pixel *p) {
-    kept_number(kept, slots, KEPT_RED, write, &p->radiance.r);
-    kept_number(kept, slots, KEPT_GREEN, write, &p->radiance.g);
-    kept_number(kept, slots, KEPT_BLUE, write, &p->radiance.b);
-    kept_number(kept, slots, KEPT_COVERAGE, write, &p->coverage);
-    kept_number(kept, slots, KEPT_SHOTS, write, &p->shots);
-#if ADAPTIVE
-    kept_number(kept, slots, KEPT_BRIGHTNESS, write, &p->brightness);
-    kept_number(kept, slots, KEPT_BRIGHTNESS_SQUARE, write, &p->brightness_square);
-    kept_number(kept, slots, KEPT_COVERAGE_SQUARE, write, &p->coverage_square);
-#endif
-    kept_number(kept, slots, KEPT_NEAREST, write, &p->nearest);
-    kept_number(kept, slots, KEPT_DEPTH, write, &p->depth);
-    kept_number(kept, slots, KEPT_NORMAL_X, write, &p->normal.x);
-    kept_number(kept, slots, KEPT_NORMAL_Y, write, &p->normal.y);
-    kept_number(kept, slots, KEPT_NORMAL_Z, write, &p->normal.z);
-    kept_number(kept, slots, KEPT_POINT_X, write, &p->point.x);
-    kept_number(kept, slots, KEPT_POINT_Y, write, &p->point.y);
-    kept_number(kept, slots, KEPT_POINT_Z, write, &p->point.z);
-    kept_number(kept, slots, KEPT_SMOOTH, write, &p->smooth);
-    kept_number(kept, slots, KEPT_STEPS, write, &p->steps);
+#define KEPT_NUMBER(i) kept_number(kept, slots, i, write, (real *)p + i);
+    FOR_NUMBERS(NUMBERS_OF(pixel), KEPT_NUMBER)
 }
 
 // A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
@@ -124,5 +107,6 @@ INLINE void count_waits_from(pass s, const place_in_pass *here) {
 // Counts what the launch has done for the packet, or adds to what was counted.
 INLINE void pass_count(const place_in_pass *here, int add, real shots, real hits, tally cost) {
     const real counts[STATISTIC_WAITS] = {shots, hits, cost.steps, cost.count, cost.bad};
-    for (int i = 0; i < STATISTIC_WAITS; ++i) here->sums[i] = (add ? here->sums[i] : 0u) + (uint)lanes_sum(counts[i]);
+#define ADD_COUNT(i) here->sums[i] = (add ? here->sums[i] : 0u) + (uint)lanes_sum(counts[i]);
+    FOR_NUMBERS(STATISTIC_WAITS, ADD_COUNT)
 }

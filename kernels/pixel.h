@@ -1,4 +1,5 @@
 // The sums over the samples of a pixel, for every renderer.
+#include "memory.h"
 
 // The results of one sample.
 typedef struct {
@@ -70,21 +71,18 @@ INLINE real noise_of(const pixel *p, int transparent) {
 }
 #endif
 
-// Writes a pixel's channels; `slots` has for each channel its place among the wanted ones, or -1; `film` begins at the tile.
+// Which number of a pixel a channel shows: both are listed in the same order, but for the count of samples.
+INLINE int number_of_channel(int channel) {
+    return channel <= CHANNEL_A ? channel : channel == CHANNEL_SAMPLES ? KEPT_SHOTS : channel - CHANNEL_Z + KEPT_DEPTH;
+}
+
+// Writes a pixel's channels; `slots` has for each channel its place among the wanted ones, or -1; `film` begins at the tile. Light
+// and coverage are means.
 INLINE void pixel_write(__global float *film, __global const int *slots, const int *place, const pixel *p) {
     const real share = R(1.0) / fmax(p->shots, R(1.0));
-    write_channel(film, slots[CHANNEL_R], place, p->radiance.r * share);
-    write_channel(film, slots[CHANNEL_G], place, p->radiance.g * share);
-    write_channel(film, slots[CHANNEL_B], place, p->radiance.b * share);
-    write_channel(film, slots[CHANNEL_A], place, p->coverage * share);
-    write_channel(film, slots[CHANNEL_Z], place, p->depth);
-    write_channel(film, slots[CHANNEL_NX], place, p->normal.x);
-    write_channel(film, slots[CHANNEL_NY], place, p->normal.y);
-    write_channel(film, slots[CHANNEL_NZ], place, p->normal.z);
-    write_channel(film, slots[CHANNEL_PX], place, p->point.x);
-    write_channel(film, slots[CHANNEL_PY], place, p->point.y);
-    write_channel(film, slots[CHANNEL_PZ], place, p->point.z);
-    write_channel(film, slots[CHANNEL_ITERATIONS], place, p->smooth);
-    write_channel(film, slots[CHANNEL_STEPS], place, p->steps);
-    write_channel(film, slots[CHANNEL_SAMPLES], place, p->shots);
+#define WRITE_CHANNEL(i)                                              \
+    real value = ((const real *)p)[number_of_channel(i)];             \
+    if (i <= CHANNEL_A) value *= share;                               \
+    write_channel(film, slots[i], place, value);
+    FOR_NUMBERS(CHANNEL_COUNT, WRITE_CHANNEL)
 }

@@ -3,7 +3,7 @@
 #include "queue.h"
 
 // Where an item is none of the picture's packets.
-#define IS_BEYOND (item + first_packet >= end_packet || WAS_CANCELLED)
+#define IS_BEYOND (ITEM + first_packet >= end_packet || WAS_CANCELLED)
 
 // All data that stages without a formula read.
 typedef struct {
@@ -36,4 +36,4 @@ INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *st
 #define STAGE_OF(name)                                                                                                     \
     const pass span_ = PASS;                                                                                               \
     const queue queue_ = STAGE_QUEUE;                                                                                      \
-    const stage name = stage_of(item, row, span_, queue_, state, first_tile, bounce, sample)
+    const stage name = stage_of(ITEM, ROW, span_, queue_, state, first_tile, bounce, sample)

@@ -31,7 +31,7 @@ STAGE(begin_shots) {
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
     numbers_keep((const real *)&a, AIM_NUMBERS, s.state + STATE_AIM * s.stride, s.stride);
     if (sample == first) count_waits_from(s.span, &here);
-    ray r = eye_ray(a, w);
+    ray r = eye_ray(a, view);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
     send_clipped(s, 0, r, mask_of(a.wanted), w);
@@ -52,7 +52,7 @@ STAGE(send_points) {
     const touch touched = {end_of_cone.hit, end_of_cone.t};
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, touched, STATE_TOUCH);
-    points_send(s, a, touched, eye_ray(a, w), points_seed(&here.at, sample, w), w);
+    points_send(s, a, touched, eye_ray(a, view), points_seed(&here.at, sample, w), w);
 }
 
 // The spot of a pixel with several points.
@@ -81,7 +81,7 @@ STAGE(find_spots) {
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
     path so_far;
-    const ray r = path_ray(s, a, &so_far, w);
+    const ray r = path_ray(s, eye_ray(a, view), a.wanted, &so_far);
     tally cost = {R(0.0), R(0.0), R(0.0)};
     sighting at_first;
     spot found;
@@ -116,7 +116,7 @@ STAGE(light_spots) {
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     path so_far;
-    const vec direction = path_ray(s, a, &so_far, w).direction;
+    const vec direction = path_ray(s, eye_ray(a, view), a.wanted, &so_far).direction;
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT
@@ -128,7 +128,7 @@ STAGE(light_spots) {
     path_add(s, &so_far, direction, a.y, &found, gathered, last, w);
     if (!last) {
         STATE_KEEP(s, cost, STATE_TALLY);
-        path_mirror(s, &so_far, direction, eye_ray(a, w), &found, w);
+        path_mirror(s, &so_far, direction, eye_ray(a, view), &found, w);
         return;
     }
     end_shots(s, a, so_far.seen, &found, cost, w);

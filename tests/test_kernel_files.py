@@ -16,7 +16,7 @@ LONGER = {
 }
 # A function's or a kernel's name, at the left; its body begins on the same line or a few lines below.
 _HEAD = re.compile(
-    r"^(?:(?:INLINE|BODY|static inline|__kernel)\b[^;{]*?(?=\b\w+\()|STAGE\()(\w+)", re.MULTILINE
+    r"^(?:(?:INLINE|CALLED|static inline|__kernel)\b[^;{]*?(?=\b\w+\()|STAGE\()(\w+)", re.MULTILINE
 )
 
 
