@@ -246,8 +246,8 @@ class TestCost:
         monkeypatch.setattr(program, "_built", counted("built", program._built))
         monkeypatch.setattr(program, "build", watched)
         self.pair(stereo_scene(kind), device)
-        entry = "march_rays" if kind in ("surface", "planes") else kind
-        pictures = [text for text in texts if f"kernel void {entry}(" in text]
+        entry = "STAGE(march_rays)" if kind in ("surface", "planes") else f"kernel void {kind}("
+        pictures = [text for text in texts if entry in text]
         assert len(pictures) == 2
         assert len(set(pictures)) == 1
         assert len(made) == len(set(texts))
