@@ -47,12 +47,12 @@ INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, __constant const
 }
 
 // Cuts a ray to the formula's bounding sphere; lanes that miss it are not in the result.
-INLINE mask ray_clip(ray *r, __constant const scalar *center, scalar radius) {
+INLINE mask ray_clip(ray *r, __constant const scalar *center, real radius) {
     const vec offset = vec_sub(r->origin, vec_splat(center));
     const real middle = -vec_dot(offset, r->direction);
     // Distance of the ray from the centre, by the perpendicular: b^2 - c would cancel for a far-off origin.
     const vec nearest = vec_along(offset, middle, r->direction);
-    const real half_square = (real)(radius * radius) - vec_dot(nearest, nearest);
+    const real half_square = radius * radius - vec_dot(nearest, nearest);
     const real half_chord = sqrt(fmax(half_square, R(0.0)));
     r->near = fmax(r->near, middle - half_chord);
     r->far = fmin(r->far, middle + half_chord);

@@ -28,7 +28,7 @@ INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
 INLINE void send_clipped(stage s, int turn, ray r, mask wanted, world w) {
     real face;
     wanted &= planes_cut(&r, &face, w.planes);
-    wanted &= ray_clip(&r, w.settings->bounds_center, w.settings->bounds_radius);
+    wanted &= ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
     queue_send(s.q, turn, s.slot, r, wanted);
 }
 

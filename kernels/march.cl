@@ -34,7 +34,7 @@ INLINE void lanes_refill(march *m, slice_left *left, int *places, queue q, int g
     for (int i = 0; i < ENCOUNTER_NORMAL; ++i) lanes_store(((const real *)&now)[i], found[i]);
     for (int i = 0; i < RAY_NUMBERS; ++i) lanes_store(((const real *)&m->r)[i], rays[i]);
     lanes_store(number_of(m->active), busy);
-    const int count = goal == GOAL_SHADOW ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
+    const int count = goal == GOAL_SHADOW || goal == GOAL_CONE ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
     __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
     for (int lane = 0; lane < LANES; ++lane) {
         starts[lane] = S(0.0);
@@ -89,7 +89,7 @@ STAGE(march_rays) {
         march_step(&m, goal, settings, orbit, k);
     }
     // A single lane looks in a kernel of its own, which leaves it more registers for this one.
-    for (int at = begin; LANES > 1 && goal != GOAL_SHADOW && goal != GOAL_TOUCH && at < left.end; at += LANES) {
+    for (int at = begin; LANES > 1 && (goal == GOAL_SURFACE || goal == GOAL_POINT) && at < left.end; at += LANES) {
         look_at(q, at, settings, orbit, k);
     }
     if (LANES > 1) atomic_add(statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet) + STATISTIC_WAITS, (uint)waits);

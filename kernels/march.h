@@ -18,6 +18,7 @@
 #define GRAZING_MOST R(2.0)      // ... at most so much of the cone
 #define MOST_GROWTH R(0.5)       // of an unscaled distance for the way: where a surface is smooth it is half of the true one
 #define CREEP R(0.25)            // of the cone: the least step by the Jacobian
+#define CONE_LEAST R(0.25)       // of a cone of many rays: the least step that is worth another look
 #define BACK_STEPS R(4.5)        // a point's evaluations inside, before it counts as hit where it begins
 
 INLINE sight march_look(march *m, __constant const struct March *settings, __constant const struct Orbit *orbit,
@@ -81,10 +82,30 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     m->t = pick(bracketed, narrower, pick(early, m->low, pick(marching, onward, m->t)));
 }
 
+// One step of cones: as far as the free sphere holds the cone's whole width. The lanes that go on remain active. A cone that
+// leaves its ray's part ends beyond everything.
+INLINE void march_cone(march *m, const sight *s, __constant const struct March *settings) {
+    const real widens = (real)(settings->detail) * m->r.spread, all = R(1.0) + widens * widens;
+    const real free = (real)(settings->cone_share) * s->radius, square = free * free - s->cone * s->cone;
+    const real along = (sqrt(fmax(s->cone * s->cone * widens * widens + all * square, R(0.0))) - s->cone * widens) / all;
+    const mask known = less(s->here.step, (real)(REAL_LARGEST));
+    const mask onward = m->active & known & less(CONE_LEAST * s->cone, along) &
+                        less(m->found.steps, (real)((scalar)settings->max_steps));
+    m->radius_before = s->radius;
+    m->step_before = along;
+    m->t += pick(onward, along, R(0.0));
+    m->found.t = pick(m->active, pick(less(m->t, m->r.far), m->t, (real)(REAL_LARGEST)), m->found.t);
+    m->active = onward & less(m->t, m->r.far);
+}
+
 // One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
 INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
                        __constant const scalar *k) {
     const sight s = march_look(m, settings, orbit, k);
+    if (goal == GOAL_CONE) {
+        march_cone(m, &s, settings);
+        return;
+    }
     const real cone = s.cone, radius = s.radius;
     const mask marching = proof_step(m, &s, settings, orbit);
     // If this sphere does not touch the one before, something may lie between them, so go back to the end of the one

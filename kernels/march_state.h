@@ -5,6 +5,7 @@
 // The march of a packet towards one goal, the same for all lanes:
 //   GOAL_SURFACE  the surface: hits are proved, and lie where the solid begins
 //   GOAL_SHADOW   whether anything is in the way: a step that ended inside is a hit
+//   GOAL_CONE     how far the cone of a whole block of pixels is free: never a hit
 //   GOAL_TOUCH    how far a whole pixel's cone is free: the first proved touch, at a point still outside
 typedef struct {
     ray r;

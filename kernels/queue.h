@@ -20,6 +20,9 @@ typedef struct {
 #define RAY_FAR 7
 #define RAY_NUMBERS (POINTS > 1 ? NUMBERS_OF(ray) : NUMBERS_OF(ray) - 1)
 #define RAY_STRENGTH NUMBERS_OF(ray)
+#define ENCOUNTER_STEPS 1
+#define ENCOUNTER_COUNT 2
+#define ENCOUNTER_T 3
 #define ENCOUNTER_SURFACE 3
 #define ENCOUNTER_NORMAL 7  // what a march finds itself ends there
 // What is found of a shadow: not how often a march was surprised.

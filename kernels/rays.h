@@ -47,3 +47,4 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
 #define GOAL_SHADOW 1
 #define GOAL_TOUCH 2
 #define GOAL_POINT 3
+#define GOAL_CONE 4

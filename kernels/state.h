@@ -13,6 +13,11 @@ typedef struct {
     real coverage, steps;
 } sighting;
 
+// Where the pixel's rays begin: so far its block's cone is free.
+typedef struct {
+    real t;
+} start_of_rays;
+
 // How far the pixel's whole cone is free.
 typedef struct {
     real touched, t;
@@ -61,7 +66,8 @@ typedef struct {
 
 #define STATE_AIM 0
 #define STATE_SIGHTING (STATE_AIM + NUMBERS_OF(aim))
-#define STATE_TOUCH (STATE_SIGHTING + NUMBERS_OF(sighting))
+#define STATE_START (STATE_SIGHTING + NUMBERS_OF(sighting))
+#define STATE_TOUCH (STATE_START + NUMBERS_OF(start_of_rays))
 #define STATE_TALLY (STATE_TOUCH + NUMBERS_OF(touch))
 #define STATE_PATH (STATE_TALLY + NUMBERS_OF(tally))
 #define STATE_SUMS (STATE_PATH + NUMBERS_OF(path))

@@ -16,10 +16,19 @@
 #include "stage.h"
 #include "state.h"
 #include "eye.h"
+#include "cones.h"
 #include "spot.h"
 #include "pixel_points.h"
 #include "secondary.h"
 #include "lit.h"
+
+// Sends the cones of blocks: a packet of lanes for a packet of blocks, of which the wave has `wave`.
+STAGE(send_cones) {
+    const pass span = PASS;
+    const queue q = STAGE_QUEUE;
+    const world w = WORLD;
+    if (ITEM * LANES < wave && !WAS_CANCELLED) cones_send(span, q, ITEM * LANES, first_tile, w);
+}
 
 // Sends the rays from the eye. With several points to the pixel the ray only finds out how far the pixel's whole cone is free.
 STAGE(begin_shots) {
@@ -31,7 +40,17 @@ STAGE(begin_shots) {
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
     numbers_keep((const real *)&a, AIM_NUMBERS, s.state + STATE_AIM * s.stride, s.stride);
     if (sample == first) count_waits_from(s.span, &here);
+    tally cost = {R(0.0), R(0.0), R(0.0)};
+    start_of_rays begin = {R(0.0)};
+    if (turns > 0 && sample == first) {
+        begin.t = cone_end(s, &here, s.tile - first_tile, &cost);
+        STATE_KEEP(s, begin, STATE_START);
+    } else if (turns > 0) {
+        STATE_RECALL(s, begin, STATE_START);
+    }
+    STATE_KEEP(s, cost, STATE_TALLY);
     ray r = eye_ray(a, view);
+    r.near = fmax(r.near, begin.t);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
     send_clipped(s, 0, r, mask_of(a.wanted), w);
@@ -46,7 +65,8 @@ STAGE(send_points) {
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
     const encounter end_of_cone = queue_met(s.q, 0, s.slot);
-    tally cost = {R(0.0), R(0.0), R(0.0)};
+    tally cost;
+    STATE_RECALL(s, cost, STATE_TALLY);
     tally_met(&cost, end_of_cone, 0);
     cost.bad += end_of_cone.bad;
     const touch touched = {end_of_cone.hit, end_of_cone.t};
@@ -59,7 +79,6 @@ STAGE(send_points) {
 INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, sighting *first, tally *cost, world w) {
     touch touched;
     STATE_RECALL(s, touched, STATE_TOUCH);
-    STATE_RECALL(s, *cost, STATE_TALLY);
     first->steps = cost->steps;
     pixel_points points = points_begin(pixel_ray, touched, points_seed(at, s.sample, w), w);
     for (int turn = 0; turn < POINTS; ++turn) {
@@ -82,7 +101,8 @@ STAGE(find_spots) {
     const aim a = aim_kept(s.state, s.stride);
     path so_far;
     const ray r = path_ray(s, eye_ray(a, view), a.wanted, &so_far);
-    tally cost = {R(0.0), R(0.0), R(0.0)};
+    tally cost;
+    STATE_RECALL(s, cost, STATE_TALLY);
     sighting at_first;
     spot found;
 #if POINTS > 1
@@ -92,7 +112,6 @@ STAGE(find_spots) {
 #endif
     {
         const encounter met = queue_met(s.q, 0, s.slot);
-        if (bounce > 0) STATE_RECALL(s, cost, STATE_TALLY);
         tally_met(&cost, met, 1);
         at_first.coverage = met.hit;
         at_first.steps = met.steps;

@@ -1,6 +1,10 @@
 // A packet's pixels in its tile. A tile is TILE x TILE pixels, its pixels numbered along the Morton curve: any LANES in a row
 // form a compact patch whose rays stay together. Film layout: [tile][channel][row][column], TILE x TILE floats a channel.
 #define TILE_PIXELS (TILE * TILE)
+// Blocks of BLOCK x BLOCK pixels stand one after the other on the curve.
+#define BLOCK 8
+#define PACKETS_OF_BLOCK (BLOCK * BLOCK / LANES)
+INLINE int block_of_packet(int packet) { return packet / PACKETS_OF_BLOCK; }
 
 // Even bits of a Morton number, gathered: its column. Its row is the same of the number shifted by one.
 INLINE int morton_column(int m) {

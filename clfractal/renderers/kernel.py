@@ -28,6 +28,8 @@ KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 RAY_NUMBERS, MET_NUMBERS = 12, 13
 # Numbers between two columns of what is kept between stages: a power of 2 apart, all would lie in one place of a cache.
 STATE_PADDING = 80
+BLOCK = 8
+"""Side of a block of pixels that share a cone, in pixels (`kernels/tiles.h`)."""
 WAVE_NUMBERS = ("first_tile", "wave", "queue_stride", "turns", "slice")
 """Arguments of a stage's kernel that follow from the launch, after those that every kernel has."""
 STAGE_NUMBERS = ("next_turns", "goal", "bounce", "sample")
@@ -52,12 +54,14 @@ class Stage:
         over: what each work-item does: a packet of pixels; some rays of the queue; a packet of rays.
         turns: rays of each pixel in the queue that it reads.
         numbers: its last arguments, see `STAGE_NUMBERS`; 0 where they are missing.
+        of: what has sent the rays of the queue: pixels, or blocks of BLOCK x BLOCK pixels.
     """
 
     kernel: str
     over: Literal["pixels", "rays", "packets of rays"] = "pixels"
     turns: int = 0
     numbers: Mapping[str, int] = field(default_factory=dict)
+    of: Literal["pixels", "blocks"] = "pixels"
 
 
 @dataclass(frozen=True, slots=True)

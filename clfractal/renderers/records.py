@@ -54,6 +54,10 @@ MARCH = Struct(
         Field("near", "real", 0, "scaled distance at which light is computed, in cones"),
         Field("shadow_lift", "real", 0, "where shadow rays start, in footprints above the surface"),
         Field("shadow_detail", "real", 0, "hit distance of shadow rays, in footprints over detail"),
+        Field(
+            "cone_margin", "real", 0, "what a block's cone is wider than its rays, in footprints over detail"
+        ),
+        Field("cone_share", "real", 0, "part of a scaled distance that is free for all of a block"),
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
         Field("step", "real", 0, "step of the search by steps, scene units"),
         Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
@@ -137,6 +141,9 @@ STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL)
 LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
+# A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
+# And the part of a scaled distance that the cone takes for free.
+CONE_MARGIN, CONE_SHARE = 1.5, 0.8
 # In cones: the distance at which light is computed for a pixel of one sample, and at the least.
 NEAR, NEAR_LEAST = 2.2, 0.6
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
@@ -214,6 +221,8 @@ def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
     largest = float(np.finfo(np.float32).max) / 16
     limit = renderer.firefly_limit if renderer.firefly_limit is not None else largest
+    points = renderer.used_points.count
+    touch = max(TOUCH / renderer.detail, 1 / math.sqrt(points)) if points > 1 else 1.0
     values = {
         "bounds_center": center,
         "bounds_radius": radius,
@@ -223,13 +232,11 @@ def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record
         "near": near_height(scene, samples),
         "shadow_lift": SHADOW_LIFT * renderer.detail,
         "shadow_detail": SHADOW_DETAIL,
+        "cone_margin": max(CONE_MARGIN * near_height(scene, samples) / step_scale(scene), 1.5 * touch),
+        "cone_share": CONE_SHARE,
         "max_steps": renderer.max_steps,
         "step": renderer.step if renderer.step is not None else radius / 100,
-        "touch_share": (
-            max(TOUCH / renderer.detail, 1 / math.sqrt(renderer.used_points.count))
-            if renderer.used_points.count > 1
-            else 1.0
-        ),
+        "touch_share": touch,
         # The search by steps begins at the eye, and goes both ways from the touch.
         "point_start": POINT_START if renderer.search == "distance" else largest,
         "known_reach": KNOWN_REACH / renderer.detail,

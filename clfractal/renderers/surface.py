@@ -30,7 +30,7 @@ from clfractal.renderers.planes import (
     plane_palettes,
     plane_records,
 )
-from clfractal.renderers.waves import asks_formula, march_kernels, most_turns, surface_stages
+from clfractal.renderers.waves import asks_formula, has_cones, march_kernels, most_turns, surface_stages
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -48,7 +48,7 @@ NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangl
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
 # Numbers of a pixel in `kernels/state.h`, without its normals.
-STATE_NUMBERS = 111
+STATE_NUMBERS = 112
 
 Floats = npt.NDArray[np.float32]
 
@@ -221,6 +221,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             "surface",
             "surface.cl",
             feature_defines(scene, plan),
+            *(("send_cones",) if has_cones(scene) else ()),
             "begin_shots",
             *points,
             "find_spots",

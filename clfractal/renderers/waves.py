@@ -1,6 +1,8 @@
 """The order of the surface renderer's stages: which kernels a launch has, and what each marches or makes.
 
-Rays of a purpose are sent by one stage, marched by another, which knows the formula, and read by a third. A sample is
+Rays of a purpose are sent by one stage, marched by another, which knows the formula, and read by a third. A launch is
+
+    [send_cones  march]  and for each sample
 
     begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
 
@@ -16,14 +18,21 @@ from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
 
 # What a march is after, as in `kernels/rays.h`.
-GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT = range(4)
+GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(5)
 
 
 def asks_formula(coloring: Coloring) -> bool:
     """Whether the quantity that chooses colours is found by asking the formula."""
     return coloring.by in ("thickness", "layer_distance", "trap")
+
+
+def has_cones(scene: Scene) -> bool:
+    """Whether a cone for each block of pixels goes before the rays: those through a lens have no common one."""
+    lens = isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0
+    return scene.surface.search == "distance" and not lens
 
 
 def light_turns(scene: Scene) -> int:
@@ -44,6 +53,9 @@ def march_kernels(plan: Plan) -> tuple[str, ...]:
 
 def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterator[Stage]:
     """The stages of a launch for samples from the first up to the second."""
+    if has_cones(scene) and samples[0] < samples[1]:
+        yield Stage("send_cones", "packets of rays", 1, of="blocks")
+        yield Stage("march_rays", "rays", 1, {"goal": GOAL_CONE}, of="blocks")
     # A launch without samples only writes what pixels have.
     for sample in range(*samples):
         yield from _sample(scene, sample, march_kernels(plan))
@@ -56,7 +68,7 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...]) -> Iterator[St
     def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
         return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
 
-    yield stage("begin_shots")
+    yield stage("begin_shots", int(has_cones(scene)))
     if scene.cut_planes:
         yield stage("find_faces")
     for bounce in range(bounces(scene) + 1):

@@ -15,6 +15,7 @@ from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.pictures.tiles import TILE
 from clfractal.renderers.kernel import (
+    BLOCK,
     MET_NUMBERS,
     RAY_NUMBERS,
     STAGE_NUMBERS,
@@ -141,9 +142,10 @@ class Stages:
         size: tuple[int, ...] = (-(-(end - first) // self.group) * self.group, len(tiles))
         if self.kernel.waves:
             wave = (end - first) * len(tiles) * lanes
-            rays = wave * stage.turns
+            sent_by = self._blocks(span, len(tiles)) if stage.of == "blocks" else wave
+            rays = sent_by * stage.turns
             share = self._slice(rays)
-            numbers += [tiles.start, wave, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
+            numbers += [tiles.start, sent_by, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
             numbers += [stage.numbers.get(name, 0) for name in STAGE_NUMBERS]
             if stage.over != "pixels":
                 each = group[0] * (share if stage.over == "rays" else lanes)
@@ -160,6 +162,12 @@ class Stages:
             count = 2 + number_count(self.kernel)
             kernel.set_scalar_arg_dtypes([None] * (kernel.num_args - count) + [np.int32] * count)
         return self._groups[name]
+
+    def _blocks(self, span: Span, tiles: int) -> int:
+        """Blocks of pixels of which the launch has any."""
+        packets = BLOCK * BLOCK // self.kernel.plan.lanes
+        first, end = span.packets
+        return ((end - 1) // packets - first // packets + 1) * tiles
 
     def _slice(self, rays: int) -> int:
         """Rays that a work-item marches: fewer where there are too few for all cores."""
