@@ -333,7 +333,7 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
 
     def broken(*arguments: object) -> list[ProgramText]:
         def changed(text: str) -> str:
-            return text.replace("kernel void find_spots", "kernel vod find_spots")
+            return text.replace("STAGE(find_spots)", "__kernel vod find_spots(STAGE_ARGUMENTS)")
 
         return [
             replace(each, flat=replace(each.flat, text=changed(each.flat.text)))
