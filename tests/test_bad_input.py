@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from clfractal.commands import progress
 from clfractal.device import program, select
 from clfractal.renderers import surface
 from clfractal.renderers.kernel import ProgramText
@@ -343,11 +344,12 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
     monkeypatch.setattr(surface, "program_texts", broken)
     # However slow the machine is: a line about a long compilation is not what is tested.
     monkeypatch.setattr(program, "_REMARK_SECONDS", 600.0)
+    monkeypatch.setattr(progress, "SILENT_SECONDS", 600.0)
     ended = shell("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "surface.cl:", "vod")
     told = shell("render", "scene.yaml", "-o", "old.png", "--verbose")
     assert told.status == 3
-    assert " | __kernel" in told.err.split("\n", 1)[1]
+    assert " | STAGE(find_spots)" in told.err.split("\n", 1)[1]
     assert untouched(here)
 
 
