@@ -21,7 +21,8 @@ from clfractal.resources import folder
 Floats = npt.NDArray[np.floating[Any]]
 
 _DEFINED = re.compile(
-    r"^(?:INLINE \w+|__kernel void|#define|#undef) (\w+)|^(?:\}|typedef [\w(), ]+) (\w+);", re.MULTILINE
+    r"^(?:(?:INLINE|CALLED) \w+|__kernel void|#define|#undef) (\w+)|^(?:\}|typedef [\w(), ]+) (\w+);|^STAGE\((\w+)\)",
+    re.MULTILINE,
 )
 _INCLUDES = re.compile(r'^#include "(?:lanes|vectors|structs|formula|orbit|numbers/\w+)\.h"\n', re.MULTILINE)
 
@@ -38,7 +39,7 @@ def kernel_file(name: str) -> str:
 
 def numbered(text: str, number: int) -> str:
     """The text with `_f<number>` after every name that it defines (but not after members, `light->color`)."""
-    names = {first or second for first, second in _DEFINED.findall(text)}
+    names = {name for found in _DEFINED.findall(text) for name in found if name}
     pattern = rf"(?<!->)\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
     return re.sub(pattern, rf"\1_f{number}", text)
 
