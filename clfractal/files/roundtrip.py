@@ -248,6 +248,10 @@ class _Editor:
         if not after or not old:
             return not after and not old
         pairs, gone, new = _matched(old, after)
+        # What a word stands for, such as a colour of a palette, may follow from its place and from how many there are.
+        words = any(isinstance(each, spans.Scalar) for each in node.entries)
+        if words and (gone or new) and any(isinstance(each, Mapping) for each in old):
+            return False
         texts = {j: _written_value(None, after[j], _child(sparse, j), None) for j in range(len(after))}
         for i in gone:
             self._lost(node.entries[i])

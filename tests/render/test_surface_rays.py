@@ -120,7 +120,7 @@ def test_hard_and_soft_lights_together(device: Device, order: tuple[int, int]) -
 
 def test_rays_that_go_together_lose_no_number(device: Device) -> None:
     """With ambient occlusion rays wait in a batch, and what they found comes back from there: all of it."""
-    for formula, scale in ((BALL, 1.0), (QUICK_BALL, 1.9)):  # 1.9: steps that end inside are counted, too
+    for formula, scale in ((BALL, 1.0), (QUICK_BALL, 2.0)):  # 2.0: steps that end inside are counted, too
         found = []
         for occlusion in (None, {"rays": 1}):
             settings = {"step_scale": scale, "over_relaxation": 1, "ambient_occlusion": occlusion}
@@ -133,7 +133,7 @@ def test_rays_that_go_together_lose_no_number(device: Device) -> None:
             np.testing.assert_allclose(together[name], alone[name], rtol=1e-5, atol=1e-6, err_msg=name)
         assert alone["iterations"][alone["A"] == 1].min() > 0
         assert bad == bad_together
-    assert bad > 100
+    assert bad > 50
 
 
 def test_ambient_occlusion_is_the_part_of_the_hemisphere_that_is_covered(device: Device) -> None:

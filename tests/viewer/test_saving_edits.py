@@ -159,6 +159,21 @@ def test_any_edit_of_every_shipped_scene(path: Path, data: st.DataObject) -> Non
     assert load_scene(back) == loaded
 
 
+def test_a_palette_of_words_loses_a_colour(tmp_path: Path) -> None:
+    """Where a word stands among the others is a part of what it means; comments stay all the same."""
+    text = (
+        "version: 1\nformula: {name: hast}\ncamera: {position: [0, -3, 0]}\n"
+        'coloring:\n  by: trap  # how near\n  palette: ["#ffd27a", "#e8743a", "#7a3a7c", "#2a4a94"]  # warm to cold\n'
+    )
+    loaded = load_scene(text)
+    coloring = loaded.coloring.model_copy(update={"palette": loaded.coloring.palette[1:]})
+    present = loaded.model_copy(update={"coloring": coloring})
+    found = scene_text(SceneSource("scene", tmp_path / "a.yaml", text, loaded), present)
+    assert load_scene(found) == present
+    assert "# how near" in found
+    assert "# warm to cold" in found
+
+
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: str(path.stem))
 def test_a_moved_camera_changes_one_line(path: Path) -> None:
     source = open_source(path)

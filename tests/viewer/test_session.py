@@ -194,7 +194,7 @@ def test_a_request_that_is_paused_before_its_first_frame_goes_on(device: Device)
 def test_a_region_is_refined_alone(device: Device) -> None:
     scene = scene_of(BULB, "renderer.samples=16")
     region = (30, 20, 33, 17)
-    with session_on(device) as watch:
+    with session_on(device, Pacing(coarsest=1)) as watch:
         one = first_look(scene, device)
         watch.finished(turned(scene, 0.8))
         frame = watch.finished(scene, region=region)
