@@ -225,6 +225,12 @@ DIRECT_ROOTS_OF_DOUBLES
 #define floor(a) direct_floor(a)
 #endif
 
+// Bits of whole numbers of 32; there is no count of the zeros of 0.
+#undef popcount
+#undef clz
+#define popcount(a) __builtin_popcount(a)
+#define clz(a) __builtin_clz(a)
+
 // Conversions, each as OpenCL rounds it: towards 0 to whole numbers, to the nearest real one.
 #undef convert_uchar
 #undef convert_uchar_sat

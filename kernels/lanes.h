@@ -123,19 +123,46 @@ INLINE scalar lanes_sum(real value) {
     return sum;
 }
 
-// In how many lanes a mask is true.
-INLINE int lanes_count(mask m) {
+// The lanes of a packet as bits, lane i as 1 << i.
+#define ALL_LANES ((1u << LANES) - 1u)
+#define bits_count(bits) ((int)popcount((uint)(bits)))
+#define highest_bit(bits) (31 - (int)clz((uint)(bits)))
+
 #if LANES == 1
-    return m ? 1 : 0;
-#elif defined(__has_builtin) && !defined(INTERPRETED)
-#if __has_builtin(__builtin_reduce_add)
-    return -(int)__builtin_reduce_add(m);
+#define lanes_bits(m) ((uint)(m) & 1u)
+#define lanes_of_bits(bits) (-(mask)(bits))
 #else
-    return (int)lanes_sum(pick(m, R(1.0), R(0.0)));
+#if LANES == 4
+#define BIT_OF_LANE ((mask)(1, 2, 4, 8))
+#elif LANES == 8
+#define BIT_OF_LANE ((mask)(1, 2, 4, 8, 16, 32, 64, 128))
+#else
+#define BIT_OF_LANE ((mask)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
+#endif
+#define lanes_of_bits(bits) ((BIT_OF_LANE & (mask)((int)(bits))) != 0)
+
+// In which lanes a mask is true. A processor has an instruction for that.
+#if defined(DIRECT_BUILT_INS) && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512) && LANES == (REAL_IS_DOUBLE ? 8 : 16)
+#if REAL_IS_DOUBLE
+#define lanes_bits(m) ((uint)__builtin_ia32_cvtq2mask512(m))
+#else
+#define lanes_bits(m) ((uint)__builtin_ia32_cvtd2mask512(m))
+#endif
+#elif defined(DIRECT_BUILT_INS) && defined(__AVX__) && __has_builtin(__builtin_ia32_movmskps256) && LANES == (REAL_IS_DOUBLE ? 4 : 8)
+#if REAL_IS_DOUBLE
+#define lanes_bits(m) ((uint)__builtin_ia32_movmskpd256(as_double4(m)))
+#else
+#define lanes_bits(m) ((uint)__builtin_ia32_movmskps256(as_float8(m)))
 #endif
 #else
-    return (int)lanes_sum(pick(m, R(1.0), R(0.0)));
-#endif
+INLINE uint lanes_bits(mask m) {
+    scalar each[LANES];
+    lanes_store(pick(m, R(1.0), R(0.0)), each);
+    uint bits = 0;
+    for (int lane = 0; lane < LANES; ++lane) bits |= (each[lane] > S(0.0) ? 1u : 0u) << lane;
+    return bits;
 }
+#endif
+#endif
 
 #include "repairs.h"

@@ -1,10 +1,3 @@
-// What a march has found, as the stages after it read it.
-INLINE encounter encounter_of(crossing c) {
-    const vec none = {R(0.0), R(0.0), R(0.0)};
-    const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0)};
-    return e;
-}
-
 // Light is computed where the ray's cone came near the solid: most of these surfaces are rougher than a pixel, and there the
 // distance has smoothed them over the pixel's footprint. Where the surface is smooth, light is computed at the hit. It is smooth
 // where the gradient at the hit is the one straight above it too. (Before the hit, on the ray, it is that of a place beside it.)

@@ -45,15 +45,6 @@ INLINE vec voxel_points(ulong place, int first, int4 sub_point, __global const s
     return vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
 }
 
-// Bit i of the result: whether lane i is true.
-INLINE uint lanes_bits(mask m) {
-    scalar each[LANES];
-    lanes_store(pick(m, R(1.0), R(0.0)), each);
-    uint bits = 0;
-    for (int lane = 0; lane < LANES; ++lane) bits |= (each[lane] != 0 ? 1u : 0u) << lane;
-    return bits;
-}
-
 // The square of how far apart two states are, where orbits may come back.
 INLINE real apart_square(state z, state past) {
     state apart = {z.s0 - past.s0, z.s1 - past.s1, z.s2 - past.s2};

@@ -9,6 +9,7 @@ from clfractal.device import select
 from clfractal.device.select import Device, DeviceInfo
 from clfractal.errors import ClfractalError, DeviceError
 from clfractal.renderers import lanes
+from clfractal.renderers.trial import RULES
 
 _HEAD = ("", "index", "name", "platform", "memory", "float64", "GL", "lanes", "speed")
 
@@ -48,7 +49,7 @@ def _measured(device: Device, on_start: Callable[[str], None]) -> tuple[str, str
     if select.is_simulator(device.info):
         return "1", "a simulator"
     try:
-        best = [lanes.best_lanes(device, "float32", rule, on_start=on_start) for rule in lanes.RULES]
+        best = [lanes.best_lanes(device, "float32", rule, on_start=on_start) for rule in RULES]
         speed = lanes.pixels_per_second(lanes.march_reports(device, "float32", on_start=on_start))
     except ClfractalError as error:
         return "-", f"does not work: {error.message}" if isinstance(error, DeviceError) else error.message

@@ -9,57 +9,22 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any
 
-import numpy as np
-import pyopencl as cl
-
-from clfractal.device import activity, cache, isolate, program, select, tune
-from clfractal.device.groups import fitting
+from clfractal.device import activity, cache, isolate, select, tune
 from clfractal.device.select import Device
-from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
-from clfractal.formulas.catalog import load_chain
 from clfractal.formulas.language import Chain
-from clfractal.formulas.opencl import FormulaText, write_formula
-from clfractal.renderers.records import MARCH, NEAR, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
-from clfractal.scene.surface import SurfaceRenderer
+from clfractal.formulas.opencl import write_formula
+from clfractal.renderers.trial import RULES, Rule, march, picture_side
 
 LANES_VARIABLE = "CLFRACTAL_LANES"
 JOB = "clfractal.renderers.lanes:march_job"
 
-Rule = Literal["scalar", "jacobian"]
-RULES: tuple[Rule, ...] = ("scalar", "jacobian")
-
-_VERSION = 1  # of this measurement: older ones no longer count
+_VERSION = 2  # of this measurement: older ones no longer count
 _SECTION = "marches"
 _TIMEOUT_S = 60.0
-# The pictures' sides: enough work-items for a GPU; on a processor launches of a millisecond, many of which no other program
-# interrupts.
-_SIDES: dict[Rule, int] = {"scalar": 128, "jacobian": 64}
-_SIDE_GPU = 1024
-_LAUNCHES, _SECONDS = 200, 0.5
-_GROUP, _GROUP_GPU = (8, 1), (8, 8)
-
-
-@dataclass(frozen=True, slots=True)
-class _Example:
-    """What is marched: formula, iterations, the eye, where it looks, and the direction to the light."""
-
-    formula: str
-    parameters: Mapping[str, float]
-    iterations: int
-    eye: tuple[float, float, float]
-    target: tuple[float, float, float]
-    light: tuple[float, float, float]
-
-
-# Views of the speed table (`clfractal bench`).
-_EXAMPLES: dict[Rule, _Example] = {
-    "scalar": _Example("mandelbulb", {"power": 8}, 100, (0, -3, 0), (0, 0, 0), (-0.5, -0.6, 0.62)),
-    "jacobian": _Example("hast", {"power": 2}, 40, (-0.8, 2.2, 3.0), (-0.5, 0, 0), (0.4, 0.5, 0.77)),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,106 +168,7 @@ def march_job(request: Mapping[str, Any]) -> dict[str, Any]:
     if select.is_simulator(device.info):
         # It would take minutes, and only tells that wide packets are fewer instructions.
         return dict.fromkeys(RULES, 1000000000.0 / lanes)
-    sides = dict.fromkeys(RULES, _SIDE_GPU) if device.info.kind == "gpu" else _SIDES
+    sides = {rule: picture_side(device, rule) for rule in RULES}
     return {
         rule: 1e6 * march(device, precision, lanes, rule, sides[rule])[0] / sides[rule] ** 2 for rule in RULES
     }
-
-
-def program_text(formula: FormulaText, lanes: int, precision: Precision) -> FlatText:
-    """The whole text of the program that marches for a measurement."""
-    defines = {
-        "LANES": lanes,
-        "REAL_IS_DOUBLE": int(precision == "float64"),
-        "SEARCH_DISTANCE": 0,
-        "SEARCH_STEPS": 1,
-        "SEARCH": 0,
-        "POINTS": 1,
-        "POLISH": 0,
-        "HAS_LENS": 0,
-    }
-    generated = {"structs.h": struct_text(), "formula.h": formula.text}
-    return flatten("march_probe.cl", generated=generated, defines=defines)
-
-
-def march(
-    device: Device, precision: Precision, lanes: int, rule: Rule, side: int
-) -> tuple[float, np.ndarray[Any, np.dtype[np.float32]]]:
-    """Marches a picture of `side` x `side` pixels.
-
-    Returns:
-        Milliseconds of the fastest launch, and for each pixel, shape (side, side, 2), how far its ray went (-1 where it met
-        nothing) and whether the light is hidden there.
-
-    Raises:
-        DeviceError, KernelBuildError: the device failed.
-    """
-    example = _EXAMPLES[rule]
-    chain = load_chain(example.formula, example.parameters)
-    formula = write_formula(chain)
-    flat = program_text(formula, lanes, precision)
-    flags = program.math_flags(precision)
-    built = program.build(device, flat.text, flags=flags, sources=flat.sources, isolated=False)
-    met = np.empty((side, side, 2), np.float32)
-    arguments: list[Any] = [
-        device.buffer(met.nbytes, "the measured picture"),
-        *(
-            _upload(device, array)
-            for array in (
-                _settings(chain, precision).reshape(1),
-                orbit_record(chain, example.iterations, precision).reshape(1),
-                np.array(formula.constants or [0.0], precision),
-                _view(example, side).astype(precision),
-            )
-        ),
-        np.int32(side),
-    ]
-    kernel = built.kernel("march_probe")
-    kernel.set_args(*arguments)
-    across, down = (1, 1) if lanes == 1 else (4, lanes // 4)
-    group = fitting(device, kernel, _GROUP_GPU if device.info.kind == "gpu" else _GROUP)
-    times: list[float] = []
-    with device.failures("marching"):
-        # The first launch makes PoCL compile.
-        for _ in range(1 + _LAUNCHES):
-            event = cl.enqueue_nd_range_kernel(device.queue, kernel, (side // across, side // down), group)
-            event.wait()
-            times.append(1e-6 * (event.profile.end - event.profile.start))
-            if len(times) > 2 and sum(times[1:]) > 1e3 * _SECONDS:
-                break
-        cl.enqueue_copy(device.queue, met, arguments[0])
-    return max(min(times[1:]), 1e-3), met
-
-
-def _settings(chain: Chain, precision: Precision) -> np.ndarray[Any, np.dtype[np.void]]:
-    """The march of a usual scene; what it does not read stays 0."""
-    usual = SurfaceRenderer.model_validate({})
-    values: dict[str, object] = {
-        "bounds_center": chain.center,
-        "bounds_radius": chain.radius,
-        "step_scale": chain.step_scale,
-        "relaxation": usual.over_relaxation,
-        "detail": usual.detail,
-        "near": NEAR * chain.step_scale,
-        "max_steps": usual.max_steps,
-        "shadow_lift": SHADOW_LIFT * usual.detail,
-        "shadow_detail": SHADOW_DETAIL,
-    }
-    unused = {field.name: np.zeros(field.count) if field.count else 0 for field in MARCH.fields}
-    return MARCH.value(precision, {**unused, **values})
-
-
-def _view(example: _Example, side: int) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """The eye, the axis, one pixel to the right, and the direction to the light; the field of view is 53 degrees."""
-    eye, light = np.array(example.eye, float), np.array(example.light, float)
-    axis = np.array(example.target) - eye
-    axis /= np.linalg.norm(axis)
-    right = np.cross(axis, [0.0, 0.0, 1.0])
-    right *= 1.0 / (side * np.linalg.norm(right))
-    return np.concatenate([eye, axis, right, light / np.linalg.norm(light)])
-
-
-def _upload(device: Device, array: np.ndarray[Any, Any]) -> cl.Buffer:
-    buffer = device.buffer(array.nbytes, "the measured scene", read_only=True)
-    cl.enqueue_copy(device.queue, buffer, np.ascontiguousarray(array).view(np.uint8).reshape(-1))
-    return buffer

@@ -22,6 +22,22 @@ from clfractal.scene.parts import PerspectiveCamera
 
 # What a march is after, as in `kernels/rays.h`.
 GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(5)
+# Rays that a work-item marches: a packet of lanes, which take them in turn, or one lane.
+PACKET_RAYS, LANE_RAYS = 1024, 4
+_LANE_GROUP = 64
+
+
+def rays_of_item(lanes: int, rays: int, compute_units: int) -> int:
+    """Rays that a work-item marches: fewer where there are too few for all cores."""
+    if lanes == 1:
+        return LANE_RAYS
+    share = rays // (3 * max(compute_units, 1))
+    return min(max(share // lanes, 1) * lanes, PACKET_RAYS)
+
+
+def rays_group(lanes: int) -> tuple[int, ...]:
+    """Work-items of a group that marches rays."""
+    return (_LANE_GROUP if lanes == 1 else 1,)
 
 
 def asks_formula(coloring: Coloring) -> bool:

@@ -25,15 +25,13 @@ from clfractal.renderers.kernel import (
     Stage,
     TileKernel,
 )
+from clfractal.renderers.waves import rays_group, rays_of_item
 
 # Tiles of the largest launch: 1024 of them are a megapixel.
 CAPACITY = 512
 # A wave is the pixels of a launch that are taken from stage to stage at a time: as many as need so many bytes. On a
 # processor the next stage should find them in the caches; a GPU wants many pixels at a time.
-WAVE_BYTES = {"cpu": 6 << 20, "gpu": 512 << 20}
-# Rays that a work-item marches: a packet of lanes, which take them in turn, or one lane.
-PACKET_RAYS, LANE_RAYS = 1024, 4
-_RAY_GROUP = {1: 64}
+WAVE_BYTES = {"cpu": 24 << 20, "gpu": 512 << 20}
 # Numbers that every kernel is given last, or before those of waves: the packets and samples of a launch, and its mode.
 _SPAN_NUMBERS = 5
 
@@ -97,7 +95,7 @@ def number_count(kernel: TileKernel) -> int:
 def group_of(stage: Stage, lanes: int, group: int) -> tuple[int, ...]:
     """The size of a stage's work-groups, of which those over pixels have `group` work-items."""
     if stage.over == "rays":
-        return (_RAY_GROUP.get(lanes, 1),)
+        return rays_group(lanes)
     return (group, 1) if stage.over == "pixels" else (group,)
 
 
@@ -144,7 +142,7 @@ class Stages:
             wave = (end - first) * len(tiles) * lanes
             sent_by = self._blocks(span, len(tiles)) if stage.of == "blocks" else wave
             rays = sent_by * stage.turns
-            share = self._slice(rays)
+            share = rays_of_item(lanes, rays, self.device.info.compute_units)
             numbers += [tiles.start, sent_by, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
             numbers += [stage.numbers.get(name, 0) for name in STAGE_NUMBERS]
             if stage.over != "pixels":
@@ -168,11 +166,3 @@ class Stages:
         packets = BLOCK * BLOCK // self.kernel.plan.lanes
         first, end = span.packets
         return ((end - 1) // packets - first // packets + 1) * tiles
-
-    def _slice(self, rays: int) -> int:
-        """Rays that a work-item marches: fewer where there are too few for all cores."""
-        lanes = self.kernel.plan.lanes
-        if lanes == 1:
-            return LANE_RAYS
-        share = rays // (3 * max(self.device.info.compute_units, 1))
-        return min(max(share // lanes, 1) * lanes, PACKET_RAYS)

@@ -10,7 +10,7 @@ from clfractal.device.source import FlatText
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import lanes, points
+from clfractal.renderers import points, trial
 from clfractal.scene.load import load_scene
 from tests.gpu.pairs import covering
 from tests.platforms import programs
@@ -122,7 +122,7 @@ def everything() -> Iterator[Listed]:
             yield Listed(f"{name} {precision}", precision, text)
         for name in catalog.names():
             formula = write_formula(catalog.load_chain(name))
-            probe = lanes.program_text(formula, 1, precision)
+            probe = trial.program_text(formula, 1, precision)
             yield Listed(f"march_probe {name} {precision}", precision, probe)
             yield Listed(f"points {name} {precision}", precision, points.program_text(formula, 1, precision))
             # What knows a formula in a program of its own has figures for each of them.

@@ -11,7 +11,7 @@ from clfractal.device.source import FlatText, SourceMap
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import cut_plane, lanes, points, records, surface, volume
+from clfractal.renderers import cut_plane, points, records, surface, trial, volume
 from clfractal.renderers.plan import make_plan
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
@@ -41,7 +41,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
     for name in ("mandelbulb", "hast"):  # by a scalar rule, and by the Jacobian
         yield (
             f"march_probe {name}",
-            lanes.program_text(write_formula(catalog.load_chain(name)), count, precision),
+            trial.program_text(write_formula(catalog.load_chain(name)), count, precision),
         )
     if count == 1:  # these know no packets
         yield "structs", FlatText(struct_layout.program_text(records.STRUCTS, precision), SourceMap())

@@ -15,7 +15,8 @@ from clfractal.device.select import Device, choose
 from clfractal.errors import DeviceError
 from clfractal.formulas.catalog import load_chain
 from clfractal.renderers import lanes
-from clfractal.renderers.lanes import best_lanes, march, march_reports, rule_of
+from clfractal.renderers.lanes import best_lanes, march_reports, rule_of
+from clfractal.renderers.trial import RULES, Rule, march
 from tests.portability.lane_counts import accepted_in_use
 
 pytestmark = pytest.mark.conformance
@@ -125,8 +126,8 @@ def test_formulas_march_by_their_scalar_rule_if_all_have_one() -> None:
     assert rule_of(load_chain("hast")) == "jacobian"
 
 
-@pytest.mark.parametrize("rule", lanes.RULES)
-def test_what_is_marched_is_the_object(device: Device, rule: lanes.Rule) -> None:
+@pytest.mark.parametrize("rule", RULES)
+def test_what_is_marched_is_the_object(device: Device, rule: Rule) -> None:
     """With every lane count the same: rays that meet the set, and places that the light does not reach."""
     met = {
         count: march(device, "float32", count, rule, 64)[1] for count in accepted_in_use(device, "float32")

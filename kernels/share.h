@@ -1,0 +1,83 @@
+// How a work-item marches its share of a queue: its lanes take ray after ray, so that none waits for others.
+
+// Idle lanes that are worth a pause for new rays. The steps of the search by steps are too cheap, and those of neighbours too alike.
+#define REFILL (SEARCH == SEARCH_STEPS ? LANES : 1)
+
+// The rays that one work-item marches: `next`, and every one that is `hop` further, before `end`.
+typedef struct {
+    int next, end, hop;
+} share;
+
+// A packet's lanes share `slice` rays in a row; single lanes take rays that are far apart, so that neighbours read neighbouring
+// memory.
+INLINE share share_of_item(int item, int slice, queue q) {
+    const int total = q.turns * q.wave, begin = LANES == 1 ? item : item * slice;
+    const share s = {begin, LANES == 1 ? total : min(begin + slice, total), LANES == 1 ? (int)get_global_size(0) : 1};
+    return s;
+}
+
+// What a march has found, as the stages after it read it.
+INLINE encounter encounter_of(crossing c) {
+    const vec none = {R(0.0), R(0.0), R(0.0)};
+    const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0)};
+    return e;
+}
+
+// What the lanes of a packet have under way.
+typedef struct {
+    int places[LANES];                   // the number of each lane's ray, or -1
+    scalar rays[RAY_NUMBERS * LANES];    // the rays, number by number
+} lanes_at_work;
+
+// The `idle` lanes put down what they found, and take the next rays, which begin.
+INLINE void lanes_refill(march *m, uint idle, share *left, lanes_at_work *at, queue q, int goal,
+                         __constant const struct March *settings) {
+    scalar found[ENCOUNTER_NORMAL * LANES];
+    const encounter now = encounter_of(m->found);
+#define HOLD_FOUND(i) lanes_store(((const real *)&now)[i], found + i * LANES);
+    WRITTEN_OUT(ENCOUNTER_NORMAL, HOLD_FOUND)
+    const int count = goal == GOAL_SHADOW || goal == GOAL_CONE ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
+    __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
+    uint fresh = 0;
+    while (idle != 0) {
+        const int lane = highest_bit(idle), done = at->places[lane];
+        idle ^= 1u << lane;
+        if (done >= 0) {
+            for (int i = 0; i < count; ++i) q.met[i * q.stride + done] = found[i * LANES + lane];
+        }
+        at->places[lane] = -1;
+        while (left->next < left->end && !(near[left->next] < far[left->next])) left->next += left->hop;
+        if (left->next >= left->end) continue;
+#define TAKE_NUMBER(i) at->rays[i * LANES + lane] = q.rays[i * q.stride + left->next];
+        WRITTEN_OUT(RAY_NUMBERS, TAKE_NUMBER)
+        at->places[lane] = left->next;
+        left->next += left->hop;
+        fresh |= 1u << lane;
+    }
+    ray next;
+    next.known = RAY_NOTHING_KNOWN;
+#define GIVE_NUMBER(i) ((real *)&next)[i] = lanes_load(at->rays + i * LANES);
+    WRITTEN_OUT(RAY_NUMBERS, GIVE_NUMBER)
+    march_begin(m, next, lanes_of_bits(fresh), goal, settings);
+}
+
+// Marches a share of a queue; the result is how many lanes have waited, in steps.
+INLINE int march_share(share mine, queue q, int goal, __constant const struct March *settings,
+                       __constant const struct Orbit *orbit, __constant const scalar *k) {
+    share left = mine;
+    march m = {0};
+    lanes_at_work at;
+    for (int lane = 0; lane < LANES; ++lane) at.places[lane] = -1;
+    for (int i = 0; i < RAY_NUMBERS * LANES; ++i) at.rays[i] = S(0.0);
+    int waits = 0;
+    for (;;) {
+        uint idle = lanes_bits(~m.active);
+        if (idle == ALL_LANES || (bits_count(idle) >= REFILL && left.next < left.end)) {
+            lanes_refill(&m, idle, &left, &at, q, goal, settings);
+            idle = lanes_bits(~m.active);
+            if (idle == ALL_LANES) return waits;
+        }
+        waits += bits_count(idle);
+        march_step(&m, goal, settings, orbit, k);
+    }
+}
