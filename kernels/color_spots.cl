@@ -26,7 +26,7 @@ STAGE(color_spots) {
     if (!any_lane(found)) return;
     path so_far;
     const aim a = aim_kept(s.state, s.stride);
-    const vec direction = path_ray(s, eye_ray(a, view), a.wanted, &so_far).direction;
+    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);
     spot_keep(&here, s.state, bounce, s.stride);

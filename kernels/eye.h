@@ -8,8 +8,8 @@ INLINE pixel sums_before(stage s, const place_in_pass *here) {
     return p;
 }
 
-CALLED ray eye_ray(aim a, __constant const struct View *view) {
-    return camera_ray(a.x, a.y, a.lens_x, a.lens_y, view);
+CALLED ray eye_ray(const aim *a, __constant const struct View *view) {
+    return camera_ray(a->x, a->y, a->lens_x, a->lens_y, view);
 }
 
 INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {

@@ -23,6 +23,14 @@ typedef float scalar;
 
 #include "direct.h"
 
+#if REAL_IS_DOUBLE
+#define NUMBERS_4 double4
+#define NUMBERS_8 double8
+#else
+#define NUMBERS_4 float4
+#define NUMBERS_8 float8
+#endif
+
 #define JOIN_(a, b) a##b
 #define JOIN(a, b) JOIN_(a, b)
 
@@ -114,13 +122,23 @@ typedef JOIN(int, LANES) mask;
 #define TURNS(count) (count)
 #endif
 
-// Sum of a quantity over the lanes of a packet.
+// Sum of a quantity over the lanes of a packet: of its halves, theirs, and so on.
 INLINE scalar lanes_sum(real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    scalar sum = 0;
-    for (int lane = 0; lane < LANES; ++lane) sum += each[lane];
-    return sum;
+#if LANES == 1
+    return value;
+#else
+#if LANES == 16
+    const NUMBERS_8 eight = value.lo + value.hi;
+#elif LANES == 8
+    const real eight = value;
+#endif
+#if LANES >= 8
+    const NUMBERS_4 four = eight.lo + eight.hi;
+#else
+    const real four = value;
+#endif
+    return (four.x + four.z) + (four.y + four.w);
+#endif
 }
 
 // The lanes of a packet as bits, lane i as 1 << i.

@@ -113,7 +113,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
     const place_in_pass at = place_of_packet(s.span, s.packet, s.tile);
     const mask wanted = mask_of(a.wanted);
-    const shot found = shot_of(s, a, eye_ray(a, w.view), seen, here, w);
+    const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);
     pixel p = sums_before(s, &at);
     sample_add(&p, found, wanted, a.offset);
     const mask hit = wanted & less(R(0.0), found.coverage);

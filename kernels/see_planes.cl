@@ -25,7 +25,7 @@ STAGE(find_faces) {
     STAGE_OF(s);
     const world w = WORLD;
     const aim a = aim_kept(s.state, s.stride);
-    ray r = eye_ray(a, view);
+    ray r = eye_ray(&a, view);
     real from;
     plane_face face;
     const mask left = planes_cut(&r, &from, w.planes) & mask_of(a.wanted);
@@ -49,7 +49,7 @@ STAGE(find_planes) {
     const spot found = spot_kept(s.state, 0, s.stride);
     plane_face face;
     STATE_RECALL(s, face, STATE_FACE);
-    const ray r = eye_ray(a, view);
+    const ray r = eye_ray(&a, view);
     const mask bare = mask_of(face.bare);
     const vec point = vec_pick(bare, vec_along(r.origin, face.t, r.direction), found.seen);
     const real way = vec_dot(vec_sub(point, r.origin), r.direction);

@@ -49,7 +49,7 @@ STAGE(begin_shots) {
         STATE_RECALL(s, begin, STATE_START);
     }
     STATE_KEEP(s, cost, STATE_TALLY);
-    ray r = eye_ray(a, view);
+    ray r = eye_ray(&a, view);
     r.near = fmax(r.near, begin.t);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
@@ -72,7 +72,7 @@ STAGE(send_points) {
     const touch touched = {end_of_cone.hit, end_of_cone.t};
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, touched, STATE_TOUCH);
-    points_send(s, a, touched, eye_ray(a, view), points_seed(&here.at, sample, w), w);
+    points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
 }
 
 // The spot of a pixel with several points.
@@ -100,7 +100,7 @@ STAGE(find_spots) {
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
     path so_far;
-    const ray r = path_ray(s, eye_ray(a, view), a.wanted, &so_far);
+    const ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     sighting at_first;
@@ -135,7 +135,7 @@ STAGE(light_spots) {
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     path so_far;
-    const vec direction = path_ray(s, eye_ray(a, view), a.wanted, &so_far).direction;
+    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT
@@ -147,7 +147,7 @@ STAGE(light_spots) {
     path_add(s, &so_far, direction, a.y, &found, gathered, last, w);
     if (!last) {
         STATE_KEEP(s, cost, STATE_TALLY);
-        path_mirror(s, &so_far, direction, eye_ray(a, view), &found, w);
+        path_mirror(s, &so_far, direction, eye_ray(&a, view), &found, w);
         return;
     }
     end_shots(s, a, so_far.seen, &found, cost, w);

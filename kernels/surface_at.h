@@ -29,6 +29,8 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant 
             *there = here;
             surface = found;
             wide = *normal = gradient;
+            // The search by steps has no place before the hit.
+            asked &= less(met->touch, met->last) | less(met->touch, met->t);
             place = vec_along(r.origin, met->last, r.direction);
         } else if (i == 1) {
             const real way = fmax(met->last - met->touch, R(0.01) * cone);
