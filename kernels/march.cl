@@ -20,28 +20,13 @@
 #include "arguments.h"
 #include "surface_at.h"
 
-// Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and with POLISH where
-// exactly they are.
-INLINE void look_at(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                    __constant const scalar *k) {
-    encounter e = queue_met(q, 0, at);
-    const mask hit = mask_of(e.hit);
-    if (!any_lane(hit)) return;
-    surface_at(queue_ray(q, 0, at), &e, hit, settings, orbit, k);
-    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,
-                 q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
-}
-
 // Marches all rays of a queue, each work-item its share.
 STAGE(march_rays) {
     const queue q = STAGE_QUEUE;
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next >= mine.end || WAS_CANCELLED) return;
     const int waits = march_share(mine, q, goal, settings, orbit, k);
-    // A single lane looks in a kernel of its own, which leaves it more registers for this one.
-    for (int at = mine.next; LANES > 1 && (goal == GOAL_SURFACE || goal == GOAL_POINT) && at < mine.end; at += LANES) {
-        look_at(q, at, settings, orbit, k);
-    }
+    look_at_share(mine, q, goal, settings, orbit, k);
     if (LANES > 1) atomic_add(statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet) + STATISTIC_WAITS, (uint)waits);
 }
 

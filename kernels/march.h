@@ -21,28 +21,31 @@
 #define CONE_LEAST R(0.25)       // of a cone of many rays: the least step that is worth another look
 #define BACK_STEPS R(4.5)        // a point's evaluations inside, before it counts as hit where it begins
 
-INLINE sight march_look(march *m, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
+INLINE sight march_place(const march *m) {
     sight s;
     s.on_ray = vec_along(m->r.origin, m->t, m->r.direction);
 #if HAS_DERIVATIVE
     s.point = s.on_ray;
-    s.here = orbit_scalar_distance(s.point, m->active, orbit, k);
-    const mask free = less_equal((real)(REAL_LARGEST), m->high);
 #else
     s.point = vec_pick(m->proving, m->probe, s.on_ray);
-    s.here = orbit_dual_distance(s.point, m->active, orbit, k, &s.surface);
-    const mask free = less_equal((real)(REAL_LARGEST), m->high) & ~m->proving;
 #endif
-    s.cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing.
-    s.radius = s.here.step * (real)(settings->step_scale);
-    // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
-    s.radius = pick(less(s.radius, (real)(REAL_LARGEST)), s.radius, (real)(settings->step));
-    s.radius = pick(free, fmin(s.radius, m->radius_before + MOST_GROWTH * (real)(settings->step_scale) * m->step_before), s.radius);
-    m->found.steps += pick(m->active, R(1.0), R(0.0));
-    m->found.count += pick(m->active, s.here.end.count, R(0.0));
     return s;
+}
+
+// What the distance found at that place means for the march.
+INLINE void march_measure(march *m, sight *s, __constant const struct March *settings) {
+    mask free = less_equal((real)(REAL_LARGEST), m->high);
+#if !HAS_DERIVATIVE
+    free &= ~m->proving;
+#endif
+    s->cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
+    // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing.
+    s->radius = s->here.step * (real)(settings->step_scale);
+    // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
+    s->radius = pick(less(s->radius, (real)(REAL_LARGEST)), s->radius, (real)(settings->step));
+    s->radius = pick(free, fmin(s->radius, m->radius_before + MOST_GROWTH * (real)(settings->step_scale) * m->step_before), s->radius);
+    m->found.steps += pick(m->active, R(1.0), R(0.0));
+    m->found.count += pick(m->active, s->here.end.count, R(0.0));
 }
 
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
@@ -98,10 +101,9 @@ INLINE void march_cone(march *m, const sight *s, __constant const struct March *
     m->active = onward & less(m->t, m->r.far);
 }
 
-// One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
-INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                       __constant const scalar *k) {
-    const sight s = march_look(m, settings, orbit, k);
+// What the active lanes do after a look; those that arrive, or leave their ray's part, are active no longer.
+INLINE void march_act(march *m, sight s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+    march_measure(m, &s, settings);
     if (goal == GOAL_CONE) {
         march_cone(m, &s, settings);
         return;
@@ -165,3 +167,32 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
 }
+
+// One step of the active lanes.
+INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                       __constant const scalar *k) {
+    sight s = march_place(m);
+#if HAS_DERIVATIVE
+    s.here = orbit_scalar_distance(s.point, m->active, orbit, k);
+#else
+    s.here = orbit_dual_distance(s.point, m->active, orbit, k, &s.surface);
+#endif
+    march_act(m, s, goal, settings, orbit);
+}
+
+#if HAS_DERIVATIVE
+// One step of two packets. Their orbits run side by side: an application is a chain of operations that wait for each other, and the
+// processor works on the other packet's meanwhile.
+INLINE void march_step_both(march *m, march *n, int goal, __constant const struct March *settings,
+                            __constant const struct Orbit *orbit, __constant const scalar *k) {
+    sight s = march_place(m), other = march_place(n);
+    const vec points[2] = {s.point, other.point};
+    const mask active[2] = {m->active, n->active};
+    clearance found[2];
+    orbit_scalar_distances(points, active, found, orbit, k);
+    s.here = found[0];
+    other.here = found[1];
+    march_act(m, s, goal, settings, orbit);
+    march_act(n, other, goal, settings, orbit);
+}
+#endif

@@ -1,5 +1,5 @@
-// Marches rays that the host has made, to measure how fast a device does that with packets of LANES rays. Nothing is shaded, and no
-// surface is looked at, so it compiles in a fraction of a renderer's time; the time of a picture is mostly that of the same march.
+// Marches rays that the host has made, and looks at the surfaces that they meet, to measure how fast a device does that with packets
+// of LANES rays. Nothing is shaded, so it compiles in a fraction of a renderer's time; a picture's time is mostly that of the same.
 #include "lanes.h"
 #include "numbers/real.h"
 #include "numbers/dual.h"
@@ -13,11 +13,14 @@
 #include "march.h"
 #include "queue.h"
 #include "share.h"
+#include "surface_at.h"
 
 // `rays` and `met`: a queue of `wave` rays, with `stride` from one number of a ray to its next; each work-item marches a share.
 __kernel void march_probe(__global scalar *rays, __global scalar *met, __constant const struct March *settings,
                           __constant const struct Orbit *orbit, __constant const scalar *k, int wave, int stride, int slice, int goal) {
     const queue q = {rays, met, wave, 1, stride};
     const share mine = share_of_item((int)get_global_id(0), slice, q);
-    if (mine.next < mine.end) march_share(mine, q, goal, settings, orbit, k);
+    if (mine.next >= mine.end) return;
+    march_share(mine, q, goal, settings, orbit, k);
+    look_at_share(mine, q, goal, settings, orbit, k);
 }

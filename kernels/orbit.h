@@ -160,37 +160,77 @@ INLINE mask orbit_inside(vec point, mask active, int limit, __constant const str
 }
 
 #if HAS_DERIVATIVE
-// Distance by the formula's own scalar derivative: |z| / g with g carried as one number.
-INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
-                                       __constant const scalar *k) {
+// An orbit under way that carries the formula's own scalar derivative.
+typedef struct {
     state c, z;
-    start(point, k, &c, &z);
-    real growth = R(1.0);
-    real square = state_square(z);
-    real count = (real)((scalar)FIRST_COUNT);
-    mask alive = active & less_equal(square, (real)(orbit->distance_square));
-    mask inside = alive & ~alive;
-    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look && orbit_look(n, &look, square, &alive, &inside, orbit)) break;
-        if (!any_lane(alive)) break;
-        real next_growth = growth;
-        const state next = apply_derivative(n, z, c, &next_growth, k);
-        z = state_pick(alive, next, z);
-        growth = pick(alive, next_growth, growth);
-        square = pick(alive, state_square(next), square);
-        count = pick(alive, (real)((scalar)(n + 1)), count);
-        alive &= less_equal(square, (real)(orbit->distance_square));
-    }
-    if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
+    real growth, square, count;
+    mask alive, inside;
+} scalar_orbit;
+
+INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, __constant const struct Orbit *orbit,
+                               __constant const scalar *k) {
+    start(point, k, &o->c, &o->z);
+    o->growth = R(1.0);
+    o->square = state_square(o->z);
+    o->count = (real)((scalar)FIRST_COUNT);
+    o->alive = active & less_equal(o->square, (real)(orbit->distance_square));
+    o->inside = o->alive & ~o->alive;
+}
+
+INLINE void scalar_orbit_apply(scalar_orbit *o, int n, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    real next_growth = o->growth;
+    const state next = apply_derivative(n, o->z, o->c, &next_growth, k);
+    o->z = state_pick(o->alive, next, o->z);
+    o->growth = pick(o->alive, next_growth, o->growth);
+    o->square = pick(o->alive, state_square(next), o->square);
+    o->count = pick(o->alive, (real)((scalar)(n + 1)), o->count);
+    o->alive &= less_equal(o->square, (real)(orbit->distance_square));
+}
+
+// The distance by this derivative: |z| / g with g carried as one number.
+INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    mask inside = o->inside;
+    if (orbit->longest <= orbit->iterations) inside |= o->alive & settled(o->square, orbit);
 #if HAS_SHAPE
-    const real solid = solid_distance(z, k);
-    const real distance = fmax(solid / growth, R(0.0));
+    const real solid = solid_distance(o->z, k);
+    const real distance = fmax(solid / o->growth, R(0.0));
     inside = active & less_equal(solid, R(0.0));
 #else
-    const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
+    const real distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
 #endif
-    const clearance result = {pick(inside, R(0.0), distance), {count, inside}};
+    const clearance result = {pick(inside, R(0.0), distance), {o->count, inside}};
     return result;
+}
+
+INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
+                                       __constant const scalar *k) {
+    scalar_orbit o;
+    scalar_orbit_begin(&o, point, active, orbit, k);
+    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
+        if (n == look && orbit_look(n, &look, o.square, &o.alive, &o.inside, orbit)) break;
+        if (!any_lane(o.alive)) break;
+        scalar_orbit_apply(&o, n, orbit, k);
+    }
+    return scalar_orbit_end(&o, active, orbit, k);
+}
+
+// The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
+// on the other packet's meanwhile.
+INLINE void orbit_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
+                                   __constant const scalar *k) {
+    scalar_orbit a, b;
+    scalar_orbit_begin(&a, points[0], active[0], orbit, k);
+    scalar_orbit_begin(&b, points[1], active[1], orbit, k);
+    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
+        int next_look = look;
+        if (n == look && (orbit_look(n, &next_look, a.square, &a.alive, &a.inside, orbit) |
+                          orbit_look(n, &look, b.square, &b.alive, &b.inside, orbit))) break;
+        if (!any_lane(a.alive | b.alive)) break;
+        scalar_orbit_apply(&a, n, orbit, k);
+        scalar_orbit_apply(&b, n, orbit, k);
+    }
+    found[0] = scalar_orbit_end(&a, active[0], orbit, k);
+    found[1] = scalar_orbit_end(&b, active[1], orbit, k);
 }
 #endif
 

@@ -3,6 +3,9 @@
 // Idle lanes that are worth a pause for new rays. The steps of the search by steps are too cheap, and those of neighbours too alike.
 #define REFILL (SEARCH == SEARCH_STEPS ? LANES : 1)
 
+// Packets that a work-item marches side by side. Orbits over dual numbers fill a processor's registers and units without that.
+#define ABREAST (HAS_DERIVATIVE && SEARCH == SEARCH_DISTANCE && LANES > 1 ? 2 : 1)
+
 // The rays that one work-item marches: `next`, and every one that is `hop` further, before `end`.
 typedef struct {
     int next, end, hop;
@@ -61,23 +64,46 @@ INLINE void lanes_refill(march *m, uint idle, share *left, lanes_at_work *at, qu
     march_begin(m, next, lanes_of_bits(fresh), goal, settings);
 }
 
+INLINE void lanes_begin(march *m, lanes_at_work *at) {
+    m->active = less(R(1.0), R(0.0));
+    for (int lane = 0; lane < LANES; ++lane) at->places[lane] = -1;
+    for (int i = 0; i < RAY_NUMBERS * LANES; ++i) at->rays[i] = S(0.0);
+}
+
+// The lanes that wait in the next step, as bits, after idle ones have taken new rays.
+INLINE uint lanes_waiting(march *m, share *left, lanes_at_work *at, queue q, int goal, __constant const struct March *settings) {
+    const uint idle = lanes_bits(~m->active);
+    if (idle != ALL_LANES && (bits_count(idle) < REFILL || left->next >= left->end)) return idle;
+    lanes_refill(m, idle, left, at, q, goal, settings);
+    return lanes_bits(~m->active);
+}
+
 // Marches a share of a queue; the result is how many lanes have waited, in steps.
 INLINE int march_share(share mine, queue q, int goal, __constant const struct March *settings,
                        __constant const struct Orbit *orbit, __constant const scalar *k) {
     share left = mine;
     march m = {0};
     lanes_at_work at;
-    for (int lane = 0; lane < LANES; ++lane) at.places[lane] = -1;
-    for (int i = 0; i < RAY_NUMBERS * LANES; ++i) at.rays[i] = S(0.0);
-    int waits = 0;
-    for (;;) {
-        uint idle = lanes_bits(~m.active);
-        if (idle == ALL_LANES || (bits_count(idle) >= REFILL && left.next < left.end)) {
-            lanes_refill(&m, idle, &left, &at, q, goal, settings);
-            idle = lanes_bits(~m.active);
-            if (idle == ALL_LANES) return waits;
-        }
-        waits += bits_count(idle);
+    lanes_begin(&m, &at);
+#if ABREAST > 1
+    march n = {0};
+    lanes_at_work at_n;
+    lanes_begin(&n, &at_n);
+#endif
+    for (int waits = 0;;) {
+        uint waiting = lanes_waiting(&m, &left, &at, q, goal, settings);
+        uint idle = bits_count(waiting);
+#if ABREAST > 1
+        const uint others = lanes_waiting(&n, &left, &at_n, q, goal, settings);
+        idle += bits_count(others);
+        waiting &= others;
+#endif
+        if (waiting == ALL_LANES) return waits;
+        waits += idle;
+#if ABREAST > 1
+        march_step_both(&m, &n, goal, settings, orbit, k);
+#else
         march_step(&m, goal, settings, orbit, k);
+#endif
     }
 }

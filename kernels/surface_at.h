@@ -100,3 +100,23 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     met->normal = vec_pick(less(R(0.1), away), vec_along(normal, R(-2.0) * away, r.direction), normal);
     met->smooth = smooth_count(there.end, surface, orbit);
 }
+
+// Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and with POLISH where
+// exactly they are.
+INLINE void look_at(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                    __constant const scalar *k) {
+    encounter e = queue_met(q, 0, at);
+    const mask hit = mask_of(e.hit);
+    if (!any_lane(hit)) return;
+    surface_at(queue_ray(q, 0, at), &e, hit, settings, orbit, k);
+    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,
+                 q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
+}
+
+// Looks at the surfaces of a share that was marched. A single lane looks in a kernel of its own, which leaves it more registers for
+// the march.
+INLINE void look_at_share(share mine, queue q, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                          __constant const scalar *k) {
+    if (LANES == 1 || (goal != GOAL_SURFACE && goal != GOAL_POINT)) return;
+    for (int at = mine.next; at < mine.end; at += LANES) look_at(q, at, settings, orbit, k);
+}

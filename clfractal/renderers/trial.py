@@ -38,8 +38,6 @@ _SIDES: dict[Rule, int] = {"scalar": 256, "jacobian": 160}
 _SIDE_GPU = 1024
 _RAYS_OF_CORE = 2048
 _LAUNCHES, _SECONDS = 100, 0.2
-# Rays stand in the queue block by block of so many pixels' side, as the pixels of tiles do.
-_BLOCK = 8
 # Places in the queue's structs.
 _HIT, _T = 0, 3
 
@@ -90,7 +88,7 @@ def picture_side(device: Device, rule: Rule) -> int:
     if device.info.kind == "gpu":
         return _SIDE_GPU
     wanted = math.sqrt(_RAYS_OF_CORE * max(device.info.compute_units, 1))
-    return max(_SIDES[rule], _BLOCK * math.ceil(wanted / _BLOCK))
+    return max(_SIDES[rule], 8 * math.ceil(wanted / 8))
 
 
 def program_text(formula: FormulaText, lanes: int, precision: Precision) -> FlatText:
@@ -220,10 +218,9 @@ def _settings(chain: Chain, precision: Precision) -> npt.NDArray[np.void]:
 
 
 def _block_order(side: int) -> npt.NDArray[np.int64]:
-    """The number of each ray's pixel, row by row."""
-    blocks = side // _BLOCK
-    numbers = np.arange(side * side).reshape(blocks, _BLOCK, blocks, _BLOCK)
-    return numbers.transpose(0, 2, 1, 3).reshape(-1)
+    """The pixels' numbers, counted row by row, in the order of rays: blocks of 8 x 8, in them blocks of 4 x 4, of 2 x 2."""
+    numbers = np.arange(side * side).reshape(side // 8, 2, 2, 2, side // 8, 2, 2, 2)
+    return numbers.transpose(0, 4, 1, 5, 2, 6, 3, 7).reshape(-1)
 
 
 def _eye_rays(example: _Example, side: int) -> _Rays:
