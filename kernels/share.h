@@ -39,15 +39,19 @@ INLINE void lanes_refill(march *m, uint idle, share *left, lanes_at_work *at, qu
     const encounter now = encounter_of(m->found);
 #define HOLD_FOUND(i) lanes_store(((const real *)&now)[i], found + i * LANES);
     WRITTEN_OUT(ENCOUNTER_NORMAL, HOLD_FOUND)
+#if LANES == 1
+    // One lane's ray is in registers, and once is enough.
+#define HOLD_NUMBER(i) at->rays[i] = ((const real *)&m->r)[i];
+    WRITTEN_OUT(RAY_NUMBERS, HOLD_NUMBER)
+#endif
     const int count = goal == GOAL_SHADOW || goal == GOAL_CONE ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
     __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
     uint fresh = 0;
     while (idle != 0) {
         const int lane = highest_bit(idle), done = at->places[lane];
         idle ^= 1u << lane;
-        if (done >= 0) {
-            for (int i = 0; i < count; ++i) q.met[i * q.stride + done] = found[i * LANES + lane];
-        }
+#define PUT_FOUND(i) if (i < count) q.met[i * q.stride + done] = found[i * LANES + lane];
+        if (done >= 0) { WRITTEN_OUT(ENCOUNTER_NORMAL, PUT_FOUND) }
         at->places[lane] = -1;
         while (left->next < left->end && !(near[left->next] < far[left->next])) left->next += left->hop;
         if (left->next >= left->end) continue;
