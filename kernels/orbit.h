@@ -1,7 +1,7 @@
 // Orbits of points under the formula, as one loop over a packet: escape counts, inside tests, distances and gradients.
 //
 // From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
-// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, start, apply, apply_derivative, dual_start, dual_apply,
+// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, apply, apply_derivative, dual_start, dual_apply,
 // state_pick, dual_state_pick, state_values, state_square, solid_distance.
 //
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
@@ -198,9 +198,11 @@ INLINE void orbit_scalar_distances(const vec *points, const mask *active, cleara
         int next_look = look;
         if (n == look && (orbit_look(n, &next_look, a.square, &a.alive, &a.inside, orbit) |
                           orbit_look(n, &look, b.square, &b.alive, &b.inside, orbit))) break;
-        if (!any_lane(a.alive | b.alive)) break;
-        scalar_orbit_apply(&a, n, orbit, k);
-        scalar_orbit_apply(&b, n, orbit, k);
+        // One of them may go on for long.
+        const int first = any_lane(a.alive), second = any_lane(b.alive);
+        if (!(first | second)) break;
+        if (first) scalar_orbit_apply(&a, n, orbit, k);
+        if (second) scalar_orbit_apply(&b, n, orbit, k);
     }
     found[0] = scalar_orbit_end(&a, active[0], orbit, k);
     found[1] = scalar_orbit_end(&b, active[1], orbit, k);

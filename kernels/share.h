@@ -3,8 +3,9 @@
 // Idle lanes that are worth a pause for new rays. The steps of the search by steps are too cheap, and those of neighbours too alike.
 #define REFILL (SEARCH == SEARCH_STEPS ? LANES : 1)
 
-// Packets that a work-item marches side by side. Orbits over dual numbers fill a processor's registers and units without that.
-#define ABREAST (HAS_DERIVATIVE && SEARCH == SEARCH_DISTANCE && LANES > 1 ? 2 : 1)
+// Packets that a work-item marches side by side. Orbits over dual numbers fill a processor's registers and units without that, and
+// calls empty the registers.
+#define ABREAST (HAS_DERIVATIVE && !HAS_CALLS && SEARCH == SEARCH_DISTANCE && LANES > 1 ? 2 : 1)
 
 // The rays that one work-item marches: `next`, and every one that is `hop` further, before `end`.
 typedef struct {

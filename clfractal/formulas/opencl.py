@@ -182,6 +182,7 @@ class _ChainWriter:
             f"#define LOGARITHMIC {int(logarithmic)}",
             f"#define HAS_DERIVATIVE {int(self.has_derivative)}",
             f"#define HAS_SHAPE {int(self.chain.shape_index is not None)}",
+            "",
             _state_functions(self.size),
         ]
         number_types: tuple[NumberType, ...] = ("real", "dual")
@@ -194,6 +195,7 @@ class _ChainWriter:
         if self.has_derivative:
             parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
             parts.append(self._dispatch("real", derivative=True))
+        parts[5] = f"#define HAS_CALLS {int(any(map(_CALLS.search, parts)))}"
         return _Written(
             _one("\n".join(parts) + "\n"),
             logarithmic,
@@ -414,6 +416,9 @@ _COSTS = {
     "dual_acos": 53, "dual_atan": 41, "dual_atan2": 62, "dual_mod": 18, "dual_pow": 150, "dual_pow_real": 123,
 }  # fmt: skip
 
+
+# What drivers have in a library: calls that move all registers into memory.
+_CALLS = re.compile(r"\breal_(exp|log|pow|power_\w+|sin|cos|tan|asin|acos|atan2?|arc_slope)\(")
 
 # Arithmetic of the dual operations that are more than one; what only selects is none.
 _OPERATIONS = {
