@@ -28,7 +28,7 @@ _INCLUDES = re.compile(r'^#include "(?:lanes|vectors|structs|formula|orbit|numbe
 
 HEAD = "".join(
     f'#include "{name}"\n'
-    for name in ("lanes.h", "numbers/real.h", "numbers/dual.h", "vectors.h", "structs.h")
+    for name in ("lanes.h", "numbers/real.h", "numbers/dual.h", "numbers/quick.h", "vectors.h", "structs.h")
 )
 
 
