@@ -15,7 +15,7 @@ import pyopencl as cl
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.launch import Pace
-from clfractal.device.select import Device
+from clfractal.device.select import Device, is_simulator
 from clfractal.device.watched import Watched, is_watched
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel
@@ -237,9 +237,13 @@ class Drawing:
         # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all.
         ended = threading.Event()
         pool = ThreadPoolExecutor(len(texts))
-        building = [pool.submit(build, text) for text in texts]
         try:
-            built = [each.result() for each in building]
+            if is_simulator(
+                self.device.info
+            ):  # Oclgrind's checks of memory are lost with the thread that they began in
+                built = [build(text) for text in texts]
+            else:
+                built = [each.result() for each in [pool.submit(build, text) for text in texts]]
         except BaseException:
             ended.set()
             raise
