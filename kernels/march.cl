@@ -27,7 +27,8 @@ STAGE(march_rays) {
     if (mine.next >= mine.end || WAS_CANCELLED) return;
     const int waits = march_share(mine, q, goal, settings, orbit, k);
     look_at_share(mine, q, goal, settings, orbit, k);
-    if (LANES > 1) atomic_add(statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet) + STATISTIC_WAITS, (uint)waits);
+    // Nobody counts those of the cones.
+    if (LANES > 1 && goal != GOAL_CONE) atomic_add(statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet) + STATISTIC_WAITS, (uint)waits);
 }
 
 #if LANES == 1

@@ -31,6 +31,7 @@ from tests.portability.implementations import (
     MissingError,
     NotAllowedError,
 )
+from tests.portability.pictures import PARTS
 
 _TIMEOUT_S = 1800
 
@@ -105,11 +106,12 @@ def _picture_faults(
     # Tiny ones are for the simulator, and what it is compared with.
     measure = (kind, "tiny") if implementation is IMPLEMENTATIONS[0] else (kind,)
     for each in ("tiny",) if implementation.simulator else measure:
-        pictures = _pictures(implementation, each, half)
-        pictures.unlink(missing_ok=True)
-        module = ["tests.portability.pictures", str(pictures), each, str(half)]
-        if not _run(implementation.command(module, environment), environment):
-            found.append(f"the {each} pictures fail")
+        for part in range(PARTS[each])[half::2]:
+            pictures = _pictures(implementation, each, part)
+            pictures.unlink(missing_ok=True)
+            module = ["tests.portability.pictures", str(pictures), each, str(part)]
+            if not _run(implementation.command(module, environment), environment):
+                found.append(f"the {each} pictures fail")
     return found
 
 
@@ -138,8 +140,8 @@ def _marked() -> list[str]:
     ]
 
 
-def _pictures(implementation: Implementation, kind: str, half: int) -> Path:
-    return WORKPLACE / f"{implementation.name}-{kind}-{half}.npz"
+def _pictures(implementation: Implementation, kind: str, part: int) -> Path:
+    return WORKPLACE / f"{implementation.name}-{kind}-{part}.npz"
 
 
 def _oclgrind_checks(implementation: Implementation) -> dict[str, str]:
@@ -178,7 +180,7 @@ def _compare(chosen: list[Implementation], kinds: tuple[str, str]) -> list[tuple
         reference: dict[str, np.typing.NDArray[np.float32]] = {}
         for implementation in chosen:
             pictures: dict[str, np.typing.NDArray[np.float32]] = {}
-            for path in (_pictures(implementation, kind, half) for half in (0, 1)):
+            for path in (_pictures(implementation, kind, part) for part in range(PARTS[kind])):
                 if path.exists():
                     with np.load(path) as archive:
                         pictures |= {name: archive[name] for name in archive.files}

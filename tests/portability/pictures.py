@@ -1,7 +1,7 @@
 """Small pictures that every implementation renders: `python -m tests.portability.pictures OUT.npz KIND PART`.
 
-KIND is `full`, `brief` or `tiny`, PART is 0 or 1: every other picture. They reach what a compiler may get wrong:
-trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full
+KIND is `full`, `brief` or `tiny`, PART is 0 or 1: every other picture (0 to 3 for `tiny`: every fourth). They reach what
+a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full
 Jacobian, shadows of both kinds of light, several samples; what stills add: the points of a pixel, the search by steps,
 every kind of ray, a lens and fog; a grid that is filled and shown as a cloud around a cut plane, and a plane by itself.
 """
@@ -76,6 +76,8 @@ _DOUBLE = ("mandelbulb", "mandelbox")
 _TINY = ("mandelbulb", "hast", "mandelbox", "plane")
 
 SIZE, TINY_SIZE = (96, 72), (12, 8)
+# Processes that share the pictures of a kind. The simulator's checker of memory mistakes a second picture's for a first one's.
+PARTS = {"full": 2, "brief": 2, "tiny": 4}
 
 
 def cases(kind: str) -> Iterator[tuple[str, Precision]]:
@@ -138,7 +140,7 @@ def main() -> None:
     device = choose()
     print(device.info.name, "|", device.info.version, flush=True)
     rendered = {}
-    for name, precision in list(cases(kind))[part::2]:
+    for name, precision in list(cases(kind))[part :: PARTS[kind]]:
         rendered[f"{name} {precision}"] = picture(
             device, name, precision, TINY_SIZE if kind == "tiny" else SIZE
         )
