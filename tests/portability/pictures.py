@@ -1,9 +1,10 @@
 """Small pictures that every implementation renders: `python -m tests.portability.pictures OUT.npz KIND PART`.
 
 KIND is `full`, `brief` or `tiny`, PART is 0 or 1: every other picture (0 to 3 for `tiny`: every fourth). They reach what
-a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar derivative and the full
-Jacobian, shadows of both kinds of light, several samples; what stills add: the points of a pixel, the search by steps,
-every kind of ray, a lens and fog; a grid that is filled and shown as a cloud around a cut plane, and a plane by itself.
+a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar
+derivative and the full Jacobian, shadows of both kinds of light, several samples; what stills add: the points of a pixel,
+the search by steps, every kind of ray, a lens and fog; a grid that is filled and shown as a cloud around a cut plane, and a
+plane by itself.
 """
 
 from __future__ import annotations
@@ -76,7 +77,7 @@ _DOUBLE = ("mandelbulb", "mandelbox")
 _TINY = ("mandelbulb", "hast", "mandelbox", "plane")
 
 SIZE, TINY_SIZE = (96, 72), (12, 8)
-# Processes that share the pictures of a kind. The simulator's checker of memory mistakes a second picture's for a first one's.
+# Processes that share a kind's pictures. The simulator's checker of memory takes a second picture's for the first one's.
 PARTS = {"full": 2, "brief": 2, "tiny": 4}
 
 
