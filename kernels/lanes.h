@@ -143,14 +143,13 @@ INLINE scalar lanes_sum(real value) {
 
 // The lanes of a packet as bits, lane i as 1 << i.
 #define ALL_LANES ((1u << LANES) - 1u)
+#define bits_count(bits) ((int)popcount((uint)(bits)))
 
 #if LANES == 1
-#define bits_count(bits) ((int)(bits))
 #define highest_bit(bits) 0
 #define lanes_bits(m) ((uint)(m) & 1u)
 #define lanes_of_bits(bits) (-(mask)(bits))
 #else
-#define bits_count(bits) ((int)popcount((uint)(bits)))
 #define highest_bit(bits) (31 - (int)clz((uint)(bits)))
 #if LANES == 4
 #define BIT_OF_LANE ((mask)(1, 2, 4, 8))
