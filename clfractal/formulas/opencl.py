@@ -176,15 +176,14 @@ class _ChainWriter:
 
     def write(self) -> _Written:
         logarithmic = self.chain.degree > 1
-        parts = [
+        head = [
             f"#define STATE_SIZE {self.size}",
             f"#define FIRST_COUNT {1 if self.offset is not None else 0}",
             f"#define LOGARITHMIC {int(logarithmic)}",
             f"#define HAS_DERIVATIVE {int(self.has_derivative)}",
             f"#define HAS_SHAPE {int(self.chain.shape_index is not None)}",
-            "",
-            _state_functions(self.size),
         ]
+        parts = [_state_functions(self.size)]
         number_types: tuple[NumberType, ...] = ("real", "dual")
         for number_type in number_types:
             parts.append(self._start(number_type))
@@ -195,9 +194,9 @@ class _ChainWriter:
         if self.has_derivative:
             parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
             parts.append(self._dispatch("real", derivative=True))
-        parts[5] = f"#define HAS_CALLS {int(any(map(_CALLS.search, parts)))}"
+        head.append(f"#define HAS_CALLS {int(any(map(_CALLS.search, parts)))}")
         return _Written(
-            _one("\n".join(parts) + "\n"),
+            _one("\n".join([*head, *parts]) + "\n"),
             logarithmic,
             self.has_derivative,
             self.offset,

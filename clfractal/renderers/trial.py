@@ -32,8 +32,8 @@ from clfractal.scene.surface import SurfaceRenderer
 Rule = Literal["scalar", "jacobian"]
 RULES: tuple[Rule, ...] = ("scalar", "jacobian")
 
-# The pictures' sides: enough rays for a GPU; on a processor enough for each core to take some packets again and again, and
-# launches of a millisecond, many of which no other program interrupts.
+# The pictures' sides: enough rays for a GPU; on a processor so many that the last rays of each share, which leave lanes
+# empty, are few, and launches of some milliseconds, many of which no other program interrupts.
 _SIDES: dict[Rule, int] = {"scalar": 256, "jacobian": 160}
 _SIDE_GPU = 1024
 _RAYS_OF_CORE = 2048

@@ -64,9 +64,9 @@ class OutputBuffers:
         if wanted != self._wave_sizes:
             self.wave, self._wave_sizes = [], []
             self.wave = [self.device.buffer(size, "pixels between stages") for size in wanted]
-            # Lanes without a ray compute with what happens to be in the queue, and a checker of memory minds it.
-            for buffer, size in zip(self.wave[1:], wanted[1:], strict=True):
-                if is_simulator(self.device.info):
+            if is_simulator(self.device.info):
+                # Lanes without a ray compute with what happens to be in the queue, and a checker of memory minds it.
+                for buffer, size in zip(self.wave[1:], wanted[1:], strict=True):
                     cl.enqueue_copy(self.device.queue, buffer, np.zeros(size, np.uint8))
             self._wave_sizes = wanted
 

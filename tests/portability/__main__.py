@@ -192,7 +192,7 @@ def _compare(chosen: list[Implementation], kinds: tuple[str, str]) -> list[tuple
                 if name not in reference:  # it failed there, which is told already
                     continue
                 # The measure is compared with itself too: that finds colours that are no numbers.
-                found = difference(reference[name], picture, name.split()[-1])
+                found = difference(reference[name], picture, name.split()[-1], name)
                 print(f"{implementation.name:12} {kind} {name:24} {found.share:.3%} {found.fault or 'same'}")
                 if found.fault:
                     faults.append((implementation.name, f"{kind} {name}: {found.fault}"))

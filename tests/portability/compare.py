@@ -25,7 +25,9 @@ import numpy.typing as npt
 Picture = npt.NDArray[np.float32]
 
 # Largest share of pixels that may differ visibly.
-LIMITS = {"float32": 0.012, "float64": 0.001}
+LIMITS = {"float32": 0.008, "float64": 0.001}
+# Of pictures that differ more by their nature, see above.
+OWN_LIMITS = {"still float32": 0.012}
 # A visible difference of R, G, B or A: two steps of 8 bits at full brightness.
 VISIBLE = 2 / 255
 # A distance, position, normal or count that differs by more than this, relative to 1 and its own size, is
@@ -42,8 +44,12 @@ class Difference:
     pixels: npt.NDArray[np.bool_]
 
 
-def difference(ours: Picture, theirs: Picture, precision: str) -> Difference:
-    """Compare two pictures of shape (channels, height, width), whose first channels are R, G, B and A."""
+def difference(ours: Picture, theirs: Picture, precision: str, name: str = "") -> Difference:
+    """Compare two pictures of shape (channels, height, width), whose first channels are R, G, B and A.
+
+    Args:
+        name: as the picture is called, if it may have a limit of its own.
+    """
     if ours.shape != theirs.shape:
         return Difference(1.0, f"shapes {ours.shape} and {theirs.shape}", np.ones((1, 1), np.bool_))
     pixels = _different(ours, theirs)
@@ -51,7 +57,7 @@ def difference(ours: Picture, theirs: Picture, precision: str) -> Difference:
     broken = _no_numbers(ours) | _no_numbers(theirs)
     if broken.any():
         return Difference(share, "colours that are no numbers", pixels | broken)
-    limit = LIMITS[precision]
+    limit = OWN_LIMITS.get(name, LIMITS[precision])
     # A tiny picture has so few pixels that one is more than its share: one is always allowed.
     if int(pixels.sum()) > max(1, int(limit * pixels.size)):
         return Difference(share, f"{share:.2%} of the pixels differ, {limit:.1%} may", pixels)
