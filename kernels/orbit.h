@@ -1,8 +1,8 @@
 // Orbits of points under the formula, as one loop over a packet: escape counts, inside tests, distances and gradients.
 //
 // From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
-// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, apply, apply_derivative, dual_start, dual_apply,
-// state_pick, dual_state_pick, state_values, state_square, solid_distance.
+// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, apply,
+// apply_derivative, dual_start, dual_apply, state_pick, dual_state_pick, state_values, state_square, solid_distance.
 //
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
