@@ -27,59 +27,48 @@ INLINE encounter encounter_of(crossing c) {
     return e;
 }
 
-// What the lanes of a packet have under way.
-typedef struct {
-    int places[LANES];                   // the number of each lane's ray, or -1
-    scalar rays[RAY_NUMBERS * LANES];    // the rays, number by number
-} lanes_at_work;
-
-// The `idle` lanes put down what they found, and take the next rays, which begin.
-INLINE void lanes_refill(march *m, uint idle, share *left, lanes_at_work *at, queue q, int goal,
+// The `idle` lanes put down what they found, and take the next rays, which begin. `places`: the number of each lane's ray, or -1.
+INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q, int goal,
                          __constant const struct March *settings) {
     scalar found[ENCOUNTER_NORMAL * LANES];
     const encounter now = encounter_of(m->found);
 #define HOLD_FOUND(i) lanes_store(((const real *)&now)[i], found + i * LANES);
     WRITTEN_OUT(ENCOUNTER_NORMAL, HOLD_FOUND)
-#if LANES == 1
-    // One lane's ray is in registers, and once is enough.
-#define HOLD_NUMBER(i) at->rays[i] = ((const real *)&m->r)[i];
-    WRITTEN_OUT(RAY_NUMBERS, HOLD_NUMBER)
+    ray next = m->r;
+#if POINTS == 1
+    next.known = RAY_NOTHING_KNOWN;
 #endif
     const int count = goal == GOAL_SHADOW || goal == GOAL_CONE ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
     __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
     uint fresh = 0;
     while (idle != 0) {
-        const int lane = highest_bit(idle), done = at->places[lane];
+        const int lane = highest_bit(idle), done = places[lane];
         idle ^= 1u << lane;
 #define PUT_FOUND(i) if (i < count) q.met[i * q.stride + done] = found[i * LANES + lane];
         if (done >= 0) { WRITTEN_OUT(ENCOUNTER_NORMAL, PUT_FOUND) }
-        at->places[lane] = -1;
+        places[lane] = -1;
         while (left->next < left->end && !(near[left->next] < far[left->next])) left->next += left->hop;
         if (left->next >= left->end) continue;
-#define TAKE_NUMBER(i) at->rays[i * LANES + lane] = q.rays[i * q.stride + left->next];
+        const mask here = lanes_of_bits(1u << lane);
+#define TAKE_NUMBER(i) ((real *)&next)[i] = pick(here, (real)(q.rays[i * q.stride + left->next]), ((real *)&next)[i]);
         WRITTEN_OUT(RAY_NUMBERS, TAKE_NUMBER)
-        at->places[lane] = left->next;
+        places[lane] = left->next;
         left->next += left->hop;
         fresh |= 1u << lane;
     }
-    ray next;
-    next.known = RAY_NOTHING_KNOWN;
-#define GIVE_NUMBER(i) ((real *)&next)[i] = lanes_load(at->rays + i * LANES);
-    WRITTEN_OUT(RAY_NUMBERS, GIVE_NUMBER)
     march_begin(m, next, lanes_of_bits(fresh), goal, settings);
 }
 
-INLINE void lanes_begin(march *m, lanes_at_work *at) {
+INLINE void lanes_begin(march *m, int *places) {
     m->active = less(R(1.0), R(0.0));
-    for (int lane = 0; lane < LANES; ++lane) at->places[lane] = -1;
-    for (int i = 0; i < RAY_NUMBERS * LANES; ++i) at->rays[i] = S(0.0);
+    for (int lane = 0; lane < LANES; ++lane) places[lane] = -1;
 }
 
 // The lanes that wait in the next step, as bits, after idle ones have taken new rays.
-INLINE uint lanes_waiting(march *m, share *left, lanes_at_work *at, queue q, int goal, __constant const struct March *settings) {
+INLINE uint lanes_waiting(march *m, share *left, int *places, queue q, int goal, __constant const struct March *settings) {
     const uint idle = lanes_bits(~m->active);
     if (idle != ALL_LANES && (bits_count(idle) < REFILL || left->next >= left->end)) return idle;
-    lanes_refill(m, idle, left, at, q, goal, settings);
+    lanes_refill(m, idle, left, places, q, goal, settings);
     return lanes_bits(~m->active);
 }
 
@@ -88,18 +77,18 @@ INLINE int march_share(share mine, queue q, int goal, __constant const struct Ma
                        __constant const struct Orbit *orbit, __constant const scalar *k) {
     share left = mine;
     march m = {0};
-    lanes_at_work at;
-    lanes_begin(&m, &at);
+    int places[LANES];
+    lanes_begin(&m, places);
 #if ABREAST > 1
     march n = {0};
-    lanes_at_work at_n;
-    lanes_begin(&n, &at_n);
+    int places_n[LANES];
+    lanes_begin(&n, places_n);
 #endif
     for (int waits = 0;;) {
-        uint waiting = lanes_waiting(&m, &left, &at, q, goal, settings);
+        uint waiting = lanes_waiting(&m, &left, places, q, goal, settings);
         uint idle = bits_count(waiting);
 #if ABREAST > 1
-        const uint others = lanes_waiting(&n, &left, &at_n, q, goal, settings);
+        const uint others = lanes_waiting(&n, &left, places_n, q, goal, settings);
         idle += bits_count(others);
         waiting &= others;
 #endif
