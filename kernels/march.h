@@ -75,8 +75,9 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     m->landing = (m->landing & ~marching) | landing | (marching & less(step, CREEP * s->cone));
     step = fmax(step, CREEP * s->cone);
 #endif
-    const real back = m->low + m->radius_before;
-    const real onward = pick(overshot, back, m->t + step);
+    m->limit = pick(overshot & s->here.end.inside, m->t, m->limit);
+    step = fmin(step, m->limit - m->t);
+    const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
     m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside, s->radius, m->radius_before);

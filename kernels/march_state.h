@@ -14,6 +14,7 @@ typedef struct {
     real t;
     real low;         // the last point known to be outside
     real high;        // a point known to be inside
+    real limit;       // one that a step saw which was too long: what is before it is looked at first, and no step passes it
     real slope;       // of the distance along the ray, over the last steps
     real radius_before, step_before;
     mask landing;     // the last step led to where the solid is expected
@@ -43,6 +44,7 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
     m->t = pick(fresh, r.near, m->t);
     m->low = pick(fresh, r.near, m->low);
     m->high = pick(fresh, (real)(REAL_LARGEST), m->high);
+    m->limit = pick(fresh, (real)(REAL_LARGEST), m->limit);
     m->slope = pick(fresh, SLOPE_AT_FIRST, m->slope);
     m->radius_before = pick(fresh, (real)(REAL_LARGEST), m->radius_before);
     m->step_before = pick(fresh, R(0.0), m->step_before);
