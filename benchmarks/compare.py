@@ -1,7 +1,7 @@
 """This engine and its rivals side by side: one session, rounds in turn, medians.
 
     python -m benchmarks.compare [--rounds N] [--json FILE] [--row NAME ...] [--only TEXT ...]
-        [--runtime NAME=ICD_FOLDER[,LIBRARY_FOLDER] ...] [--kernel ROW=FILE.cl ...]
+        [--runtime NAME=ICD_FOLDER[,LIBRARY_FOLDER] ...] [--kernel ROW=FILE.cl[,DETAIL] ...]
 
 Prints a Markdown table. A contestant that cannot run gets a line that says why. In every round each
 contestant draws once, so that a machine that slows down slows all of them. Needs nothing but this engine;
@@ -244,10 +244,12 @@ def contestants(
     """Everyone who might take part in the wanted rows, or in all, ours first."""
     found: list[Contestant] = [Ours(runtime, rows) for runtime in runtimes]
     for text in kernels:
-        row, equals, file = text.partition("=")
+        row, equals, rest = text.partition("=")
+        file, _, detail = rest.partition(",")
         if not (equals and Path(file).is_file()):
-            raise ValueError(f"a kernel looks like ROW=FILE.cl, not {text!r}")
-        found += [StandAloneKernel(row, Path(file).resolve(), flags, runtime) for runtime in runtimes]
+            raise ValueError(f"a kernel looks like ROW=FILE.cl or ROW=FILE.cl,DETAIL, not {text!r}")
+        path, wanted = Path(file).resolve(), float(detail or 1)
+        found += [StandAloneKernel(row, path, flags, runtime, detail=wanted) for runtime in runtimes]
     rivals: list[Contestant] = []
     if not rows or set(rows) & set(NumbaRival.rows):
         rivals.append(NumbaRival(rows))
@@ -269,7 +271,10 @@ def main() -> int:
     )
     parser.add_argument("--runtime", action="append", default=[], help="NAME=ICD_FOLDER[,LIBRARY_FOLDER]")
     parser.add_argument(
-        "--kernel", action="append", default=[], help="ROW=FILE.cl, a stand-alone kernel to time too"
+        "--kernel",
+        action="append",
+        default=[],
+        help="ROW=FILE.cl[,DETAIL], a stand-alone kernel to time too, whose rays end so many pixels' widths before the set",
     )
     parser.add_argument(
         "--kernel-flags", default="-cl-fast-relaxed-math", help="how stand-alone kernels are built"
