@@ -33,6 +33,8 @@ typedef uchar sample;
 #endif
 #include "grid.h"
 #include "volume_ray.h"
+#include "volume_light.h"
+#include "volume_sight.h"
 #include "volume_shot.h"
 
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {

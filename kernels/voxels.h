@@ -58,11 +58,13 @@ INLINE real apart_square(state z, state past) {
 // the very same z never escapes (Brent 1980, "An improved Monte Carlo factorization algorithm", sec. 2: compare with a z that is
 // renewed at powers of two). Packets are tested every few applications, and lanes that escaped continue without effect. One
 // lane ends at once, and has neither arrays nor loops of a constant count (see TURNS in lanes.h).
+#if HAS_SHAPE
 INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const mask all_lanes = equal(R(0.0), R(0.0));
-#if HAS_SHAPE
     for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = orbit_inside(points[p], all_lanes, orbit->iterations, orbit, k);
+}
 #elif LANES == 1
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const real farthest = orbit->distance_square;
     const int limit = orbit->iterations;
     state c, z;
@@ -89,7 +91,10 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
 #endif
     }
     inside[0] = alive & settled(square, orbit);
+}
 #else
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const mask all_lanes = equal(R(0.0), R(0.0));
     const real farthest = (real)(orbit->distance_square);
     const int limit = orbit->iterations;
     state c[PACKETS], z[PACKETS], past[PACKETS];
@@ -148,5 +153,5 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
     }
     #pragma unroll
     for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = periodic[p] | (alive[p] & settled(square[p], orbit));
-#endif
 }
+#endif

@@ -154,6 +154,79 @@ INLINE void store_values(__global VALUE *out, wide row) {
 #endif
 }
 
+// Where a brick's samples are stored, and which of its lines and columns this item stores.
+typedef struct {
+    __global VALUE *value;
+    __global uint *normal;
+    int first_line, own;
+} brick_place;
+
+#if NORMALS
+INLINE void store_normal(__global uint *out, wide_uint packed) {
+#if ALONE
+    *out = packed;
+#else
+    vstore8(packed.lo, 0, out);
+    out[8] = packed.s8;
+#endif
+}
+
+INLINE void store_samples(neighbourhood *n, brick_place at, __constant const struct Extent *extent) {
+    // Filtered along x and y: the values, and their differences along x and along y; of each slot LINES lines.
+    wide plain[SLOTS * LINES], along_x[SLOTS * LINES], along_y[SLOTS * LINES];
+    wide_uint alpha[SLOTS * LINES];
+    for (int layer = 0; layer < LAYERS; ++layer) {
+        wide rows[SLOTS], rows_x[SLOTS];
+        const int z = layer - REACH, kept = SLOT(layer) * LINES;
+        MOVE_ON(plain);
+        MOVE_ON(along_x);
+        MOVE_ON(along_y);
+        MOVE_ON(alpha);
+        for (int line = 0; line < LINES + 2 * REACH; ++line) {
+            const int y = line - REACH;
+            const row r = row_at(n, at.first_line + y, z);
+            wide window[2 * REACH + 1];
+            #pragma unroll
+            for (int i = -REACH; i <= REACH; ++i) window[i + REACH] = row_window(&r, i);
+            const wide middle = window[REACH];
+            MOVE_ON(rows);
+            MOVE_ON(rows_x);
+            rows[SLOT(line)] = smoothed(window + REACH, 1);
+            rows_x[SLOT(line)] = differed(window + REACH, 1);
+            if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < LINES) {
+                alpha[kept + (ALONE ? 0 : y)] = middle >= extent->opaque ? (wide_uint)(255u) : (wide_uint)(0u);
+                store_values(at.value + BRICK_SIDE * (BRICK_SIDE * z + at.first_line + y) + at.own, middle * extent->scale);
+            }
+        }
+        for (int y = 0; y < LINES; ++y) {
+            const int line = y + REACH;
+            plain[kept + y] = smoothed(rows + line, 1);
+            along_x[kept + y] = smoothed(rows_x + line, 1);
+            along_y[kept + y] = differed(rows + line, 1);
+        }
+        // The layer that has all its neighbours now.
+        const int done = z - REACH;
+        for (int y = 0; done >= 0 && y < LINES; ++y) {
+            const int middle = MIDDLE_SLOT(done) * LINES + y;
+            const wide gx = smoothed(along_x + middle, LINES), gy = smoothed(along_y + middle, LINES);
+            const wide gz = differed(plain + middle, LINES);
+            const wide_uint packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
+                                                   alpha[middle]);
+            store_normal(at.normal + BRICK_SIDE * (BRICK_SIDE * done + at.first_line + y) + at.own, packed);
+        }
+    }
+}
+#else
+INLINE void store_samples(neighbourhood *n, brick_place at, __constant const struct Extent *extent) {
+    for (int z = 0; z < BRICK_SIDE; ++z) {
+        for (int y = at.first_line; y < at.first_line + LINES; ++y) {
+            const row r = row_at(n, y, z);
+            store_values(at.value + BRICK_SIDE * (BRICK_SIDE * z + y) + at.own, row_window(&r, 0) * extent->scale);
+        }
+    }
+}
+#endif
+
 // Values and normals of the bricks from `first` on, into slots from `slot` on.
 __kernel void store_bricks(__global VALUE *values, __global uint *normals, __global const ulong *bricks, int first, int count,
                            int slot, __global const SAMPLE *samples, __global const int *numbers,
@@ -174,64 +247,15 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
     const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;
     __global VALUE *value = values + start;
 #if NORMALS
-    __global uint *normal = normals + start;
-    // Filtered along x and y: the values, and their differences along x and along y; of each slot LINES lines.
-    wide plain[SLOTS * LINES], along_x[SLOTS * LINES], along_y[SLOTS * LINES];
-    wide_uint alpha[SLOTS * LINES];
-    for (int layer = 0; layer < LAYERS; ++layer) {
-        wide rows[SLOTS], rows_x[SLOTS];
-        const int z = layer - REACH, kept = SLOT(layer) * LINES;
-        MOVE_ON(plain);
-        MOVE_ON(along_x);
-        MOVE_ON(along_y);
-        MOVE_ON(alpha);
-        for (int line = 0; line < LINES + 2 * REACH; ++line) {
-            const int y = line - REACH;
-            const row r = row_at(&n, first_line + y, z);
-            wide window[2 * REACH + 1];
-            #pragma unroll
-            for (int i = -REACH; i <= REACH; ++i) window[i + REACH] = row_window(&r, i);
-            const wide middle = window[REACH];
-            MOVE_ON(rows);
-            MOVE_ON(rows_x);
-            rows[SLOT(line)] = smoothed(window + REACH, 1);
-            rows_x[SLOT(line)] = differed(window + REACH, 1);
-            if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < LINES) {
-                alpha[kept + (ALONE ? 0 : y)] = middle >= extent->opaque ? (wide_uint)(255u) : (wide_uint)(0u);
-                store_values(value + BRICK_SIDE * (BRICK_SIDE * z + first_line + y) + own, middle * extent->scale);
-            }
-        }
-        for (int y = 0; y < LINES; ++y) {
-            const int line = y + REACH;
-            plain[kept + y] = smoothed(rows + line, 1);
-            along_x[kept + y] = smoothed(rows_x + line, 1);
-            along_y[kept + y] = differed(rows + line, 1);
-        }
-        // The layer that has all its neighbours now.
-        const int done = z - REACH;
-        for (int y = 0; done >= 0 && y < LINES; ++y) {
-            const int at = MIDDLE_SLOT(done) * LINES + y;
-            const wide gx = smoothed(along_x + at, LINES), gy = smoothed(along_y + at, LINES);
-            const wide gz = differed(plain + at, LINES);
-            const wide_uint packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
-                                                   alpha[at]);
-            __global uint *out = normal + BRICK_SIDE * (BRICK_SIDE * done + first_line + y) + own;
-#if ALONE
-            *out = packed;
+    const brick_place at = {value, normals + start, first_line, own};
 #else
-            vstore8(packed.lo, 0, out);
-            out[8] = packed.s8;
+    const brick_place at = {value, 0, first_line, own};
 #endif
-        }
-    }
-    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE && own + first_line == 0; ++i) normal[i] = 0x00808080u;
-#else
-    for (int z = 0; z < BRICK_SIDE; ++z) {
-        for (int y = first_line; y < first_line + LINES; ++y) {
-            const row r = row_at(&n, y, z);
-            store_values(value + BRICK_SIDE * (BRICK_SIDE * z + y) + own, row_window(&r, 0) * extent->scale);
-        }
-    }
+    store_samples(&n, at, extent);
+    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE && own + first_line == 0; ++i) {
+        value[i] = 0;
+#if NORMALS
+        at.normal[i] = 0x00808080u;
 #endif
-    for (int i = BRICK_SAMPLES; i < BRICK_STRIDE && own + first_line == 0; ++i) value[i] = 0;
+    }
 }

@@ -8,12 +8,6 @@ from collections.abc import Iterator
 from clfractal.resources import folder
 
 MOST_LINES = 80
-# Those that are longer, and how long they may be: to be split, never to grow.
-LONGER = {
-    "volume_shot.h: take_shot": 150,
-    "voxels.h: solid_inside": 92,
-    "voxels_bricks.cl: store_bricks": 95,
-}
 # A function's or a kernel's name, at the left; its body begins on the same line or a few lines below.
 _HEAD = re.compile(
     r"^(?:(?:INLINE|CALLED|static inline|__kernel)\b[^;{]*?(?=\b\w+\()|STAGE\()(\w+)", re.MULTILINE
@@ -39,7 +33,7 @@ def test_no_function_of_a_kernel_is_long() -> None:
         for name, count in functions(path.read_text("utf-8"))
     }
     assert len(found) > 300
-    assert {name: count for name, count in found.items() if count > LONGER.get(name, MOST_LINES)} == {}
+    assert {name: count for name, count in found.items() if count > MOST_LINES} == {}
 
 
 def test_functions_are_counted() -> None:
