@@ -49,7 +49,7 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
     m->active &= ~arrived;
     m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
     m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
-    m->t = pick(failed, m->t + PROOF_ONWARD * cone, m->t);
+    m->t = pick(failed, fmin(m->t + PROOF_ONWARD * cone, m->limit), m->t);
     m->step_before = pick(failed, PROOF_ONWARD * cone, m->step_before);
     m->slope = pick(failed, R(-1.0), m->slope);
     m->landing |= failed;
