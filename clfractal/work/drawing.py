@@ -242,9 +242,8 @@ class Drawing:
         ended = threading.Event()
         pool = ThreadPoolExecutor(len(texts))
         try:
-            if is_simulator(
-                self.device.info
-            ):  # Oclgrind's checks of memory are lost with the thread that they began in
+            # Oclgrind's checks of memory are lost with the thread that they began in.
+            if is_simulator(self.device.info):
                 built = [build(text) for text in texts]
             else:
                 built = [each.result() for each in [pool.submit(build, text) for text in texts]]

@@ -8,11 +8,11 @@ then differ by any amount. Hence a share of the pixels is limited, and not the d
 Measured between PoCL 3.0, PoCL 3.1 and Intel's runtime on pictures of 96 x 72: at most 0.42 % of the pixels of a
 float32 picture (hast, single pixels at its needle and rims: a hit there is proved by a descent of up to twelve steps,
 each of which magnifies the last digit, and PoCL's reciprocal roots are estimates refined where Intel's are exact; the
-other pictures have none), none of a float64 picture. Of PoCL 6 and rusticl 0.19 % and 0.88 % of `still`, which is of hast
-with two samples and all kinds of rays (a third of these pixels at its needle), 0.09 % and 0.26 % of its plane; volumes have
-none. The faults that these pictures
-have found touched more: a driver's `pow` that spoiled neighbouring lanes 2.5 % and 4 %, a distance of ours that depended on
-the neighbouring lanes 0.5 % of a float64 picture. The limits stand between.
+other pictures have none), none of a float64 picture. Of PoCL 6 and rusticl 0.19 % and 0.88 % of `still`, which is of
+hast with two samples and all kinds of rays (a third of these pixels at its needle), 0.09 % and 0.26 % of its plane;
+volumes have none. The faults that these pictures have found touched more: a driver's `pow` that spoiled neighbouring
+lanes 2.5 % and 4 %, a distance of ours that depended on the neighbouring lanes 0.5 % of a float64 picture. The limits
+stand between.
 """
 
 from __future__ import annotations
