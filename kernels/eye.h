@@ -24,11 +24,13 @@ INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     return a;
 }
 
-// Sends a ray for the part of its way that cutting planes and the bounding sphere leave.
-INLINE void send_clipped(stage s, int turn, ray r, mask wanted, world w) {
+// Sends a ray for the part of its way that cutting planes and the bounding sphere leave, from `free` on: nothing should be before.
+INLINE void send_clipped(stage s, int turn, ray r, real free, mask wanted, world w) {
     real face;
     wanted &= planes_cut(&r, &face, w.planes);
     wanted &= ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
+    lanes_store(r.near, s.q.rays + RAY_START * s.q.stride + turn * s.q.wave + s.slot);
+    r.near = fmax(r.near, free);
     queue_send(s.q, turn, s.slot, r, wanted);
 }
 

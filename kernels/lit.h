@@ -68,7 +68,7 @@ INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, cons
     STATE_KEEP(s, *so_far, STATE_PATH);
     ray r = {so_far->origin, so_far->direction, R(0.0), (real)(REAL_LARGEST), so_far->footprint, so_far->spread,
              RAY_NOTHING_KNOWN};
-    send_clipped(s, 0, r, mask_of(so_far->on_path), w);
+    send_clipped(s, 0, r, R(0.0), mask_of(so_far->on_path), w);
 }
 
 // The shot at its end: what its path has seen, over the background; and what it has found first.

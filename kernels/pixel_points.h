@@ -62,7 +62,7 @@ INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed,
         ray r = camera_ray(a.x + across, a.y + below, a.lens_x, a.lens_y, w.view);
         r.near = fmax(touched.t - (real)(w.settings->point_start) * cone, R(0.0));
         r.known = touched.t;
-        send_clipped(s, turn, r, mask_of(touched.touched), w);
+        send_clipped(s, turn, r, R(0.0), mask_of(touched.touched), w);
     }
 }
 

@@ -19,7 +19,10 @@ typedef struct {
 #define RAY_NEAR 6
 #define RAY_FAR 7
 #define RAY_NUMBERS (POINTS > 1 ? NUMBERS_OF(ray) : NUMBERS_OF(ray) - 1)
+// Beside a ray stands one number more: of a ray of ambient light the weight of what it brings; of one that looks for a surface
+// where it began before a cone took it farther.
 #define RAY_STRENGTH NUMBERS_OF(ray)
+#define RAY_START NUMBERS_OF(ray)
 #define ENCOUNTER_STEPS 1
 #define ENCOUNTER_COUNT 2
 #define ENCOUNTER_T 3

@@ -20,11 +20,32 @@ INLINE share share_of_item(int item, int slice, queue q) {
     return s;
 }
 
+// The next ray of a share that is wanted, or -1.
+INLINE int share_next(share *left, queue q) {
+    __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
+    while (left->next < left->end && !(near[left->next] < far[left->next])) left->next += left->hop;
+    if (left->next >= left->end) return -1;
+    const int found = left->next;
+    left->next += left->hop;
+    return found;
+}
+
 // What a march has found, as the stages after it read it.
 INLINE encounter encounter_of(crossing c) {
     const vec none = {R(0.0), R(0.0), R(0.0)};
     const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0)};
     return e;
+}
+
+// Whether a ray was inside at its first look, although a cone had called the way there free: a distance can be too large for all the
+// cone's width. It then begins anew where it would have begun without the cone.
+INLINE int begins_anew(scalar hit, scalar steps, int number, queue q, int goal) {
+    if (goal == GOAL_SHADOW || goal == GOAL_CONE || hit == S(0.0) || steps > S(1.0)) return 0;
+    __global scalar *near = q.rays + RAY_NEAR * q.stride + number;
+    const scalar start = q.rays[RAY_START * q.stride + number];
+    if (!(start < *near)) return 0;
+    *near = start;
+    return 1;
 }
 
 // The `idle` lanes put down what they found, and take the next rays, which begin. `places`: the number of each lane's ray, or -1.
@@ -39,21 +60,19 @@ INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q,
     next.known = RAY_NOTHING_KNOWN;
 #endif
     const int count = goal == GOAL_SHADOW || goal == GOAL_CONE ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
-    __global const scalar *near = q.rays + RAY_NEAR * q.stride, *far = q.rays + RAY_FAR * q.stride;
     uint fresh = 0;
     while (idle != 0) {
         const int lane = highest_bit(idle), done = places[lane];
+        const int anew = done >= 0 && begins_anew(found[lane], found[ENCOUNTER_STEPS * LANES + lane], done, q, goal);
         idle ^= 1u << lane;
 #define PUT_FOUND(i) if (i < count) q.met[i * q.stride + done] = found[i * LANES + lane];
-        if (done >= 0) { WRITTEN_OUT(ENCOUNTER_NORMAL, PUT_FOUND) }
-        places[lane] = -1;
-        while (left->next < left->end && !(near[left->next] < far[left->next])) left->next += left->hop;
-        if (left->next >= left->end) continue;
+        if (done >= 0 && !anew) { WRITTEN_OUT(ENCOUNTER_NORMAL, PUT_FOUND) }
+        const int next_place = anew ? done : share_next(left, q);
+        places[lane] = next_place;
+        if (next_place < 0) continue;
         const mask here = lanes_of_bits(1u << lane);
-#define TAKE_NUMBER(i) ((real *)&next)[i] = pick(here, (real)(q.rays[i * q.stride + left->next]), ((real *)&next)[i]);
+#define TAKE_NUMBER(i) ((real *)&next)[i] = pick(here, (real)(q.rays[i * q.stride + next_place]), ((real *)&next)[i]);
         WRITTEN_OUT(RAY_NUMBERS, TAKE_NUMBER)
-        places[lane] = left->next;
-        left->next += left->hop;
         fresh |= 1u << lane;
     }
     march_begin(m, next, lanes_of_bits(fresh), goal, settings);

@@ -50,10 +50,9 @@ STAGE(begin_shots) {
     }
     STATE_KEEP(s, cost, STATE_TALLY);
     ray r = eye_ray(&a, view);
-    r.near = fmax(r.near, begin.t);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
-    send_clipped(s, 0, r, mask_of(a.wanted), w);
+    send_clipped(s, 0, r, begin.t, mask_of(a.wanted), w);
 }
 
 #if POINTS > 1

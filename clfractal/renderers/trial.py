@@ -73,14 +73,16 @@ class _Rays:
     spreads: Numbers
 
     def numbers(self, chain: Chain) -> Numbers:
-        """As the queue has them, shape (10, count), within the set's sphere; beyond it far is less than near."""
+        """As the queue has them, shape (12, count), within the set's sphere; beyond it far is less than near."""
         offset = self.origins - np.array(chain.center)
         middle = -(offset * self.directions).sum(1)
         nearest = offset + middle[:, None] * self.directions
         half_chord = np.sqrt(np.maximum(chain.radius**2 - (nearest**2).sum(1), 0.0))
         near = np.maximum(middle - half_chord, 0.0)
         far = np.where(half_chord > 0, middle + half_chord, -1.0)
-        return np.vstack([self.origins.T, self.directions.T, near, far, self.footprints, self.spreads])
+        # Nothing is known of other rays, and no cone has gone before these.
+        widths = [self.footprints, self.spreads]
+        return np.vstack([self.origins.T, self.directions.T, near, far, *widths, np.zeros_like(near), near])
 
 
 def picture_side(device: Device, rule: Rule) -> int:

@@ -9,10 +9,21 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.pictures.film import Film
-from clfractal.renderers import surface, waves
+from clfractal.renderers import records, surface, waves
 from clfractal.renderers.kernel import BLOCK
 from clfractal.scene.model import Scene
-from tests.render.shots import plan_of, render_planned, scene_of
+from tests.render.shots import (
+    BALL,
+    BALL_RADIUS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    QUICK_BALL,
+    plan_of,
+    rays,
+    render_planned,
+    scene_of,
+    to_sphere,
+)
 
 SIZE = (320, 240)
 LIGHTS: list[dict[str, Any]] = [{"direction": [-1, 1, -1]}]
@@ -93,6 +104,30 @@ def test_a_block_sees_what_is_smaller_than_a_pixel_anywhere_in_it(
             alone, _ = rendered(scene, device)
         np.testing.assert_allclose(film["A"], alone["A"], atol=1e-6)
         assert film["A"].sum() > 0.3, side
+
+
+@pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "scalar rule"])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+@pytest.mark.parametrize("renderer", [{}, {"normal": "least_squares"}], ids=["one", "points"])
+def test_a_ray_whose_cone_ended_inside_begins_anew(
+    formula: dict[str, Any],
+    camera: dict[str, Any],
+    renderer: dict[str, Any],
+    device: Device,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A share of more than the whole distance stands for distances that are too large: cones go into the ball."""
+    scene = scene_of(formula, camera, (160, 120), renderer=renderer, lights=LIGHTS)
+    origin, direction, _ = rays(scene)
+    _, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
+    monkeypatch.setattr(records, "CONE_SHARE", 3.0)
+    cones, _ = rendered(scene, device)
+    hit = nearest < 0.8 * BALL_RADIUS
+    assert hit.sum() > 2000
+    assert (cones["A"][hit] > 0).all()
+    # Light is computed a little above the ball.
+    points = np.stack([cones["P.X"], cones["P.Y"], cones["P.Z"]], axis=-1)
+    assert (np.abs(np.linalg.norm(points, axis=-1) - BALL_RADIUS)[hit] < 0.02).all()
 
 
 def test_rays_through_a_lens_and_the_search_by_steps_have_no_cones() -> None:
