@@ -72,7 +72,7 @@ def test_interrupted_the_finished_ones_stay(clf: InProcess, monkeypatch: pytest.
             raise KeyboardInterrupt
         return render(*arguments, **settings)
 
-    monkeypatch.setattr(work, "run", interrupted)
+    monkeypatch.setattr("clfractal.commands.numbered.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
         clf("slices", "scene.yaml", "--count", "4")
     assert names() == ["slice_0001.png", "slice_0002.png"]

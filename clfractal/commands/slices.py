@@ -21,12 +21,8 @@ from clfractal.scene.plane import moved
 
 if TYPE_CHECKING:
     from clfractal.device.select import Device
-    from clfractal.work.engine import Engine
-    from clfractal.work.job import Job
 
 MOST_SLICES = 100_000
-# Pictures larger than this are kept on disk until they are complete, bytes.
-_IN_MEMORY = 1 << 28
 _LINE_SECONDS = 2.0
 
 
@@ -70,6 +66,7 @@ def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     _check_files(scene, files)
     scenes = [slice_scene(scene, stack, number) for number in numbers]
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
+    from clfractal.commands.numbered import render_one
     from clfractal.work.engine import Engine
 
     engine = Engine(order.device, tell=shell.say)
@@ -87,7 +84,7 @@ def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     for number, each, paths in zip(numbers, scenes, files, strict=True):
         with naming_options():
             job = engine.prepare(each, precision=precision, samples=order.samples)
-        rays += _rendered(job, engine, paths, shell)
+        rays += render_one(job, engine, paths, shell).rays
         now = time.perf_counter()
         if now - told > _LINE_SECONDS and number < stack.count:
             told = now
@@ -157,22 +154,3 @@ def _precision(scenes: list[Scene], device: Device) -> str:
     able = has_float64(device.info)
     found = {choose_precision(end, wanted, has_float64=able)[0] for end in (scenes[0], scenes[-1])}
     return max(found)
-
-
-def _rendered(job: Job, engine: Engine, paths: tuple[Path, ...], shell: Shell) -> int:
-    """Renders one slice and writes its files; returns the number of its samples."""
-    from clfractal.commands.unfinished import Unfinished
-    from clfractal.work.films import JobFilms
-    from clfractal.work.run import run
-    from clfractal.work.save import save_job
-
-    header = job.header()
-    if 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
-        films = JobFilms(job)
-        state = run(job, films.films, engine.executor)
-        save_job(job, films.films, paths, header)
-    else:
-        with Unfinished(job, header, paths[0], shell, resume=False) as unfinished:
-            state = run(job, unfinished.films, engine.executor)
-            save_job(job, unfinished.films, paths, header)
-    return state.rays

@@ -1,0 +1,61 @@
+"""One of several pictures that a command writes, such as slices and the frames of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from clfractal.commands.progress import Reporter
+from clfractal.commands.unfinished import Unfinished
+from clfractal.work.films import JobFilms
+from clfractal.work.run import run
+from clfractal.work.save import save_job
+
+if TYPE_CHECKING:
+    from clfractal.commands.shell import Shell
+    from clfractal.pictures.tiled import TiledStore
+    from clfractal.work.engine import Engine
+    from clfractal.work.job import Job
+    from clfractal.work.run import Progress
+
+# Pictures larger than this are kept on disk until they are complete, bytes.
+_IN_MEMORY = 1 << 28
+
+
+def render_one(
+    job: Job,
+    engine: Engine,
+    paths: tuple[Path, ...],
+    shell: Shell,
+    *,
+    resume: bool = False,
+    keep: bool = False,
+) -> Progress:
+    """Renders one picture and writes its files.
+
+    Args:
+        resume: whether to continue tiles that an earlier run has kept.
+        keep: whether tiles are kept beside the first file until it is whole, however small the picture is.
+
+    Returns:
+        The last state of the work.
+    """
+    header = job.header()
+    reporter = Reporter(shell, job.tiles)
+    if not keep and 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
+        films = JobFilms(job)
+        state = _run(job, films.films, engine, reporter)
+        save_job(job, films.films, paths, header)
+        return state
+    with Unfinished(job, header, paths[0], shell, resume=resume) as unfinished:
+        state = _run(job, unfinished.films, engine, reporter)
+        save_job(job, unfinished.films, paths, header)
+        return state
+
+
+def _run(job: Job, stores: Sequence[TiledStore], engine: Engine, reporter: Reporter) -> Progress:
+    try:
+        return run(job, stores, engine.executor, progress=reporter)
+    finally:
+        reporter.close()
