@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
     from clfractal.work.engine import Engine as Engine
+    from clfractal.work.frames import at_frame as at_frame
+    from clfractal.work.frames import frames as frames
     from clfractal.work.run import Progress as Progress
     from clfractal.work.variations import variations as variations
 
@@ -70,6 +72,8 @@ _HOMES = {
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
     "Engine": "clfractal.work.engine",
+    "at_frame": "clfractal.work.frames",
+    "frames": "clfractal.work.frames",
     "Progress": "clfractal.work.run",
     "variations": "clfractal.work.variations",
 }

@@ -38,10 +38,12 @@ def test_everything_public_is_there() -> None:
 
 
 FUNCTIONS = {
+    "at_frame": ["scene", "frame"],
     "devices": [],
     "distances": ["formula", "points"],
     "dump_scene": ["scene"],
     "escape": ["formula", "points", "iterations", "bailout"],
+    "frames": ["scene", "device", "progress", "numbers"],
     "load_scene": ["source", "overrides", "folder"],
     "mesh": ["source", "device", "progress", "level"],
     "probe": ["scene", "x", "y"],

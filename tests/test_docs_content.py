@@ -30,6 +30,7 @@ from clfractal.renderers import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.scene.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.viewer import settings
+from clfractal.work import frames
 from tests.shell import SCENE, InProcess
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -113,6 +114,11 @@ VOLUMES = {
     "renderer.transfer.opacity": "OpacityStop",
     "renderer.transfer.color": "ColorStop",
 }
+ANIMATION = {
+    "animation": "Animation",
+    "animation.tracks": "Track",
+    "animation.tracks.keys": "Key",
+}
 
 
 def number(value: float) -> str:
@@ -192,7 +198,8 @@ def expected_rows(name: str) -> list[list[str]]:
 
 
 def test_every_part_of_a_scene_is_described() -> None:
-    assert {*SECTIONS.values(), *CUT_PLANES.values(), *VOLUMES.values()} == set(load.schema()["$defs"])
+    told = {*SECTIONS.values(), *CUT_PLANES.values(), *VOLUMES.values(), *ANIMATION.values()}
+    assert told == set(load.schema()["$defs"])
     keys = {code(row[0]) for row in table("scenes.md", "The top level")}
     assert keys == set(load.schema()["properties"])
     required = {code(row[0]) for row in table("scenes.md", "The top level") if row[1] == "required"}
@@ -215,6 +222,12 @@ def test_keys_defaults_and_ranges_of_cut_planes(heading: str) -> None:
 def test_keys_defaults_and_ranges_of_volumes(heading: str) -> None:
     told = [row[:3] for row in table("volumes.md", heading)]
     assert sorted(told) == sorted(expected_rows(VOLUMES[heading]))
+
+
+@pytest.mark.parametrize("heading", ANIMATION)
+def test_keys_defaults_and_ranges_of_animations(heading: str) -> None:
+    told = [row[:3] for row in table("animation.md", heading)]
+    assert sorted(told) == sorted(expected_rows(ANIMATION[heading]))
 
 
 def test_limits_of_scene_files() -> None:
@@ -404,7 +417,7 @@ def test_the_python_api_is_described() -> None:
         name for name in dir(clfractal) if not name.startswith("__") and f"`clfractal.{name}" not in page
     ]
     assert missing == []
-    for function in (api.render, api.render_pair, api.escape):
+    for function in (api.render, api.render_pair, api.escape, frames.frames):
         told = {code(row[0]) for row in table("python.md", f"clfractal.{function.__name__}")}
         assert told == set(inspect.signature(function).parameters)
 

@@ -22,6 +22,7 @@ __all__ = ["app", "call", "list_facts", "list_grids", "list_pictures", "list_sce
 # As `clfractal --help` lists them; a command that is missing here comes last.
 _ORDER = (
     "render",
+    "animate",
     "view",
     "watch",
     "scenes",

@@ -1,7 +1,8 @@
-"""`clfractal check`: the scene with every default filled in, and where the eyes of a stereo scene are."""
+"""`clfractal check`: the scene with every default filled in, how it moves, and where the eyes of a stereo scene are."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,16 +11,30 @@ from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where, speaking_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.movement import movement_of
 
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
+    from clfractal.scene.animation import Animation
+    from clfractal.scene.tracks import Kind
+
+_MOST_KEYS = 12
+_WORDS: Mapping[Kind, str] = {
+    "number": "a number",
+    "whole": "a whole number",
+    "scale": "by equal factors",
+    "place": "a place in space",
+    "direction": "a direction",
+    "color": "each number by itself",
+}
+
 
 def check_scene(
     source: str, overrides: tuple[str, ...], shell: Shell, *, parallax: bool, device: str | None
 ) -> None:
-    """Prints a scene with all defaults; remarks about stereo come first, as comments, so that the output is a scene.
+    """Prints a scene with all defaults; remarks about movement and stereo come first, as comments: the output is a scene.
 
     Args:
         parallax: whether to measure a stereo scene's depth (which needs a device) and print the range of parallax.
@@ -40,6 +55,8 @@ def check_scene(
         lines.append(summary)
     if scene.stereo is not None and scene.stereo.fit is None:
         lines = [*_eyes(scene), *lines]
+    if scene.animation is not None:
+        lines = [*_moves(scene, scene.animation), *lines]
     text = dump_scene(scene)
     if not shell.can_print(text):
         text = dump_scene(scene, only_ascii=True)  # the output stays a scene
@@ -59,6 +76,32 @@ def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, st
     if comfort is None:
         return found, "parallax: the picture is empty", ""
     return found, comfort.sentence(), comfort.warning()
+
+
+def _moves(scene: Scene, animation: Animation) -> list[str]:
+    """Remarks: the film's length, and each track with the values at its keys, or at its ends and in its middle."""
+    last = animation.count - 1
+    seconds = animation.count / animation.fps
+    loop = ", begins again without a seam" if animation.loop else ""
+    lines = [f"animation: {animation.count} frames, {seconds:.6g} s at {animation.fps:g} per second{loop}"]
+    for mover in movement_of(scene).movers:
+        track = animation.tracks[mover.name]
+        if track.keys is not None:
+            frames = [animation.frame_of(key) for key in track.keys]
+            by = f"{len(frames)} keys, {track.interpolation}"
+        else:
+            frames = sorted({0.0, float(last // 2), float(last)})
+            by = "by an expression" if track.expression is not None else f"by {track.file}"
+        left = f"; {len(frames) - _MOST_KEYS} more" if len(frames) > _MOST_KEYS else ""
+        values = [f"frame {frame:g}: {_value(mover.value(frame))}" for frame in frames[:_MOST_KEYS]]
+        lines.append(
+            f"animation: {mover.name} ({by}; {_WORDS[mover.target.kind]}): {', '.join(values)}{left}"
+        )
+    return lines
+
+
+def _value(value: float | tuple[float, ...]) -> str:
+    return _point(value) if isinstance(value, tuple) else f"{value:.6g}"
 
 
 def _eyes(scene: Scene) -> list[str]:
@@ -86,5 +129,5 @@ def _eyes(scene: Scene) -> list[str]:
     return lines
 
 
-def _point(place: npt.NDArray[np.float64] | tuple[float, float, float]) -> str:
+def _point(place: npt.NDArray[np.float64] | tuple[float, ...]) -> str:
     return "[" + ", ".join(f"{float(value) + 0.0:.6g}" for value in place) + "]"

@@ -79,6 +79,54 @@ def render(
 
 
 @app.command()
+def animate(
+    context: typer.Context,
+    scene: Scene,
+    output: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "-o",
+            "--output",
+            help="A picture file, as for render, with # for the frame's number: frame_####.exr; repeatable."
+            "  [default: SCENE_####.png]",
+        ),
+    ] = None,
+    frames: Annotated[
+        str | None,
+        typer.Option("--frames", metavar="A-B:STEP", help="Render only these frames, counted from 0."),
+    ] = None,
+    device: DeviceOption = None,
+    precision: Precision = None,
+    size: Size = None,
+    overrides: Overrides = None,
+    samples: Samples = None,
+    quality: Quality = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Keep frames that are there, and continue the one in work.")
+    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Render the frames of a scene's animation to numbered picture files."""
+    from clfractal.commands.animate import Part, animate_scene
+    from clfractal.commands.order import Order
+
+    order = Order(
+        scene=scene,
+        outputs=tuple(output or ()),
+        device=device,
+        precision=precision,
+        size=size,
+        overrides=tuple(overrides or ()),
+        samples=samples,
+        quality=quality,
+        resume=resume,
+    )
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: animate_scene(order, Part(frames), shell)
+
+
+@app.command()
 def slices(
     context: typer.Context,
     scene: Scene,

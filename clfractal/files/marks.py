@@ -122,6 +122,19 @@ class Document:
         )
         return Where(node.file, line, place, _below(node.file, shown) or None)
 
+    def _with_dots(self, parts: tuple[str, ...]) -> tuple[str, ...]:
+        """The path of these parts, of which several may be one key with dots in it."""
+        path: list[str] = []
+        node: Node | None = self.root
+        while parts:
+            known = node.value if node is not None and isinstance(node.value, dict) else {}
+            fits = [key for key in known if split_path(key) == parts[: len(split_path(key))]]
+            key = max(fits, key=len, default=parts[0])
+            path.append(key)
+            node = node.child(key) if node is not None else None
+            parts = parts[max(len(split_path(key)), 1) :]
+        return tuple(path)
+
     def has(self, path: Sequence[str | int]) -> bool:
         """Whether there is a value at `path`."""
         node: Node | None = self.root
@@ -154,7 +167,7 @@ class Document:
         """
         if error.where.file is not None:
             return error
-        path = split_path(error.where.path or "")
+        path = self._with_dots(split_path(error.where.path or ""))
         unknown = re.match(r"unknown \w+ '(.*?)'", error.message)
         key = unknown.group(1) if unknown else None
         if key is not None and path and path[-1] == key:

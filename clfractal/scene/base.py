@@ -71,7 +71,7 @@ def _own_errors(cls: Any) -> Iterator[None]:
 
 
 # Names of sections that are no part of the Python API.
-_FOR_OURSELVES = frozenset({"checked", "note_files", "placed", "tag"})
+_FOR_OURSELVES = frozenset({"checked", "note_files", "once", "placed", "tag"})
 
 
 class Section(BaseModel, metaclass=_Kind):
@@ -145,9 +145,10 @@ class Section(BaseModel, metaclass=_Kind):
                 self.__pydantic_fields_set__.add(name)
 
 
-def problem(message: str, at: str = "") -> PydanticCustomError:
-    """Our own error inside a validator, at the key (or dotted path) `at` of the model that raises it."""
-    return PydanticCustomError("clfractal", "{message}", {"message": message, "at": at})
+def problem(message: str, at: str | tuple[str | int, ...] = "") -> PydanticCustomError:
+    """Our own error inside a validator, at the key (or path, dotted or of parts) `at` of the model that raises it."""
+    path = tuple(part for part in at.split(".") if part) if isinstance(at, str) else at
+    return PydanticCustomError("clfractal", "{message}", {"message": message, "at": path})
 
 
 class _ByKey:

@@ -199,6 +199,10 @@ def check_scene(scene: Scene) -> None:
     _check_names(scene)
     if scene.layout is not None:
         _check_views(scene)
+    if scene.animation is not None:
+        from clfractal.scene.movement import movement_of
+
+        movement_of(scene).check(check_parts)
 
 
 def _check_names(scene: Scene) -> None:

@@ -156,8 +156,7 @@ def _own(details: ErrorDetails, root: Root) -> Problem:
         key, location = str(location[-2]), location[:-2]
     path = tuple(_place(root, location).path)
     context = details["ctx"]
-    at = tuple(part for part in context["at"].split(".") if part)
-    return Problem(path + at, context["message"], key)
+    return Problem((*path, *context["at"]), context["message"], key)
 
 
 def _unknown_key(details: ErrorDetails, root: Root) -> Problem:

@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
 from clfractal.errors import ClfractalError
 from clfractal.files.inputs import noting
+from clfractal.scene.animation import Animation
 from clfractal.scene.base import Section, Vector
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
@@ -63,6 +64,9 @@ class Scene(Section):
     layout: Layout | None = Field(None, description="several views in one picture; null: one view")
     stereo: Stereo | None = Field(None, description="a pair of pictures for two eyes; null: one picture")
     output: Output = Field(default_factory=dict, validate_default=True)
+    animation: Animation | None = Field(
+        None, description="values that change from frame to frame of a film; null: a still"
+    )
     bookmarks: Bookmarks = Field({}, description="cameras kept under names; they do not change the picture")
 
     # Not fields: they are not part of the scene's values, and not compared.
@@ -172,8 +176,8 @@ class Scene(Section):
     def _context(self) -> dict[str, Any]:
         return {"folder": self._folder}
 
-    def _once(self, name: str, read: Callable[[], T]) -> T:
-        """The data kept under a name; they are read first if there are none."""
+    def once(self, name: str, read: Callable[[], T]) -> T:
+        """The data kept under a name, which follow from the scene; they are made first if there are none."""
         if name not in self._read:
             with noting() as files:
                 self._read[name] = read()
@@ -191,7 +195,7 @@ class Scene(Section):
         from clfractal.errors import Where
         from clfractal.formulas import catalog
 
-        return self._once(
+        return self.once(
             "chain", lambda: catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
         )
 
@@ -207,7 +211,7 @@ class Scene(Section):
             return None
         from clfractal.scene.environment import read_map
 
-        return self._once("surroundings", lambda: read_map(environment, self.folder))
+        return self.once("surroundings", lambda: read_map(environment, self.folder))
 
     @property
     def given(self) -> "GivenGrid | None":
@@ -222,7 +226,7 @@ class Scene(Section):
             return None
         from clfractal.scene.given import read_given
 
-        given = self._once("given", lambda: read_given(renderer, self.folder))
+        given = self.once("given", lambda: read_given(renderer, self.folder))
         renderer.check_level(given.low, given.high)
         return given
 
@@ -233,7 +237,7 @@ class Scene(Section):
         Raises:
             SceneError: a view does not fit into the picture.
         """
-        return self._once("views", self._find_views)
+        return self.once("views", self._find_views)
 
     def _find_views(self) -> "list[tuple[Scene, Place]]":
         from clfractal.errors import SceneError, Where

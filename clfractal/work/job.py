@@ -176,11 +176,12 @@ class Job:
     def identity(self, number: int) -> dict[str, Any]:
         """The values that must be equal for a tile of one view to have the same bits; stored with unfinished work.
 
-        Bookmarks and settings for writing files and for showing a pair may change; the journal compares the channels.
+        Bookmarks, movement, and settings for writing files and for showing a pair may change; the journal compares the
+        channels.
         """
         view, side = self.views[number], self.sides[number]
         scene = self.resolved()
-        del scene["output"], scene["bookmarks"]
+        del scene["output"], scene["bookmarks"], scene["animation"]
         found: dict[str, Any] = {}
         if side is not None:
             scene["stereo"] = {key: value for key, value in scene["stereo"].items() if key not in _SHOWN}

@@ -1,0 +1,126 @@
+"""What a scene looks like at each frame of its animation."""
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from math import isfinite
+from typing import Any
+
+from clfractal.errors import ClfractalError, FormulaError, SceneError, Where
+from clfractal.scene.animation import Animation
+from clfractal.scene.curves import Values
+from clfractal.scene.model import Scene
+from clfractal.scene.movers import Mover, Movers
+from clfractal.scene.tracks import Target, target_of, with_values
+
+
+class Movement:
+    """All tracks of a scene's animation.
+
+    Raises:
+        SceneError, FormulaError, FileError: a track moves what cannot move, or is wrong; at its path.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        assert scene.animation is not None
+        self.animation: Animation = scene.animation
+        self.targets = {name: _placed(name, target_of, scene, name) for name in self.animation.tracks}
+        self._scene = _with_live(scene, self.targets.values())
+        self.movers = Movers(scene, self.animation, self.targets).made()
+
+    def values(self, frame: float) -> dict[str, Any]:
+        """The value of each track at a frame."""
+        return {mover.name: mover.value(frame) for mover in self.movers}
+
+    def scene(self, frame: float) -> Scene:
+        """The scene as it is at a frame, which may lie between two; it has no animation of its own.
+
+        Raises:
+            SceneError: a value is out of its range then, or the formula has no meaning with it; at its track.
+        """
+        try:
+            return self._scene_at(frame)
+        except ClfractalError as error:
+            raise self._blamed(error, frame) from error
+
+    def _scene_at(self, frame: float) -> Scene:
+        values = {mover.target.path: mover.value(frame) for mover in self.movers}
+        found = with_values(self._scene, values)
+        _ = found.chain
+        return found
+
+    def _blamed(self, error: ClfractalError, frame: float) -> ClfractalError:
+        """The error at the track that is the reason, with the frame."""
+        path = error.where.path or ""
+        told = f" at frame {frame:g}"
+        for mover in self.movers:
+            own = ".".join(mover.target.path)
+            if path == own or path.startswith(f"{own}."):
+                return type(error)(error.message + told, mover.where, details=error.details)
+        shown = f"{path}: " if path else ""
+        return type(error)(f"{shown}{error.message}{told}", Where(path="animation"), details=error.details)
+
+    def check(self, check_parts: Callable[[Scene], None]) -> None:
+        """Raises ClfractalError if a frame's scene is wrong: every frame at which one of the values is extreme is tried."""
+        tried = {0, self.animation.count - 1}
+        for mover in self.movers:
+            tried |= self._extremes(mover)
+        for frame in sorted(tried):
+            found = self.scene(frame)
+            try:
+                check_parts(found)
+            except ClfractalError as error:
+                raise self._blamed(error, frame) from error
+
+    def _extremes(self, mover: Mover) -> set[int]:
+        """The frames with the least and the largest of each component.
+
+        Raises:
+            FormulaError: a value is no finite number.
+        """
+        found: set[int] = set()
+        columns: list[Values] = []
+        for frame in range(self.animation.count):
+            values = mover.at(frame)
+            if not all(isfinite(value) for value in values):
+                raise FormulaError(f"is not a finite number at frame {frame}", mover.where)
+            columns.append(values)
+        for component in zip(*columns, strict=True):
+            found |= {component.index(min(component)), component.index(max(component))}
+        return found
+
+
+def movement_of(scene: Scene) -> Movement:
+    """How a scene moves, found once for each scene.
+
+    Raises:
+        SceneError: it has no animation, or a track of it is wrong; at its path.
+        FormulaError, FileError: an expression or a table is wrong.
+    """
+    if scene.animation is None:
+        raise SceneError("is missing: a film needs fps, frames and tracks", Where(path="animation"))
+    return scene.once("movement", lambda: Movement(scene))
+
+
+def _placed(name: str, make: Callable[..., Any], *arguments: Any) -> Any:
+    """What `make` gives; its errors get the place of a track, unless they have one."""
+    try:
+        return make(*arguments)
+    except SceneError as error:
+        where = replace(error.where, path=error.where.path or f"animation.tracks.{name}")
+        raise SceneError(error.message, where, details=error.details) from error
+
+
+def _with_live(scene: Scene, targets: Iterable[Target]) -> Scene:
+    """The scene without its animation; parameters that move are live, so that no frame needs a new program."""
+    names: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for target in targets:
+        *section, group, name = ("", *target.path)
+        if group == "parameters":
+            path = (*section[1:], "live")
+            if path not in names:
+                at: Any = scene
+                for part in section[1:]:
+                    at = at[int(part)] if isinstance(at, tuple) else getattr(at, part)
+                names[path] = at.live
+            names[path] = tuple(dict.fromkeys((*names[path], name)))
+    return with_values(scene, names, animation=None)

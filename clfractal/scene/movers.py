@@ -1,0 +1,341 @@
+"""From tracks to values: what moves a value of a scene, by keys, an expression or a table."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from typing import Any, TypeAlias
+
+from clfractal.errors import FileError, SceneError, Where
+from clfractal.formulas.catalog import safe_path
+from clfractal.formulas.evaluate import as_function
+from clfractal.formulas.parser import parse
+from clfractal.scene.animation import EASES, Animation, Track
+from clfractal.scene.curves import (
+    Curve,
+    Mix,
+    Monotone,
+    Path,
+    Spans,
+    Values,
+    apart,
+    same,
+    straight,
+    turned,
+    unit,
+)
+from clfractal.scene.flight import Around, Distance, EvenTarget
+from clfractal.scene.model import Scene
+from clfractal.scene.tracks import Target, is_camera_place
+
+At: TypeAlias = Callable[[float], Values]
+"""The value at a place in the film, in frames from its beginning, which may lie between two."""
+
+_NAMES = ("frame", "t", "u")
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """A track, ready to be asked.
+
+    Attributes:
+        name: its key.
+        target: what it moves.
+        at: the values by frame.
+    """
+
+    name: str
+    target: Target
+    at: At
+
+    def value(self, frame: float) -> Any:
+        """The value as the scene has it: a number, or a tuple of them."""
+        found = self.at(frame)
+        if self.target.kind == "whole":
+            return round(found[0])
+        return found if len(found) > 1 else found[0]
+
+    @property
+    def where(self) -> Where:
+        """Its place in the scene."""
+        return Where(path=f"animation.tracks.{self.name}")
+
+
+class Movers:
+    """Makes the movers of an animation."""
+
+    def __init__(self, scene: Scene, animation: Animation, targets: Mapping[str, Target]) -> None:
+        self.scene, self.animation, self.targets = scene, animation, targets
+        self.names = {target.path: name for name, target in targets.items()}
+
+    def made(self) -> tuple[Mover, ...]:
+        """One for each track."""
+        self._refuse_two_for_one()
+        return tuple(self._mover(name) for name in self.targets)
+
+    def _refuse_two_for_one(self) -> None:
+        for name, target in self.targets.items():
+            other = self.names[target.path]
+            for length in range(1, len(target.path)):
+                other = self.names.get(target.path[:length], other)
+            if other != name:
+                raise SceneError(
+                    f"moves what {other!r} moves already", Where(path=f"animation.tracks.{name}")
+                )
+
+    def _mover(self, name: str) -> Mover:
+        track, target = self.animation.tracks[name], self.targets[name]
+        if track.around_target is not None and not is_camera_place(self.scene, target.path):
+            raise self._wrong(name, "around_target", "applies to a camera's position")
+        if track.keys is not None:
+            at = self._by_keys(name)
+        elif track.expression is not None:
+            at = self._by_expression(name, track)
+        else:
+            at = self._by_table(name, track)
+        return Mover(name, target, at)
+
+    def _wrong(self, name: str, key: str, message: str) -> SceneError:
+        return SceneError(message, Where(path=f"animation.tracks.{name}.{key}"))
+
+    def _check_size(self, name: str, key: str, given: int) -> None:
+        try:
+            self.targets[name].check_size(given)
+        except SceneError as error:
+            raise self._wrong(name, key, error.message) from None
+
+    # -- keys
+
+    def _by_keys(self, name: str) -> At:
+        track = self.animation.tracks[name]
+        times, _, closed = self._keys(name)
+        curve = self._flight(name) or self._curve(name)
+        last = times[-1] if len(times) > 1 else None
+        repeat = "loop" if closed and self.animation.loop else track.repeat
+        if repeat == "none" or last is None:
+            return curve.at
+        first, period = times[0], last - times[0]
+
+        def repeated(frame: float) -> Values:
+            turns, rest = divmod(frame - first, period)
+            backwards = repeat == "ping_pong" and turns % 2 == 1
+            return curve.at(first + (period - rest if backwards else rest))
+
+        return repeated
+
+    def _keys(self, name: str) -> tuple[list[float], list[Values], bool]:
+        """Times and values of a track's keys, and whether they are a ring.
+
+        In a film that begins again a track's first key follows its last one, a film's length after it.
+        """
+        track = self.animation.tracks[name]
+        assert track.keys is not None
+        self._check_size(name, "keys.0.value", len(track.keys[0].values))
+        times = [self.animation.frame_of(key) for key in track.keys]
+        values = [key.values for key in track.keys]
+        if self.targets[name].kind == "direction":
+            values = [self._direction(name, index, each) for index, each in enumerate(values)]
+        ends_meet = len(values) > 2 and same(values[0], values[-1])
+        if self.animation.loop and track.repeat == "none" and len(values) > 1:
+            end = times[0] + self.animation.count
+            if times[-1] > end or (times[-1] == end and not ends_meet):
+                key = f"keys.{len(times) - 1}"
+                raise self._wrong(
+                    name,
+                    key,
+                    f"must come before frame {end:g}, where a film that loops is at its first key again",
+                )
+            if times[-1] < end:
+                times.append(end)
+                values.append(values[0])
+            return times, values, True
+        return times, values, ends_meet and track.repeat == "loop"
+
+    def _direction(self, name: str, index: int, value: Values) -> Values:
+        if max(abs(x) for x in value) < 1e-12:
+            raise self._wrong(name, f"keys.{index}.value", "must not be zero")
+        return unit(value)
+
+    def _ways(self, name: str, spans: int) -> list[Values | None]:
+        """How each span between two keys is crossed, as `Spans` takes it."""
+        track = self.animation.tracks[name]
+        assert track.keys is not None
+        ways: list[Values | None] = []
+        for index in range(spans):
+            key = track.keys[min(index, len(track.keys) - 1)]
+            word = key.interpolation or track.interpolation
+            ways.append(() if word == "hold" else None if word == "smooth" else EASES.get(word, key.handles))
+        return ways
+
+    def _curve(self, name: str) -> Curve:
+        """The curve through the keys of a track by itself."""
+        times, values, closed = self._keys(name)
+        kind = self.targets[name].kind
+        ways = self._ways(name, len(times) - 1)
+        if kind == "direction":
+            return _along(times, values, ways, turned, closed=closed)
+        if kind == "place":
+            return _along(times, values, ways, straight, closed=closed)
+        if kind == "scale" and all(number > 0 for each in values for number in each):
+            logarithms = [tuple(log(number) for number in each) for each in values]
+            smooth = _Exponential(_together(times, logarithms, closed=closed))
+            return Spans(times, values, ways, smooth, _geometric)
+        return _components(times, values, ways, closed=closed)
+
+    def _flight(self, name: str) -> Curve | None:
+        """The curve of a camera that flies round its target, or of the target of such a camera; None of anything else."""
+        target = self.targets[name]
+        camera = target.path[:-1]
+        place = self.names.get((*camera, "position"))
+        if place is None or not is_camera_place(self.scene, (*camera, "position")):
+            return None
+        if target.path[-1] not in ("position", "target") or not self._flies_around(place):
+            return None
+        seen = self.names.get((*camera, "target"))
+        times, places, _ = self._keys(place)
+        found = self._around(place, seen)
+        if target.path[-1] == "target":
+            return found.target
+        return Spans(times, places, [None] * (len(times) - 1), found, straight)
+
+    def _flies_around(self, name: str) -> bool:
+        track = self.animation.tracks[name]
+        if track.keys is None or len(track.keys) < 2:
+            return False
+        smooth = all(way is None for way in self._ways(name, len(track.keys) - 1))
+        if track.around_target and not smooth:
+            raise self._wrong(name, "around_target", "applies to a smooth track")
+        return smooth if track.around_target is None else track.around_target
+
+    def _around(self, place: str, seen: str | None) -> Around:
+        times, places, closed = self._keys(place)
+        target = self._seen(place, seen, times, places, closed=closed)
+        for index, (time, at) in enumerate(zip(times, places, strict=True)):
+            if same(target.at(time), at):
+                raise self._wrong(
+                    place, f"keys.{index}.value", f"must differ from the camera's target at frame {time:g}"
+                )
+        return Around(times, places, target, closed=closed)
+
+    def _seen(
+        self, place: str, seen: str | None, times: Sequence[float], places: Sequence[Values], *, closed: bool
+    ) -> Curve:
+        """Where the camera looks."""
+        if seen is None:
+            camera: Any = self.scene
+            for part in self.targets[place].path[:-1]:
+                camera = camera[int(part)] if isinstance(camera, tuple) else getattr(camera, part)
+            return _Constant(camera.target)
+        if self.animation.tracks[seen].keys is None:
+            return _Function(self._mover(seen).at)
+        own_times, targets, own_closed = self._keys(seen)
+        smooth = all(way is None for way in self._ways(seen, len(own_times) - 1))
+        if own_times != list(times) or not smooth or own_closed != closed:
+            return self._curve(seen)
+        ways = [apart(a, b) for a, b in zip(places, targets, strict=True)]
+        if min(ways) <= 0:
+            return self._curve(seen)
+        return EvenTarget(times, targets, Distance(times, ways, closed=closed), closed=closed)
+
+    # -- expressions and tables
+
+    def _by_expression(self, name: str, track: Track) -> At:
+        assert track.expression is not None
+        texts = track.expression if isinstance(track.expression, tuple) else (track.expression,)
+        self._check_size(name, "expression", len(texts))
+        functions = []
+        for index, text in enumerate(texts):
+            path = f"animation.tracks.{name}.expression"
+            where = Where(path=f"{path}.{index}" if isinstance(track.expression, tuple) else path)
+            functions.append(as_function(parse(text, names=_NAMES, where=where, parameters_only=True)))
+        fps, count, loop = self.animation.fps, self.animation.count, self.animation.loop
+        last = count if loop else max(count - 1, 1)
+
+        def at(frame: float) -> Values:
+            values = {"frame": float(frame), "t": frame / fps, "u": frame / last}
+            return tuple(float(function(values)) for function in functions)
+
+        return at
+
+    def _by_table(self, name: str, track: Track) -> At:
+        from clfractal.files.columns import read_columns
+
+        assert track.file is not None
+        assert track.column is not None
+        titles = track.column if isinstance(track.column, tuple) else (track.column,)
+        self._check_size(name, "column", len(titles))
+        where = Where(path=f"animation.tracks.{name}.file")
+        path = safe_path(track.file, self.scene.folder, where)
+        try:
+            table = read_columns(path, dict.fromkeys(titles), track.file)
+        except FileError as error:
+            raise FileError(error.inside(track.file), where) from error
+        columns = [[track.offset + track.factor * number for number in table[title]] for title in titles]
+        rows = len(columns[0])
+        if rows < self.animation.count:
+            raise FileError(
+                f"{track.file} has {rows:,} rows, but the film {self.animation.count:,} frames", where
+            )
+
+        def at(frame: float) -> Values:
+            row = min(int(frame), rows - 1)
+            share, after = frame - row, min(row + 1, rows - 1)
+            return tuple(column[row] + share * (column[after] - column[row]) for column in columns)
+
+        return at
+
+
+class _Constant:
+    def __init__(self, value: Values) -> None:
+        self._value = value
+
+    def at(self, time: float) -> Values:
+        return self._value
+
+
+class _Function:
+    def __init__(self, function: At) -> None:
+        self._function = function
+
+    def at(self, time: float) -> Values:
+        return self._function(time)
+
+
+class _Exponential:
+    """Numbers whose logarithms follow a curve."""
+
+    def __init__(self, logarithms: Curve) -> None:
+        self._logarithms = logarithms
+
+    def at(self, time: float) -> Values:
+        return tuple(exp(number) for number in self._logarithms.at(time))
+
+
+class _Together:
+    """Numbers, each of which follows its own curve."""
+
+    def __init__(self, curves: Sequence[Monotone]) -> None:
+        self._curves = tuple(curves)
+
+    def at(self, time: float) -> Values:
+        return tuple(curve.number(time) for curve in self._curves)
+
+
+def _along(
+    times: Sequence[float], values: Sequence[Values], ways: Sequence[Values | None], mix: Mix, *, closed: bool
+) -> Curve:
+    return Spans(times, values, ways, Path(times, values, mix, closed=closed), mix)
+
+
+def _components(
+    times: Sequence[float], values: Sequence[Values], ways: Sequence[Values | None], *, closed: bool
+) -> Curve:
+    return Spans(times, values, ways, _together(times, values, closed=closed), straight)
+
+
+def _together(times: Sequence[float], values: Sequence[Values], *, closed: bool) -> Curve:
+    return _Together([Monotone(times, each, closed=closed) for each in zip(*values, strict=True)])
+
+
+def _geometric(a: Values, b: Values, share: float) -> Values:
+    """The numbers that are reached from `a` by a part of the factor to `b`."""
+    return tuple(x * (y / x) ** share for x, y in zip(a, b, strict=True))

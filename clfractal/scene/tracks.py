@@ -1,0 +1,222 @@
+"""Which values of a scene can move, and how: the schema's fields by dotted keys."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, TypeAlias
+
+from clfractal.errors import SceneError, unknown_name
+from clfractal.files.marks import split_path
+from clfractal.scene.base import Section
+from clfractal.scene.camera_base import CameraBase
+from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
+from clfractal.scene.formula import FormulaSpec
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.plane import Plane, Transform
+from clfractal.scene.stereo import StereoPlane
+from clfractal.scene.surface import Ball
+from clfractal.scene.volume import Box, Zoom
+
+Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "color"]
+"""How a value goes from key to key.
+
+`number`: as it is, angles too, which are never wrapped; `whole`: the same, then rounded; `scale`: in the logarithm;
+`place`: on a path in space; `direction`: on the sphere; `color`: each component as a number.
+"""
+
+# What is a factor to the eye, so that equal factors in equal times look even.
+_SCALES: tuple[tuple[type[Section], frozenset[str]], ...] = (
+    (PerspectiveCamera, frozenset({"fov", "focus_distance", "f_number"})),
+    (OrthographicCamera, frozenset({"height"})),
+    (Ball, frozenset({"radius"})),
+    (Box, frozenset({"size"})),
+    (Zoom, frozenset({"scale"})),
+    (Plane, frozenset({"width", "height"})),
+    (Transform, frozenset({"scale"})),
+    (StereoPlane, frozenset({"width", "height"})),
+)
+_DIRECTIONS = frozenset({"direction", "normal", "up"})
+_PLACES = frozenset({"position", "target", "center", "julia"})
+# Whole numbers between which a picture's subject changes, and not how it is made.
+_WHOLE: tuple[tuple[type[Section], str], ...] = (
+    (FormulaSpec, "iterations"),
+    (CutPlaneRenderer, "iterations"),
+    (CutPlane, "iterations"),
+)
+# Sections that say what a film is, and not what is in its pictures.
+_FIXED: Mapping[str, str] = {
+    "version": "is the version of the file",
+    "image": "is the same for all frames of a film",
+    "output": "says how files are written; only output.exposure can move",
+    "bookmarks": "does not change the picture",
+    "animation": "says how the others move",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A value of a scene that moves.
+
+    Attributes:
+        path: the keys that lead to it.
+        kind: how it goes from key to key.
+        size: of how many numbers it consists; None: of one or of three.
+    """
+
+    path: tuple[str, ...]
+    kind: Kind
+    size: int | None
+
+    def check_size(self, given: int) -> None:
+        """Raises SceneError, without a place, if a value of so many numbers does not fit."""
+        if self.size not in (None, given):
+            wanted = "a number" if self.size == 1 else f"a list of {self.size} numbers"
+            raise SceneError(
+                f"must be {wanted} for {'.'.join(self.path)}, got {given if given > 1 else 'one'}"
+            )
+
+
+def target_of(scene: Scene, name: str) -> Target:
+    """The value that a track of this name moves.
+
+    Raises:
+        SceneError: there is none, or it cannot move; without a place.
+    """
+    path = split_path(name)
+    if not path:
+        raise SceneError("must name a value, such as camera.position")
+    if path[0] in _FIXED and path != ("output", "exposure"):
+        raise SceneError(f"cannot move: it {_FIXED[path[0]]}")
+    owner: Any = None
+    value: Any = scene
+    for depth in range(len(path)):
+        owner, value = value, _below(value, path, depth)
+    kind = _kind(scene, owner, path, value)
+    return Target(path, kind, _size(owner, path[-1], kind, value))
+
+
+def _below(value: Any, path: Sequence[str], depth: int) -> Any:
+    """What is under a key of a value."""
+    part, shown = path[depth], ".".join(path[:depth])
+    if isinstance(value, Section):
+        if part not in _keys_of(value):
+            raise SceneError(_unknown(part, shown, _keys_of(value)))
+        return getattr(value, part)
+    if isinstance(value, Mapping):
+        return value.get(part)  # whether there is such a parameter the formula tells
+    if isinstance(value, tuple):
+        if not part.isdecimal() or int(part) >= len(value):
+            entries = f"entries 0 to {len(value) - 1}" if value else "no entries"
+            raise SceneError(f"cannot move: {shown} has {entries}")
+        return value[int(part)]
+    if value is None:
+        raise SceneError(f"cannot move: {shown} is null; give it a value first")
+    raise SceneError(f"cannot move: {shown} is a single value, so it has no key {part!r}")
+
+
+def _keys_of(section: Section) -> list[str]:
+    """The keys of a section that was read; those that are other words for them have done their work."""
+    return [key for key, field in type(section).model_fields.items() if not field.exclude]
+
+
+def _unknown(part: str, shown: str, known: Sequence[str]) -> str:
+    return unknown_name(f"key of {shown}" if shown else "key", part, known)
+
+
+def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
+    """How the value moves; SceneError if it does not."""
+    key = path[-1]
+    if path[-2:-1] == ("parameters",):
+        return "whole" if _is_whole(scene, path) else "number"
+    if isinstance(owner, Section):
+        if any(isinstance(owner, cls) and key == name for cls, name in _WHOLE):
+            return "whole"
+        if any(isinstance(owner, cls) and key in keys for cls, keys in _SCALES):
+            return "scale"
+        if value is None:
+            annotation = str(type(owner).model_fields[key].annotation)
+            if "float" not in annotation or "Literal" in annotation:
+                raise SceneError("cannot move: it is null, and would be no number")
+            return "direction" if key in _DIRECTIONS else "place" if key in _PLACES else "number"
+    if isinstance(value, (Section, Mapping)):
+        known = _keys_of(value) if isinstance(value, Section) else list(value)
+        raise SceneError(f"cannot move as a whole: name one of its keys, {', '.join(known)}")
+    if isinstance(value, str) and not (isinstance(owner, Section) and key == "exposure"):
+        raise SceneError(f"cannot move: it is a word, {value[:40]!r}")
+    if isinstance(value, bool):
+        raise SceneError("cannot move: it is true or false")
+    if isinstance(value, int):
+        raise SceneError("cannot move: it is a whole number, and decides how the picture is made")
+    if isinstance(value, tuple):
+        if not value or not all(isinstance(entry, float) for entry in value):
+            raise SceneError("cannot move as a whole: name one of its entries, from 0 on")
+        return "direction" if key in _DIRECTIONS else "place" if key in _PLACES else "color"
+    return "number"
+
+
+def _is_whole(scene: Scene, path: tuple[str, ...]) -> bool:
+    """Whether a formula's parameter is a whole number."""
+    link = int(path[2]) if path[1] == "chain" else 0
+    known = {each.name: each for each in scene.chain.links[link].bound.formula.parameters}
+    if path[-1] not in known:
+        raise SceneError(unknown_name("parameter", path[-1], list(known)))
+    return known[path[-1]].type == "int"
+
+
+def _size(owner: Any, key: str, kind: Kind, value: Any) -> int | None:
+    if isinstance(owner, Box) and key == "size":
+        return None
+    if isinstance(value, tuple):
+        return len(value)
+    return 3 if value is None and kind in ("place", "direction") else 1
+
+
+def with_values(scene: Scene, values: Mapping[tuple[str, ...], Any], **others: Any) -> Scene:
+    """The scene with other values at some paths, all at once.
+
+    Args:
+        others: sections that are replaced, by key.
+
+    Raises:
+        SceneError: a value is wrong; the path says which.
+    """
+    tree: dict[str, Any] = {}
+    for path, value in values.items():
+        below = tree
+        for part in path[:-1]:
+            below = below.setdefault(part, {})
+        below[path[-1]] = _Leaf(value)
+    update = {key: _changed(getattr(scene, key), below, key) for key, below in tree.items()}
+    return scene.model_copy(update={**update, **others})
+
+
+@dataclass(frozen=True, slots=True)
+class _Leaf:
+    value: Any
+
+
+def _changed(value: Any, tree: Any, shown: str) -> Any:
+    """A value with what the tree says in the place of its parts."""
+    if isinstance(tree, _Leaf):
+        return tree.value
+    if isinstance(value, tuple):
+        return tuple(
+            _changed(entry, tree[str(index)], f"{shown}.{index}") if str(index) in tree else entry
+            for index, entry in enumerate(value)
+        )
+    if isinstance(value, Mapping):
+        return {**value, **{key: _changed(value.get(key), tree[key], f"{shown}.{key}") for key in tree}}
+    update = {key: _changed(getattr(value, key), below, f"{shown}.{key}") for key, below in tree.items()}
+    try:
+        return value.model_copy(update=update)
+    except SceneError as error:
+        path = ".".join(part for part in (shown, error.where.path) if part)
+        raise SceneError(error.message, replace(error.where, path=path)) from error
+
+
+def is_camera_place(scene: Scene, path: Sequence[str]) -> bool:
+    """Whether a path leads to the place of a camera, which has a target."""
+    value: Any = scene
+    for depth in range(len(path) - 1):
+        value = _below(value, path, depth)
+    return isinstance(value, CameraBase) and path[-1] == "position"

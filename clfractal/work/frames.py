@@ -1,0 +1,137 @@
+"""The pictures of a film, one after the other, from one engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from clfractal import arguments
+from clfractal.errors import SceneError, Where
+from clfractal.scene.load import as_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.movement import movement_of
+from clfractal.work.engine import Engine
+
+if TYPE_CHECKING:
+    from clfractal.pictures.film import Film
+    from clfractal.work.run import ProgressCallback
+
+
+def at_frame(scene: Scene | str | Path | Mapping[str, Any], frame: float) -> Scene:
+    """A scene as it is at a frame of its animation: a still, with all values in the places of the tracks.
+
+    Args:
+        scene: a Scene, or what `load_scene` takes.
+        frame: counted from 0; it may lie between two frames.
+
+    Raises:
+        SceneError: the scene has no animation, the film no such frame, or a value is out of its range then.
+    """
+    found = as_scene(scene)
+    movement = movement_of(found)
+    number = arguments.number("frame", frame, 0, movement.animation.count)
+    return movement.scene(number)
+
+
+class FilmScenes:
+    """The scenes of a film's frames, as they are rendered.
+
+    What a scene leaves to be measured is measured in frame 0 where all frames must have the same (`output.exposure`,
+    `stereo.fit`), whichever frames are rendered; what a camera is focused on is measured in each frame.
+
+    Raises:
+        SceneError, FormulaError, FileError: the scene has no animation, or a track is wrong.
+    """
+
+    def __init__(self, engine: Engine, scene: Scene) -> None:
+        self._engine, self.movement = engine, movement_of(scene)
+        self._first: Scene | None = None
+
+    @property
+    def count(self) -> int:
+        """The number of frames."""
+        return self.movement.animation.count
+
+    def scene(self, number: int) -> Scene:
+        """The scene of a frame.
+
+        Raises:
+            SceneError, FormulaError: a value is out of its range then; at its track.
+            DeviceError, KernelBuildError: the quick look failed that frame 0 needs.
+        """
+        found = self.movement.scene(number)
+        update: dict[str, Any] = {}
+        if isinstance(found.output.exposure, str):
+            exposure = self._measured().output.exposure
+            update["output"] = found.output.model_copy(update={"exposure": exposure})
+        if found.stereo is not None and found.stereo.fit is not None:
+            update["stereo"] = self._measured().stereo
+        return found.model_copy(update=update) if update else found
+
+    def _measured(self) -> Scene:
+        """Frame 0 with numbers in the place of what is to be measured."""
+        if self._first is None:
+            self._first = self._engine.settled(self.movement.scene(0))
+        return self._first
+
+
+def frames(
+    scene: Scene | str | Path | Mapping[str, Any],
+    device: str | None = None,
+    progress: ProgressCallback | None = None,
+    *,
+    numbers: Iterable[int] | None = None,
+    precision: str | None = None,
+    samples: int | None = None,
+    channels: Sequence[str] | None = None,
+    quality: str | None = None,
+) -> Iterator[tuple[int, Film]]:
+    """Renders the frames of a scene's animation, one after the other, in one engine.
+
+        for number, film in clfractal.frames("dive.yaml"):
+            film.save(f"frame_{number:04}.exr")
+
+    Nothing is rendered before the first frame is asked for; who stops early loses nothing.
+
+    Args:
+        scene: a Scene, or what `load_scene` takes; it needs an `animation`.
+        numbers: the wanted frames, in any order, counted from 0; None: all.
+        device, progress, precision, samples, channels, quality: as for `clfractal.render`, for each frame.
+
+    Returns:
+        An iterator of pairs: the frame's number, and its film.
+
+    Raises:
+        SceneError, FormulaError: the scene, its animation or a setting is wrong.
+        DeviceError, KernelBuildError: as for `clfractal.render`.
+    """
+    found = as_scene(scene)
+    wanted = _wanted(numbers, movement_of(found).animation.count)
+
+    def rendered() -> Iterator[tuple[int, Film]]:
+        with Engine(device) as engine:
+            scenes = FilmScenes(engine, found)
+            for number in wanted:
+                film = engine.render(
+                    scenes.scene(number),
+                    progress,
+                    precision=precision,
+                    samples=samples,
+                    channels=channels,
+                    quality=quality,
+                )
+                yield number, film
+
+    return rendered()
+
+
+def _wanted(numbers: Iterable[int] | None, count: int) -> Sequence[int]:
+    """The frames to render, checked."""
+    if numbers is None:
+        return range(count)
+    if isinstance(numbers, (str, bytes)) or not isinstance(numbers, Iterable):
+        raise SceneError(
+            f"must be a list of numbers of frames, got {arguments.shown(numbers)}", Where(path="numbers")
+        )
+    return [arguments.whole("numbers", number, 0, count - 1) for number in numbers]

@@ -1,0 +1,342 @@
+"""Movement in a scene file: what can move and how, what is refused and where, and the scene of each frame."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import clfractal
+from clfractal.errors import ClfractalError
+from clfractal.scene.load import dump_scene, load_scene
+from clfractal.scene.model import Scene
+from clfractal.scene.movement import movement_of
+
+HEAD = """\
+version: 1
+formula: {name: mandelbulb, iterations: 8}
+camera: {position: [0, -3, 0.5], fov: 45}
+"""
+
+
+def moving(tracks: dict[str, Any], *, base: dict[str, Any] | None = None, **animation: Any) -> Scene:
+    given: dict[str, Any] = {"fps": 10, "frames": 21, "tracks": tracks, **animation}
+    scene = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": {"position": [0, -3, 0]}}
+    return load_scene({**scene, **(base or {}), "animation": given})
+
+
+def keys(*pairs: tuple[float, Any], **others: Any) -> dict[str, Any]:
+    return {"keys": [{"frame": frame, "value": value} for frame, value in pairs], **others}
+
+
+def values(scene: Scene, name: str) -> list[Any]:
+    assert scene.animation is not None
+    return [movement_of(scene).values(frame)[name] for frame in range(scene.animation.count)]
+
+
+def test_times_in_seconds_and_frames() -> None:
+    track = {"keys": [{"frame": 0, "value": 1}, {"time": 1.0, "value": 3}], "interpolation": "linear"}
+    found = values(moving({"lights.0.intensity": track}), "lights.0.intensity")
+    assert found[5] == 2
+    assert found[10:] == [3] * 11
+    assert moving({}, frames=None, duration="1.5 min", fps=2).animation.count == 180  # type: ignore[union-attr]
+    assert moving({}, frames=None, duration=0.26).animation.count == 3  # type: ignore[union-attr]
+
+
+def test_each_interpolation_meets_the_keys() -> None:
+    for word in ("hold", "linear", "smooth", "ease", "ease_in", "ease_out"):
+        found = values(
+            moving({"material.ambient": keys((0, 0.1), (10, 0.5), (20, 0.3), interpolation=word)}),
+            "material.ambient",
+        )
+        assert (found[0], found[10], found[20]) == (0.1, 0.5, 0.3), word
+        assert all(0.1 <= value <= 0.5 for value in found)
+        assert (found[5] == 0.1) == (word == "hold")
+
+
+def test_a_key_may_have_a_way_of_its_own() -> None:
+    track = keys((0, 0.0), (10, 1.0), (20, 0.0), interpolation="hold")
+    track["keys"][1] |= {"interpolation": "bezier", "handles": [0.5, 0, 0.5, 1]}
+    found = values(moving({"material.ambient": track}), "material.ambient")
+    assert set(found[:10]) == {0.0}
+    assert found[15] == pytest.approx(0.5)
+    assert found[12] > 0.85  # slow at first
+
+
+def test_scales_go_by_factors() -> None:
+    found = values(moving({"camera.fov": keys((0, 90.0), (20, 0.009))}), "camera.fov")
+    np.testing.assert_allclose(np.divide(found[1:], found[:-1]), 1e-4 ** (1 / 20), rtol=1e-9)
+    linear = values(
+        moving({"camera.fov": keys((0, 90.0), (20, 0.009), interpolation="linear")}), "camera.fov"
+    )
+    np.testing.assert_allclose(linear, found, rtol=1e-9)
+
+
+def test_angles_are_never_wrapped() -> None:
+    base = {"environment": {"name": "studio"}}
+    found = values(
+        moving({"environment.rotation": keys((0, -300.0), (20, 300.0))}, base=base), "environment.rotation"
+    )
+    np.testing.assert_allclose(found, np.linspace(-300, 300, 21))
+
+
+def test_directions_go_on_the_sphere() -> None:
+    found = values(
+        moving({"lights.0.direction": keys((0, [5, 0, 0]), (20, [0, 0, -1]))}), "lights.0.direction"
+    )
+    for frame, direction in enumerate(found):
+        angle = math.pi / 2 * frame / 20
+        np.testing.assert_allclose(direction, [math.cos(angle), 0, -math.sin(angle)], atol=1e-12)
+
+
+def test_whole_numbers_are_rounded() -> None:
+    found = values(moving({"formula.iterations": keys((0, 2), (20, 12))}), "formula.iterations")
+    assert [type(each) for each in found] == [int] * 21
+    assert found == [round(2 + frame / 2) for frame in range(21)]
+
+
+def test_one_component_of_a_place_moves_alone() -> None:
+    scene = moving({"camera.position.2": keys((0, 0.0), (20, 2.0))})
+    assert clfractal.at_frame(scene, 10).camera.position == (0, -3, 1)
+
+
+def test_what_is_null_may_move() -> None:
+    scene = moving(
+        {"formula.julia": keys((0, [0.0, 0, 0]), (20, [0.4, 0, 0])), "camera.focus_distance": keys((0, 2.0))}
+    )
+    found = clfractal.at_frame(scene, 10)
+    assert found.formula.julia == pytest.approx((0.2, 0, 0))
+    assert found.animation is None
+
+
+@pytest.mark.parametrize("frame", [0, 1, 7.5, 20])
+def test_expressions_know_frame_time_and_part(frame: float) -> None:
+    track = {"expression": ["frame", "2*t", "where(u < 0.5, u, 1 - u)"]}
+    u = frame / 20
+    expected = (frame, 2 * frame / 10, u if u < 0.5 else 1 - u)
+    found = movement_of(moving({"camera.target": track})).values(frame)["camera.target"]
+    assert found == pytest.approx(expected)
+
+
+def test_in_a_loop_the_part_does_not_reach_one() -> None:
+    scene = moving({"coloring.offset": {"expression": "u"}}, loop=True, frames=20)
+    np.testing.assert_allclose(values(scene, "coloring.offset"), np.arange(20) / 20)
+
+
+def test_a_loop_has_no_seam() -> None:
+    scene = moving({"coloring.offset": keys((0, 0.0), (7, 1.0), (13, 0.2))}, loop=True, frames=20)
+    at = [movement_of(scene).values(frame)["coloring.offset"] for frame in (19.999, 19.9999, 0.0, 0.0001)]
+    assert at[1] == pytest.approx(0, abs=1e-4)
+    before, after = (at[1] - at[0]) / 0.0009, (at[3] - at[2]) / 0.0001
+    assert before == pytest.approx(after, abs=1e-3)
+    # A first key that is not at the film's first frame, too.
+    later = moving({"coloring.offset": keys((5, 0.0), (10, 1.0))}, loop=True, frames=20)
+    found = values(later, "coloring.offset")
+    assert found[5] == 0
+    assert found[10] == 1
+    # From the key at frame 10 to the first one, at frame 25, frame 20 is two thirds of the way; both are extremes.
+    assert found[0] == pytest.approx(1 - (3 * (2 / 3) ** 2 - 2 * (2 / 3) ** 3))
+
+
+def test_tracks_that_repeat() -> None:
+    there = keys((2, 0.0), (6, 1.0), interpolation="linear")
+    looped = values(moving({"coloring.offset": {**there, "repeat": "loop"}}), "coloring.offset")
+    assert looped[2:14] == [0, 0.25, 0.5, 0.75] * 3
+    back = values(moving({"coloring.offset": {**there, "repeat": "ping_pong"}}), "coloring.offset")
+    assert back[2:18] == [0, 0.25, 0.5, 0.75, 1, 0.75, 0.5, 0.25] * 2
+
+
+def test_a_dive_comes_nearer_by_equal_factors() -> None:
+    target = [0.2, -0.7, 0.1]
+    end = [0.2, -0.7 - 3e-5, 0.1]
+    base = {"camera": {"position": [0, -3, 0], "target": target}}
+    scene = moving({"camera.position": keys((0, [0.2, -3.7, 0.1]), (20, end))}, base=base)
+    away = [math.dist(place, target) for place in values(scene, "camera.position")]
+    np.testing.assert_allclose(np.divide(away[1:], away[:-1]), 1e-5 ** (1 / 20), rtol=1e-6)
+    plain = keys((0, [0.2, -3.7, 0.1]), (20, end), around_target=False)
+    straight = values(moving({"camera.position": plain}, base=base), "camera.position")
+    np.testing.assert_allclose(np.diff(np.array(straight)[:, 1]), (3 - 3e-5) / 20)
+
+
+def test_position_and_target_fly_together() -> None:
+    tracks = {
+        "camera.position": keys((0, [0.0, -3, 0]), (20, [0.65, -0.753, 0.5])),
+        "camera.target": keys((0, [0.0, 0, 0]), (20, [0.65, -0.75, 0.5])),
+    }
+    scene = moving(tracks)
+    seen = [clfractal.at_frame(scene, frame).camera for frame in range(21)]
+    assert seen[0].position == (0, -3, 0)
+    assert seen[-1].position == (0.65, -0.753, 0.5)
+    steps = [
+        math.dist(a.target, b.target)
+        / math.sqrt(math.dist(a.position, a.target) * math.dist(b.position, b.target))
+        for a, b in pairwise(seen)
+    ]
+    assert max(steps) < 1.01 * min(steps)
+
+
+def test_a_table_moves_a_value(tmp_path: Path) -> None:
+    rows = "\n".join(f"{frame}, {0.1 * frame}" for frame in range(21))
+    (tmp_path / "sound.csv").write_text(f"frame, bass\n{rows}\n")
+    track = "{file: sound.csv, column: bass, factor: 2, offset: 1}"
+    text = f"{HEAD}animation: {{frames: 21, tracks: {{lights.0.intensity: {track}}}}}\n"
+    (tmp_path / "scene.yaml").write_text(text)
+    scene = load_scene(tmp_path / "scene.yaml")
+    assert tmp_path / "sound.csv" in scene.files
+    np.testing.assert_allclose(values(scene, "lights.0.intensity"), 1 + 0.2 * np.arange(21))
+    assert clfractal.at_frame(scene, 2.5).lights[0].intensity == pytest.approx(1.5)
+
+
+def test_parameters_that_move_are_live_and_need_no_new_text() -> None:
+    scene = moving({"formula.parameters.power": keys((0, 8), (20, 2.5))})
+    assert clfractal.at_frame(scene, 3).formula.live == ("power",)
+    chain = {"formula": {"chain": [{"name": "menger_sponge"}, {"name": "mandelbulb"}]}}
+    moved = moving({"formula.chain.1.parameters.power": keys((0, 6), (20, 9))}, base=chain)
+    links = clfractal.at_frame(moved, 20).formula.chain
+    assert links is not None
+    assert links[1].live == ("power",)
+    assert links[1].parameters == {"power": 9}
+    assert links[0].live == ()
+
+
+def test_it_loads_back_to_an_equal_scene() -> None:
+    scene = moving(
+        {
+            "camera.fov": keys((0, 40), (20, 20), repeat="loop"),
+            "formula.parameters.power": {"expression": "8"},
+        }
+    )
+    assert load_scene(dump_scene(scene)) == scene
+
+
+# --- what is refused ---
+
+REFUSED = {
+    "camera.fow: {expression: '1'}": "unknown key of camera 'fow'; did you mean 'fov'?",
+    "camera: {expression: '1'}": "cannot move as a whole: name one of its keys, position, target, up, projection, fov,"
+    " f_number, focus_distance, focus, focus_on, sensor_height",
+    "image.width: {expression: '1'}": "cannot move: it is the same for all frames of a film",
+    "output.quality: {expression: '1'}": "cannot move: it says how files are written; only output.exposure can move",
+    "renderer.samples: {expression: '1'}": "cannot move: it is a whole number, and decides how the picture is made",
+    "renderer.type: {expression: '1'}": "cannot move: it is a word, 'surface'",
+    "lights.0.shadow: {expression: '1'}": "cannot move: it is true or false",
+    "lights.2.intensity: {expression: '1'}": "cannot move: lights has entries 0 to 0",
+    "fog.density: {expression: '1'}": "cannot move: fog is null; give it a value first",
+    "camera.fov.x: {expression: '1'}": "cannot move: camera.fov is a single value, so it has no key 'x'",
+    "formula.parameters.powr: {expression: '1'}": "unknown parameter 'powr'; did you mean 'power'?",
+    "camera.fov: {}": "needs one of keys, expression and file",
+    "camera.fov: {column: a, expression: '1'}": "needs file and column together",
+    "camera.fov: {expression: '200*u'}": "must be at least 1e-06, got 0.0 at frame 0",
+    "camera.fov: {expression: '10 + 200*u'}": "must be below 180, got 210.0 at frame 20",
+    "camera.fov: {expression: '1/(frame - 7)'}": "is not a finite number at frame 7",
+    "formula.parameters.power: {expression: '8*t'}": "must be at least 1.5, got 0 at frame 0",
+    "camera.target: {expression: ['0', '-3', '0.5']}": "must differ from camera.position",
+    "lights.0.rays: {expression: '1'}": "cannot move: it is null, and would be no number",
+}
+
+
+@pytest.mark.parametrize("track", REFUSED)
+def test_a_track_that_cannot_be_is_refused_at_its_line(track: str) -> None:
+    with pytest.raises(ClfractalError) as caught:
+        load_scene(f"{HEAD}animation:\n  frames: 21\n  tracks:\n    {track}\n")
+    assert REFUSED[track] in caught.value.message
+    assert caught.value.where.line in (4, 5, 7)
+
+
+WRONG_KEYS = {
+    "[{frame: 5, value: 1}, {frame: 5, value: 2}]": (
+        "keys.1",
+        "must come after the key before it: frame 5 is at the same time as frame 5",
+    ),
+    "[{frame: 5, value: 1}, {time: 0.1, value: 2}]": (
+        "keys.1",
+        "must come after the key before it: frame 3 is before frame 5",
+    ),
+    "[{value: 1}]": ("keys.0", "needs frame or time"),
+    "[{frame: 1, time: 1, value: 1}]": ("keys.0", "needs one of frame and time"),
+    "[{frame: 1, value: [1, 2]}]": ("keys.0.value", "must be a number for camera.fov, got 2"),
+    "[{frame: 1, value: 1}, {frame: 2, value: [1, 2]}]": (
+        "keys.1.value",
+        "must be a number, as that of the first key",
+    ),
+    "[{frame: 1, value: 1, interpolation: bezier}, {frame: 2, value: 1}]": (
+        "keys.0",
+        "needs handles: [x1, y1, x2, y2], as for bezier",
+    ),
+    "[{frame: 1, value: 1, handles: [0, 0, 2, 1]}]": ("keys.0.handles.2", "must be at most 1, got 2"),
+    "[]": ("keys", "must not be empty"),
+}
+
+
+@pytest.mark.parametrize("listed", WRONG_KEYS)
+def test_wrong_keys_are_told_at_their_place(listed: str) -> None:
+    path, message = WRONG_KEYS[listed]
+    with pytest.raises(ClfractalError) as caught:
+        load_scene(f"{HEAD}animation:\n  frames: 21\n  tracks:\n    camera.fov: {{keys: {listed}}}\n")
+    assert caught.value.message == message
+    assert caught.value.where.path == f"animation.tracks.camera.fov.{path}"
+    assert caught.value.where.line == 7
+
+
+def test_one_value_has_one_track() -> None:
+    with pytest.raises(ClfractalError, match=r"moves what 'camera\.position' moves already"):
+        moving({"camera.position": keys((0, [0, -3, 0])), "camera.position.1": keys((0, -2.0))})
+
+
+def test_around_target_is_for_smooth_positions() -> None:
+    with pytest.raises(ClfractalError, match="applies to a camera's position"):
+        moving({"camera.fov": keys((0, 40), around_target=True)})
+    turn = keys((0, [0, -3, 0]), (5, [3, 0, 0]), around_target=True, interpolation="linear")
+    with pytest.raises(ClfractalError, match="applies to a smooth track"):
+        moving({"camera.position": turn})
+    with pytest.raises(ClfractalError, match="must differ from the camera's target at frame 5"):
+        moving({"camera.position": keys((0, [0, -3, 0]), (5, [0, 0, 0]), (9, [3, 0, 0]))})
+
+
+TABLES = {
+    "bass\n" + "1\n" * 20: "sound.csv has 20 rows, but the film 21 frames",
+    "treble\n" + "1\n" * 21: "sound.csv:1: unknown column 'bass'; known: treble",
+    "bass\n1\nx\n": "sound.csv:3: column 'bass' must hold finite numbers, got 'x'",
+    "a,bass\n1\n": "sound.csv:2: column 'bass' must hold finite numbers, got ''",
+    'bass\n"1': "sound.csv:2: is no CSV table: unexpected end of data",
+}
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_wrong_tables(table: str, tmp_path: Path) -> None:
+    (tmp_path / "sound.csv").write_text(table)
+    tracks = "{lights.0.intensity: {file: sound.csv, column: bass}}"
+    (tmp_path / "scene.yaml").write_text(f"{HEAD}animation: {{frames: 21, tracks: {tracks}}}\n")
+    with pytest.raises(ClfractalError) as caught:
+        load_scene(tmp_path / "scene.yaml")
+    assert caught.value.message == TABLES[table]
+    assert caught.value.where.path == "animation.tracks.lights.0.intensity.file"
+    assert caught.value.where.line == 4
+
+
+def test_a_table_stays_in_the_scenes_folder(tmp_path: Path) -> None:
+    tracks = {"lights.0.intensity": {"file": "../sound.csv", "column": "bass"}}
+    with pytest.raises(ClfractalError, match="must be a path inside the scene's folder"):
+        moving(tracks)
+
+
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=6),
+    st.sampled_from(["hold", "linear", "smooth", "ease"]),
+    st.sampled_from(["none", "loop", "ping_pong"]),
+    st.booleans(),
+)
+def test_any_keys_make_a_film(numbers: list[float], word: str, repeat: str, loop: bool) -> None:
+    listed = [(3 * index, number) for index, number in enumerate(numbers)]
+    scene = moving({"coloring.offset": keys(*listed, interpolation=word, repeat=repeat)}, loop=loop)
+    found = values(scene, "coloring.offset")
+    low, high = min(numbers), max(numbers)
+    slack = 1e-9 * max(abs(low), abs(high))
+    assert all(low - slack <= value <= high + slack for value in found)
+    assert found[0] == numbers[0]

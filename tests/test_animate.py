@@ -1,0 +1,192 @@
+"""`clfractal animate` and `clfractal.frames`: each frame is the picture of its own scene, whole or not there."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.commands.animate import Part, frame_file
+from clfractal.errors import SceneError
+from clfractal.files.exr import read_exr
+from clfractal.work import run as work
+from tests.shell import InProcess, command, environment
+
+SCENE = """version: 1
+formula: {name: mandelbulb, iterations: 6}
+image: {width: 40, height: 24}
+camera: {position: [0, -3, 0]}
+animation:
+  fps: 10
+  frames: 5
+  tracks:
+    camera.position: {keys: [{frame: 0, value: [0, -3, 0]}, {frame: 4, value: [1.6, -2, 0.8]}]}
+    formula.parameters.power: {expression: "8 - 2*u"}
+"""
+
+
+@pytest.fixture
+def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(SCENE)
+    return InProcess(capfd)
+
+
+def names() -> list[str]:
+    return sorted(path.name for path in Path().iterdir() if path.name != "scene.yaml")
+
+
+def test_each_frame_is_the_picture_of_its_scene(clf: InProcess) -> None:
+    ended = clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png")
+    assert ended.status == 0, ended
+    assert ended.err.splitlines()[-1].startswith("f_00.exr to f_04.exr: 5 frames, ")
+    assert names() == [*(f"f_0{i}.exr" for i in range(5)), *(f"p{i}.png" for i in range(5))]
+    films = dict(clfractal.frames("scene.yaml"))
+    assert list(films) == [0, 1, 2, 3, 4]
+    for number, film in films.items():
+        pixels, _ = read_exr(f"f_0{number}.exr")
+        np.testing.assert_array_equal(pixels["Z"], film["Z"])
+        still = clfractal.load_scene(f"f_0{number}.exr")
+        assert still.animation is None
+        assert still.formula.parameters == {"power": 8 - 2 * number / 4}
+        np.testing.assert_array_equal(clfractal.render(still)["Z"], film["Z"])
+    assert not np.array_equal(films[0]["Z"], films[1]["Z"])
+
+
+def test_a_part_of_the_film_and_the_default_name(clf: InProcess) -> None:
+    assert clf("animate", "scene.yaml", "--frames", "1-4:2", "--quiet").err == ""
+    assert names() == ["scene_0001.png", "scene_0003.png"]
+    some = [number for number, _ in clfractal.frames("scene.yaml", numbers=[3, 0])]
+    assert some == [3, 0]
+
+
+def test_render_shows_the_scene_as_it_stands(clf: InProcess) -> None:
+    assert clf("render", "scene.yaml", "-o", "a.exr").status == 0
+    still = clfractal.load_scene(SCENE).model_copy(update={"animation": None})
+    np.testing.assert_array_equal(read_exr("a.exr")[0]["Z"], clfractal.render(still)["Z"])
+    assert clfractal.load_scene("a.exr").animation == clfractal.load_scene(SCENE).animation
+
+
+def test_programs_are_compiled_once_for_all_frames(clf: InProcess) -> None:
+    with clfractal.Engine() as engine:
+        engine.render(clfractal.at_frame(SCENE, 0))
+        before = engine.device.loaded.building.milliseconds
+        for frame in (1, 2.5, 4):
+            engine.render(clfractal.at_frame(SCENE, frame))
+        assert engine.device.loaded.building.milliseconds == before
+
+
+def test_exposure_is_measured_once_for_all_frames(clf: InProcess) -> None:
+    scene = clfractal.load_scene(SCENE, overrides=["output.exposure=auto", "material.color=[0.1, 0.1, 0.1]"])
+    stops = {film.header["exposure"] for _, film in clfractal.frames(scene, numbers=[4, 2, 0])}
+    assert len(stops) == 1
+    assert stops != {0.0}
+
+
+def test_interrupted_the_finished_frames_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    render, calls = work.run, []
+
+    def interrupted(*arguments: Any, **settings: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+        return render(*arguments, **settings)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("clfractal.commands.numbered.run", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            clf("animate", "scene.yaml", "-o", "f#.png")
+    assert names() == ["f0.png", "f1.png"]
+    kept = [Path(name).stat().st_mtime_ns for name in names()]
+    ended = clf("animate", "scene.yaml", "-o", "f#.png", "--resume")
+    assert "f0.png to f4.png: 3 frames, 2 were there already, " in ended.err
+    assert [Path(name).stat().st_mtime_ns for name in names()[:2]] == kept
+    assert clf("animate", "scene.yaml", "-o", "f#.png", "--resume").err == (
+        "f0.png to f4.png: all 5 frames were there already\n"
+    )
+
+
+def test_frames_of_another_scene_are_refused(clf: InProcess) -> None:
+    assert clf("animate", "scene.yaml", "-o", "f#.png").status == 0
+    before = Path("f0.png").read_bytes()
+    ended = clf("animate", "scene.yaml", "-o", "f#.png", "--resume", "--set", "material.ambient=0.3")
+    assert ended.is_one_line(2, "f0.png: is a frame of another scene, or of other settings; remove it")
+    Path("f2.png").write_bytes(before[:100])
+    assert clf("animate", "scene.yaml", "-o", "f#.png", "--resume").is_one_line(2, "f2.png: ")
+    assert Path("f0.png").read_bytes() == before
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL")
+def test_killed_at_any_time_it_goes_on(clf: InProcess) -> None:
+    """Frames of 64 tiles that keep them while they are in work; the film is the same as without kills."""
+    size = ["--size", "512x512", "--set", "formula.iterations=12", "--samples", "4"]
+    for seconds in (1.5, 2.5, 3.5):
+        running = subprocess.Popen(
+            command("animate", "scene.yaml", "-o", "k#.exr", "--resume", "--quiet", *size), env=environment()
+        )
+        time.sleep(seconds)
+        running.send_signal(signal.SIGKILL)
+        running.wait()
+        for file in Path().glob("k?.exr"):
+            read_exr(file)
+    assert clf("animate", "scene.yaml", "-o", "k#.exr", "--resume", *size).status == 0
+    assert clf("animate", "scene.yaml", "-o", "w#.exr", *size).status == 0
+    for number in range(5):
+        one, other = (read_exr(f"{word}{number}.exr")[0] for word in "kw")
+        for channel in one:
+            np.testing.assert_array_equal(one[channel], other[channel])
+
+
+REFUSED = {
+    ("-o", "f.png"): "f.png: must have # where the frame's number goes, such as f_####.png",
+    ("-o", "f#.gif"): "f0.gif: unknown extension '.gif'",
+    ("-o", "f#.mp4"): "f#.mp4: cannot be a film yet; write numbered pictures, such as f#_####.png",
+    ("-o", "-"): "frames are several files",
+    ("-o", "#############.png"): "must have at most 12 # in a row",
+    ("-o", "none/f#.png"): "none/f0.png: cannot be written: there is no folder",
+    ("--frames", "0-5"): "--frames: must be frames 0 to 4 of the film, got 5",
+    ("--frames", "4-1"): "--frames: must go upwards, got '4-1'",
+    ("--frames", "0-4:0"): "--frames: must go upwards, got '0-4:0'",
+    ("--frames", "all"): "--frames: must be A-B, A-B:STEP or a number, such as 0-119:2; got 'all'",
+    ("--set", "animation=null"): "scene.yaml: animation: is missing: a film needs fps, frames and tracks",
+    ("--set", "animation.frames=0"): "--set animation.frames: must be at least 1, got 0",
+}
+
+
+@pytest.mark.parametrize("options", REFUSED)
+def test_mistakes_are_refused_before_a_frame(clf: InProcess, options: tuple[str, str]) -> None:
+    before = names()
+    assert clf("animate", "scene.yaml", *options).is_one_line(2, REFUSED[options])
+    assert names() == before
+
+
+def test_no_output_replaces_the_scene(clf: InProcess) -> None:
+    assert clf("animate", "scene.yaml", "--frames", "0", "-o", "scene#.png").status == 0
+    Path("in0.png").write_bytes(Path("scene0.png").read_bytes())
+    ended = clf("animate", "in0.png", "-o", "in#.png", "--set", "animation={frames: 2}")
+    assert ended.is_one_line(2, "in0.png: ")
+
+
+def test_arguments_of_python_are_checked() -> None:
+    with pytest.raises(SceneError, match="numbers: must be from 0 to 4, got 5"):
+        clfractal.frames(SCENE, numbers=[5])
+    with pytest.raises(SceneError, match="numbers: must be a list of numbers of frames"):
+        clfractal.frames(SCENE, numbers=3)  # type: ignore[arg-type]
+    with pytest.raises(SceneError, match="frame: must be at most 5, got 6"):
+        clfractal.at_frame(SCENE, 6)
+    with pytest.raises(SceneError, match="animation: is missing"):
+        clfractal.frames({"version": 1, "formula": {"name": "hast"}, "camera": {}})
+
+
+def test_numbers_and_names_of_frames() -> None:
+    assert list(Part("3").numbers(5)) == [3]
+    assert list(Part(" 0-4:2 ").numbers(5)) == [0, 2, 4]
+    assert frame_file(Path("a/f_###.png"), 7) == Path("a/f_007.png")
+    assert frame_file(Path("a#b##.exr"), 1234) == Path("a#b1234.exr")
