@@ -23,6 +23,7 @@ __all__ = ["app", "call", "list_facts", "list_grids", "list_pictures", "list_sce
 _ORDER = (
     "render",
     "animate",
+    "sound",
     "view",
     "watch",
     "scenes",

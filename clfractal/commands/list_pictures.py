@@ -127,6 +127,46 @@ def animate(
 
 
 @app.command()
+def sound(
+    context: typer.Context,
+    source: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A WAV file.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="A .csv file.")] = Path("tracks.csv"),
+    fps: Annotated[float, typer.Option("--fps", help="Frames per second.")] = 30.0,
+    frames: Annotated[
+        int | None,
+        typer.Option("--frames", metavar="N", help="Number of frames.  [default: as long as the sound]"),
+    ] = None,
+    band: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--band",
+            metavar="NAME=LOW-HIGH",
+            help="A band of frequencies, Hz; repeatable.  [default: bass=20-150, middle=150-2000, treble=2000-16000]",
+        ),
+    ] = None,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="What is not louder than this part of the loudest is 0.")
+    ] = 0.0,
+    fade: Annotated[
+        float, typer.Option("--fade", metavar="SECONDS", help="Time in which a beat fades to a third.")
+    ] = 0.15,
+    gain: Annotated[float, typer.Option("--gain", help="Factor on all values.")] = 1.0,
+    absolute: Annotated[
+        bool,
+        typer.Option("--absolute", help="1 is a sine at full scale, and not each band's loudest frame."),
+    ] = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Write how loud a sound is, frame by frame, as a table for a scene's tracks."""
+    from clfractal.commands.sound import SoundOrder, write_loudness
+
+    order = SoundOrder(source, output, fps, frames, tuple(band or ()), not absolute, threshold, fade, gain)
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: write_loudness(order, shell)
+
+
+@app.command()
 def slices(
     context: typer.Context,
     scene: Scene,

@@ -150,6 +150,9 @@ class Animation(Section):
     )
     duration: Duration | None = Field(None, description="seconds, such as 4 or '4 s'; give this or frames")
     loop: bool = Field(False, description="whether the film begins again after its end, without a seam")
+    noise: Literal["new", "fixed"] = Field(
+        "new", description="whether each frame has random places of its own, or all have the same"
+    )
     tracks: Tracks = Field(
         {}, description="values that move, by their dotted keys, such as `camera.position`"
     )

@@ -10,6 +10,7 @@ from clfractal.scene.animation import Animation
 from clfractal.scene.curves import Values
 from clfractal.scene.model import Scene
 from clfractal.scene.movers import Mover, Movers
+from clfractal.scene.renderer import Renderer
 from clfractal.scene.tracks import Target, target_of, with_values
 
 
@@ -44,6 +45,8 @@ class Movement:
 
     def _scene_at(self, frame: float) -> Scene:
         values = {mover.target.path: mover.value(frame) for mover in self.movers}
+        if self.animation.noise == "new":
+            values |= _seeds(self._scene, int(frame))
         found = with_values(self._scene, values)
         _ = found.chain
         return found
@@ -99,6 +102,15 @@ def movement_of(scene: Scene) -> Movement:
     if scene.animation is None:
         raise SceneError("is missing: a film needs fps, frames and tracks", Where(path="animation"))
     return scene.once("movement", lambda: Movement(scene))
+
+
+def _seeds(scene: Scene, frame: int) -> dict[tuple[str, ...], int]:
+    """The seed of each renderer of a scene in a frame, by path."""
+    renderers: dict[tuple[str, ...], Renderer] = {("renderer",): scene.renderer}
+    for number, view in enumerate(scene.layout.views if scene.layout is not None else ()):
+        if view.renderer is not None:
+            renderers["layout", "views", str(number), "renderer"] = view.renderer
+    return {(*path, "seed"): (renderer.seed + frame) % 2**32 for path, renderer in renderers.items()}
 
 
 def _placed(name: str, make: Callable[..., Any], *arguments: Any) -> Any:

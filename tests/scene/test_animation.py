@@ -205,6 +205,22 @@ def test_parameters_that_move_are_live_and_need_no_new_text() -> None:
     assert links[0].live == ()
 
 
+def test_noise_is_new_in_each_frame_or_fixed() -> None:
+    base = {
+        "renderer": {"seed": 2**32 - 2},
+        "layout": {"views": [{}, {"renderer": {"type": "surface", "seed": 5}}]},
+    }
+    new = [clfractal.at_frame(moving({}, base=base), frame) for frame in range(3)]
+    assert [scene.renderer.seed for scene in new] == [2**32 - 2, 2**32 - 1, 0]
+    for number, scene in enumerate(new):
+        assert scene.layout is not None
+        assert scene.layout.views[0].renderer is None
+        assert scene.layout.views[1].renderer is not None
+        assert scene.layout.views[1].renderer.seed == 5 + number
+    fixed = clfractal.at_frame(moving({}, base=base, noise="fixed"), 2)
+    assert fixed.renderer.seed == 2**32 - 2
+
+
 def test_it_loads_back_to_an_equal_scene() -> None:
     scene = moving(
         {
