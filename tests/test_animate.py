@@ -147,7 +147,7 @@ def test_killed_at_any_time_it_goes_on(clf: InProcess) -> None:
 REFUSED = {
     ("-o", "f.png"): "f.png: must have # where the frame's number goes, such as f_####.png",
     ("-o", "f#.gif"): "f0.gif: unknown extension '.gif'",
-    ("-o", "f#.mp4"): "f#.mp4: cannot be a film yet; write numbered pictures, such as f#_####.png",
+    ("--codec", "h264"): "--codec: applies to films, such as -o film.mp4",
     ("-o", "-"): "frames are several files",
     ("-o", "#############.png"): "must have at most 12 # in a row",
     ("-o", "none/f#.png"): "none/f0.png: cannot be written: there is no folder",

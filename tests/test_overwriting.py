@@ -56,6 +56,10 @@ def _write(here: Path) -> None:
         text = PLANE if name.startswith("slice") else SCENE
         (here / name).write_text(text)
     shutil.copy(here / "stereo.yaml", here / "out_R.png")
+    for name in ("moving.yaml", "frame_1.png"):
+        (here / name).write_text(SCENE + "animation: {frames: 2}\n")
+    (here / "track.wav").write_bytes(b"RIFF1234WAVE")
+    (here / "sound.csv").symlink_to("track.wav")
     (here / "link.png").symlink_to("scene.yaml")
     (here / "link.ply").symlink_to("scan.nrrd")
     (here / "shipped.png").symlink_to(resources.folder("scenes") / "mandelbulb.yaml")
@@ -107,6 +111,10 @@ REFUSED = {
     "render out.exr.right.view2.partial -o out.exr": f"out.exr.right.view2.partial: {READ}",
     "slices slice_0002.exr -o slice.exr": f"slice_0002.exr: {READ}",
     "slices plane.yaml -o slice.png -o slice.png": f"slice_0001.png: {TWICE}",
+    "animate frame_1.png -o frame_#.png": f"frame_1.png: {READ}",
+    "animate moving.yaml -o f#.png -o f#.png": f"f0.png: {TWICE}",
+    "animate moving.yaml -o f.mp4 -o f.mp4": f"f.mp4: {TWICE}",
+    "sound track.wav -o deep/sound.csv": f"deep/sound.csv: {READ}, but it is the file 'track.wav'",
     "scenes --sheet shipped.png": f"shipped.png: {READ}, but it is the file",
     "voxelize volume.yaml -o scan.nrrd": f"scan.nrrd: {READ}",
     "voxelize array.yaml -o scan.npy": f"scan.npy: {READ}",

@@ -1,28 +1,31 @@
-"""`clfractal animate`: the frames of a scene's animation as numbered pictures."""
+"""`clfractal animate`: the frames of a scene's animation as numbered pictures, and as films."""
 
 from __future__ import annotations
 
 import re
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clfractal.commands.kept import Kept
 from clfractal.commands.order import PARTIAL, naming_options
 from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.progress import shown_rate
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import FileError, SceneError, Where, speaking_of
+from clfractal.files.film_kinds import CONTAINERS, Recipe
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 
 if TYPE_CHECKING:
+    from clfractal.files.moving import Plan
     from clfractal.work.job import Job
 
-_FILMS = (".mp4", ".mkv", ".mov", ".webm", ".avi")
 _MOST_DIGITS = 12
 _LINE_SECONDS = 2.0
 # Frames that took longer keep their tiles while they are in work, seconds.
@@ -58,11 +61,11 @@ class Part:
         return range(first, last + 1, step)
 
 
-def animate_scene(order: Order, part: Part, shell: Shell) -> None:
-    """Renders the frames of a scene's animation, each to its own files.
+def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
+    """Renders the frames of a scene's animation, each to its own files, and makes films of them.
 
     A frame's files appear complete or not at all. With `order.resume` frames that are there are kept; those of another
-    scene are refused.
+    scene are refused. The frames of a film are kept without loss, beside it, until the film is whole.
 
     Raises:
         ClfractalError: anything wrong with the input, the files or the device.
@@ -71,19 +74,43 @@ def animate_scene(order: Order, part: Part, shell: Shell) -> None:
         refuse_stream(path, "frames are several files")
         _check_pattern(path)
     with piped(shell, order.scene, [(path, "") for path in order.outputs]) as files:
-        _animate(replace(order, scene=files.source, folder=files.folder), part, shell)
+        _animate(replace(order, scene=files.source, folder=files.folder), part, recipe, shell)
 
 
-def _animate(order: Order, part: Part, shell: Shell) -> None:
+def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     begun = time.perf_counter()
     shell.mute_drivers()
     scene = ordered_scene(order)
     with speaking_of(order.scene):
-        count = movement_of(scene).animation.count
-    numbers = part.numbers(count)
-    patterns = order.outputs or (Path(f"{Path(order.scene).stem}_####.png"),)
-    files = {number: tuple(frame_file(path, number) for path in patterns) for number in numbers}
-    _check_files(scene, list(files.values()))
+        animation = movement_of(scene).animation
+    numbers = part.numbers(animation.count)
+    films = _planned_films(order, scene, recipe, animation.fps)
+    patterns = [path for path in order.outputs if not _is_film(path)]
+    if not order.outputs:
+        patterns = [Path(f"{Path(order.scene).stem}_####.png")]
+    with Kept(films, shell, resume=order.resume) as kept:
+        if kept.pattern is not None:
+            patterns.append(kept.pattern)
+            bits = 16 if any(film.bits > 8 for film in films) else 8
+            scene = scene.model_copy(update={"output": scene.output.model_copy(update={"png_bits": bits})})
+        files = {number: tuple(frame_file(path, number) for path in patterns) for number in numbers}
+        _check_files(scene, [*files.values()], [film.path for film in films])
+        for film in films:
+            if not film.tells_stereo:
+                shell.say(f"{film.path}: players are not told how it holds two pictures; choose it there")
+        counted = _render_frames(order, scene, files, _Count(shell, len(numbers), begun), shell)
+        if kept.pattern is not None:
+            shell.state = lambda: f"{films[0].path}: interrupted; all frames are kept; --resume continues"
+            kept.write([frame_file(kept.pattern, number) for number in numbers])
+    shell.state = lambda: "clfractal: interrupted"
+    named = [f"{files[numbers[0]][0]} to {files[numbers[-1]][0].name}"] if patterns[0] != kept.pattern else []
+    shell.say(f"{', '.join([*named, *(str(film.path) for film in films)])}: {counted.summary()}")
+
+
+def _render_frames(
+    order: Order, scene: Scene, files: Mapping[int, tuple[Path, ...]], counted: _Count, shell: Shell
+) -> _Count:
+    """Renders the frames that are not there yet."""
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands.numbered import render_one
     from clfractal.work.engine import Engine
@@ -91,20 +118,47 @@ def _animate(order: Order, part: Part, shell: Shell) -> None:
 
     engine = Engine(order.device, tell=shell.say)
     scenes = FilmScenes(engine, scene)
-    counted = _Count(shell, len(numbers), begun)
-    for number in numbers:
+    for number, paths in files.items():
         with speaking_of(order.scene), naming_options():
             job = engine.prepare(scenes.scene(number), precision=order.precision, samples=order.samples)
-        shell.state = partial(counted.interrupted, number, files[number][0])
-        if order.resume and _is_there(job, files[number]):
+        shell.state = partial(counted.interrupted, number, paths[0])
+        if order.resume and _is_there(job, paths):
             counted.kept += 1
             continue
-        long = counted.seconds_each > _LONG_FRAME or _partial(files[number]).exists()
-        state = render_one(job, engine, files[number], shell, resume=order.resume, keep=long)
+        long = counted.seconds_each > _LONG_FRAME or _partial(paths).exists()
+        state = render_one(job, engine, paths, shell, resume=order.resume, keep=long)
         counted.rendered(state.rays)
-    shell.state = lambda: "clfractal: interrupted"
-    first, last = files[numbers[0]][0], files[numbers[-1]][0]
-    shell.say(f"{first} to {last.name}: {counted.summary()}")
+    return counted
+
+
+def _is_film(path: Path) -> bool:
+    return path.suffix.lower() in CONTAINERS
+
+
+def _planned_films(order: Order, scene: Scene, recipe: Recipe, fps: float) -> list[Plan]:
+    """The film files of an order, checked."""
+    films = [path for path in order.outputs if _is_film(path)]
+    given = {
+        "--codec": recipe.codec,
+        "--bits": recipe.bits,
+        "--chroma": recipe.chroma,
+        "--crf": recipe.quality,
+    }
+    if not films:
+        for option, value in given.items():
+            if value is not None:
+                raise SceneError("applies to films, such as -o film.mp4", Where(option))
+        return []
+    # Imported only now: films are rare, and NumPy takes long to import.
+    from clfractal.files.moving import plan_film
+    from clfractal.pictures.formats import Content
+
+    content = Content.of(scene)
+    if content.transparent:
+        where = Where(order.scene, path="background")
+        raise SceneError("must be a colour or a gradient for a film, which is not transparent", where)
+    mode, swap = (scene.stereo.mode, scene.stereo.swap) if scene.stereo is not None else (None, False)
+    return [plan_film(path, recipe, content.size, fps, stereo=mode, swap=swap) for path in films]
 
 
 class _Count:
@@ -165,8 +219,8 @@ def _split(name: str) -> tuple[str, str, str]:
 
 def _check_pattern(path: Path) -> None:
     where = Where(str(path))
-    if path.suffix.lower() in _FILMS:
-        raise FileError(f"cannot be a film yet; write numbered pictures, such as {path.stem}_####.png", where)
+    if _is_film(path):
+        return
     if "#" not in path.name:
         example = f"{path.stem}_####{path.suffix}"
         raise FileError(f"must have # where the frame's number goes, such as {example}", where)
@@ -178,12 +232,12 @@ def _partial(paths: tuple[Path, ...]) -> Path:
     return paths[0].with_name(paths[0].name + PARTIAL)
 
 
-def _check_files(scene: Scene, files: list[tuple[Path, ...]]) -> None:
+def _check_files(scene: Scene, files: list[tuple[Path, ...]], films: list[Path]) -> None:
     """Checks all files before anything is rendered."""
     from clfractal.pictures.formats import Content, check_output
     from clfractal.pictures.outputs import output_files
 
-    written, content = [], Content.of(scene)
+    written, content = [*films], Content.of(scene)
     for paths in files:
         for path in paths:
             for file in output_files(scene.stereo, path):

@@ -87,8 +87,8 @@ def animate(
         typer.Option(
             "-o",
             "--output",
-            help="A picture file, as for render, with # for the frame's number: frame_####.exr; repeatable."
-            "  [default: SCENE_####.png]",
+            help="A picture file, as for render, with # for the frame's number: frame_####.exr; or a film: film.mp4,"
+            " .mkv, .mov or .webm; repeatable.  [default: SCENE_####.png]",
         ),
     ] = None,
     frames: Annotated[
@@ -104,12 +104,25 @@ def animate(
     resume: Annotated[
         bool, typer.Option("--resume", help="Keep frames that are there, and continue the one in work.")
     ] = False,
+    codec: Annotated[
+        str | None,
+        typer.Option(
+            "--codec", help="Of films: h264, h265, av1, ffv1 or prores.  [default: by the file's name]"
+        ),
+    ] = None,
+    bits: Annotated[int | None, typer.Option("--bits", help="Of films: bits per channel.")] = None,
+    chroma: Annotated[str | None, typer.Option("--chroma", help="Of films: 420, 422, 444 or rgb.")] = None,
+    crf: Annotated[
+        int | None,
+        typer.Option("--crf", help="Of films: the encoder's quality; smaller is better and larger."),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Work:
-    """Render the frames of a scene's animation to numbered picture files."""
+    """Render the frames of a scene's animation to numbered picture files, or films."""
     from clfractal.commands.animate import Part, animate_scene
     from clfractal.commands.order import Order
+    from clfractal.files.film_kinds import Recipe
 
     order = Order(
         scene=scene,
@@ -123,13 +136,14 @@ def animate(
         resume=resume,
     )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: animate_scene(order, Part(frames), shell)
+    recipe = Recipe(codec, bits, chroma, crf)
+    return lambda: animate_scene(order, Part(frames), recipe, shell)
 
 
 @app.command()
 def sound(
     context: typer.Context,
-    source: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A WAV file.")],
+    source: Annotated[str, typer.Argument(metavar="FILE.wav", help="A WAV file.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="A .csv file.")] = Path("tracks.csv"),
     fps: Annotated[float, typer.Option("--fps", help="Frames per second.")] = 30.0,
     frames: Annotated[
@@ -161,7 +175,9 @@ def sound(
     """Write how loud a sound is, frame by frame, as a table for a scene's tracks."""
     from clfractal.commands.sound import SoundOrder, write_loudness
 
-    order = SoundOrder(source, output, fps, frames, tuple(band or ()), not absolute, threshold, fade, gain)
+    order = SoundOrder(
+        Path(source), output, fps, frames, tuple(band or ()), not absolute, threshold, fade, gain
+    )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
     return lambda: write_loudness(order, shell)
 

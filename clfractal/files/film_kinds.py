@@ -1,0 +1,92 @@
+"""Kinds of films: files, codecs, and how they may be stored. It imports nothing that takes long."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+CONTAINERS: Mapping[str, str] = {".mp4": "mp4", ".mkv": "matroska", ".mov": "mov", ".webm": "webm"}
+"""FFmpeg's names of the files that hold films, by extension."""
+
+
+@dataclass(frozen=True, slots=True)
+class Codec:
+    """A codec that is offered.
+
+    Attributes:
+        library: FFmpeg's name of the encoder.
+        containers: extensions of files that hold it; those of which it is the default come first in `DEFAULTS`.
+        formats: FFmpeg's pixel formats by bits and chroma (420, 422, 444, or rgb); the first is the default.
+        quality: the encoder's option for the quality, its range and its default; None: it has none.
+        options: what else the encoder is told.
+    """
+
+    library: str
+    containers: tuple[str, ...]
+    formats: Mapping[tuple[int, str], str]
+    quality: tuple[str, int, int, int] | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+_YUV8 = {(8, "420"): "yuv420p", (8, "422"): "yuv422p", (8, "444"): "yuv444p"}
+_YUV10 = {(10, "420"): "yuv420p10le", (10, "422"): "yuv422p10le", (10, "444"): "yuv444p10le"}
+CODECS: Mapping[str, Codec] = {
+    "h264": Codec("libx264", (".mp4", ".mkv", ".mov"), {**_YUV8, **_YUV10}, ("crf", 0, 51, 16)),
+    "h265": Codec(
+        "libx265",
+        (".mp4", ".mkv", ".mov"),
+        {**_YUV10, **_YUV8},
+        ("crf", 0, 51, 18),
+        {"x265-params": "log-level=error"},
+    ),
+    "av1": Codec(
+        "libsvtav1",
+        (".webm", ".mp4", ".mkv"),
+        {(10, "420"): "yuv420p10le", (8, "420"): "yuv420p"},
+        ("crf", 1, 63, 16),
+        {"preset": "6"},
+    ),
+    "ffv1": Codec("ffv1", (".mkv",), {(8, "rgb"): "bgr0", (16, "rgb"): "gbrp16le"}, None, {"level": "3"}),
+    "prores": Codec("prores_ks", (".mov", ".mkv"), {(10, "422"): "yuv422p10le", (10, "444"): "yuv444p10le"}),
+}
+DEFAULTS: Mapping[str, str] = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores", ".webm": "av1"}
+"""The codec of each kind of file, if none is named."""
+
+MATROSKA = {
+    "split": "left_right",
+    "split_half": "left_right",
+    "over_under": "top_bottom",
+    "over_under_half": "top_bottom",
+    "rows": "row_interleaved_lr",
+    "columns": "col_interleaved_lr",
+    "checkerboard": "checkerboard_lr",
+}
+"""What Matroska calls the arrangement of two eyes' pictures, by the scene's `stereo.mode`."""
+
+PACKING = {
+    "checkerboard": 0,
+    "columns": 1,
+    "rows": 2,
+    "split": 3,
+    "split_half": 3,
+    "over_under": 4,
+    "over_under_half": 4,
+}
+"""H.264's numbers for the same (ITU-T H.264, table D-8)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """How a film is stored; None stands for the codec's default.
+
+    Attributes:
+        codec: a name of `CODECS`.
+        bits: of each channel.
+        chroma: 420, 422, 444 or rgb.
+        quality: the encoder's own number; smaller is better.
+    """
+
+    codec: str | None = None
+    bits: int | None = None
+    chroma: str | None = None
+    quality: int | None = None
