@@ -7,7 +7,7 @@
 #   make window        tests of the window, on a screen of their own (needs Xvfb, xdotool, openbox and Mesa)
 #   make soak          ten minutes of random events for the window, from a seed
 #   make locks         which versions the dependencies resolve to on Linux, macOS and Windows (tests/platforms/locks)
-#   make lowest        render, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
+#   make lowest        render, animate, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make truth         how near pictures are to the set, by brute force (ARGUMENTS="--formula mandelbulb")
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
@@ -84,6 +84,7 @@ lowest: $(LOWEST)/.installed
 		&& $$program render checked.yaml --size 96x54 --samples 1 -o bulb.exr -o bulb.png \
 		&& $$program render bulb.exr -o again.png -o again.jpg -o again.webp \
 		&& $$program render again.webp -o once-more.png && $$program probe again.jpg 48,27 \
+		&& $$program animate $$scene --set 'animation={frames: 2}' --size 96x54 --samples 1 -o film.mp4 && test -s film.mp4 \
 		&& $$program voxelize $$scene --resolution 32 -o bulb.nrrd \
 		&& $$program mesh bulb.nrrd -o bulb.ply && $$program mesh $$scene --resolution 32 -o bulb.glb \
 		&& test -s bulb.exr -a -s bulb.png -a -s once-more.png -a -s again.jpg -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb \
@@ -153,7 +154,7 @@ $(LINT)/.installed: requirements-lint.txt | $(LINT)/bin/python
 $(LOWEST)/.installed: $(SOURCES) | $(LOWEST)/bin/python
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
 	$(LOWEST)/bin/uv pip compile --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
-		--only-binary :all: --extra mesh --extra viewer --output-file $(LOWEST)/versions.txt pyproject.toml
+		--only-binary :all: --extra mesh --extra viewer --extra film --output-file $(LOWEST)/versions.txt pyproject.toml
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --only-binary :all: \
 		--requirement $(LOWEST)/versions.txt
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps .
