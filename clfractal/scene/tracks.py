@@ -83,8 +83,8 @@ def target_of(scene: Scene, name: str) -> Target:
         SceneError: there is none, or it cannot move; without a place.
     """
     path = split_path(name)
-    if not path:
-        raise SceneError("must name a value, such as camera.position")
+    if not path or any(part.strip("[]") == "" for part in name.split(".")):
+        raise SceneError("must name a value by its dotted keys, such as camera.position")
     if path[0] in _FIXED and path != ("output", "exposure"):
         raise SceneError(f"cannot move: it {_FIXED[path[0]]}")
     owner: Any = None
@@ -140,7 +140,8 @@ def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
             return "direction" if key in _DIRECTIONS else "place" if key in _PLACES else "number"
     if isinstance(value, (Section, Mapping)):
         known = _keys_of(value) if isinstance(value, Section) else list(value)
-        raise SceneError(f"cannot move as a whole: name one of its keys, {', '.join(known)}")
+        listing = f"keys, {', '.join(known)}" if known else f"values, such as {'.'.join(path)}.NAME"
+        raise SceneError(f"cannot move as a whole: name one of its {listing}")
     if isinstance(value, str) and not (isinstance(owner, Section) and key == "exposure"):
         raise SceneError(f"cannot move: it is a word, {value[:40]!r}")
     if isinstance(value, bool):

@@ -237,6 +237,9 @@ REFUSED = {
     "camera.fow: {expression: '1'}": "unknown key of camera 'fow'; did you mean 'fov'?",
     "camera: {expression: '1'}": "cannot move as a whole: name one of its keys, position, target, up, projection, fov,"
     " f_number, focus_distance, focus, focus_on, sensor_height",
+    "camera..fov: {expression: '1'}": "must name a value by its dotted keys, such as camera.position",
+    "formula.parameters: {expression: '1'}": "cannot move as a whole: name one of its values, such as"
+    " formula.parameters.NAME",
     "image.width: {expression: '1'}": "cannot move: it is the same for all frames of a film",
     "output.quality: {expression: '1'}": "cannot move: it says how files are written; only output.exposure can move",
     "renderer.samples: {expression: '1'}": "cannot move: it is a whole number, and decides how the picture is made",
