@@ -123,6 +123,25 @@ def test_frames_of_another_scene_are_refused(clf: InProcess) -> None:
     assert Path("f0.png").read_bytes() == before
 
 
+def test_a_frame_in_work_keeps_its_tiles(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+    render, size = work.run, ["--size", "160x96", "--frames", "1"]
+
+    def interrupted(job: Any, stores: Any, *arguments: Any, **settings: Any) -> Any:
+        def stop(state: Any) -> None:
+            if state.tiles_done:
+                raise KeyboardInterrupt
+
+        return render(job, stores, *arguments, **{**settings, "progress": stop})
+
+    with monkeypatch.context() as patch:
+        patch.setattr("clfractal.commands.numbered.run", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            clf("animate", "scene.yaml", "-o", "f#.exr", *size, "--samples", "64")
+    assert names() == ["f1.exr.partial"]
+    assert clf("animate", "scene.yaml", "-o", "f#.exr", *size, "--samples", "64", "--resume").status == 0
+    assert names() == ["f1.exr"]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL")
 def test_killed_at_any_time_it_goes_on(clf: InProcess) -> None:
     """Frames of 36 tiles, which are kept while a frame is in work; the film is the same as without kills."""

@@ -212,21 +212,24 @@ def test_stereo_is_told(mode: str, word: str, pictures: list[Path], tmp_path: Pa
     assert h264.tells_stereo
     write_film(h264, pictures[:2])
     assert not plan_film(tmp_path / "film.mov", Recipe(), SIZE, 25, stereo=mode).tells_stereo
-    assert not plan_film(path, Recipe(), SIZE, 25, stereo="anaglyph").tells_stereo
+    assert not plan_film(path, Recipe(), SIZE, 25, stereo=mode, swap=True).tells_stereo
+    assert plan_film(path, Recipe(), SIZE, 25, stereo="anaglyph").tells_stereo  # one picture, for glasses
 
 
 REFUSED: dict[tuple[str, Recipe, tuple[int, int]], str] = {
     ("a.mp4", Recipe(), (127, 96)): "needs an even width and height with chroma 420, got 127 x 96",
     ("a.mov", Recipe(), (127, 95)): "needs an even width with chroma 422, got 127 x 95",
     ("a.mp4", Recipe("ffv1"), SIZE): "cannot hold ffv1; it goes into .mkv",
-    ("a.mp4", Recipe("vp9"), SIZE): "must be h264, h265, av1, ffv1, prores, got 'vp9'",
+    ("a.mp4", Recipe("vp9"), SIZE): "must be h264, h265, ffv1, prores, got 'vp9'",
     ("a.mp4", Recipe(bits=12), SIZE): "does not fit: h264 has 420 with 8 bits, 422 with 8 bits",
-    ("a.webm", Recipe(chroma="444"), SIZE): "does not fit: av1 has 420 with 10 bits, 420 with 8 bits",
+    ("a.mov", Recipe(chroma="420"), SIZE): "does not fit: prores has 422 with 10 bits, 444 with 10 bits",
+    ("a.webm", Recipe(), SIZE): "unknown extension '.webm'",
     ("a.mp4", Recipe(quality=60), SIZE): "must be from 0 to 51 for h264, got 60",
     ("a.mkv", Recipe(quality=6), SIZE): "has no meaning for ffv1",
     ("a.gif", Recipe(), SIZE): "unknown extension '.gif'",
     ("none/a.mp4", Recipe(), SIZE): "there is no folder",
-    ("a.mp4", Recipe(), (8, 8)): "cannot hold pictures of 8 x 8 pixels",
+    ("a.mp4", Recipe(), (8, 8)): "cannot hold pictures of 8 x 8 pixels: 16 to 16,384",
+    ("a.mp4", Recipe("h265"), (48, 48)): "cannot hold pictures of 48 x 48 pixels: 64 to 16,384",
 }
 
 
@@ -236,6 +239,58 @@ def test_what_a_film_cannot_be(asked: tuple[str, Recipe, tuple[int, int]], tmp_p
     with pytest.raises(ClfractalError) as caught:
         plan_film(tmp_path / name, recipe, size, 25)
     assert REFUSED[asked] in caught.value.message
+
+
+def test_kept_frames_stay_where_an_order_is_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(SCENE)
+    clf = InProcess(capfd)
+    Path("film.mp4.partial").mkdir()
+    kept = Path("film.mp4.partial/000000.png")
+    kept.write_bytes(b"hours of work")
+    for wrong in (("--device", "nonsense"), ("-o", "none/f#.png"), ("-o", "film.mp4"), ("--crf", "99")):
+        assert clf("animate", "scene.yaml", "-o", "film.mp4", *wrong).status in (2, 3)
+        assert kept.read_bytes() == b"hours of work", wrong
+    bad = SCENE.replace(
+        "{frame: 0, value: 60}", "{frame: 0, value: 60}, {frame: 1, value: 500, interpolation: hold}"
+    )
+    Path("bad.yaml").write_text(bad)
+    assert clf("animate", "bad.yaml", "-o", "film.mp4").status == 2
+    assert kept.exists()
+
+
+def test_a_film_leaves_other_pictures_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(SCENE + "output: {png_bits: 16}\n")
+    clf = InProcess(capfd)
+    assert clf("animate", "scene.yaml", "-o", "a#.png").status == 0
+    before = {path.name: path.read_bytes() for path in Path().glob("a*.png")}
+    assert clf("animate", "scene.yaml", "-o", "a#.png", "-o", "film.mkv").status == 0
+    after = {path.name: path.read_bytes() for path in Path().glob("a*.png")}
+    # All but the seconds in their headers.
+    for name, data in after.items():
+        assert abs(len(data) - len(before[name])) < 50
+        assert data[24] == 16  # bits, in a PNG's first chunk
+    assert clf("animate", "scene.yaml", "-o", "a#.png", "--resume").err.endswith("were there already\n")
+
+
+def test_frames_of_another_part_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(SCENE)
+    clf = InProcess(capfd)
+    with monkeypatch.context() as patch:
+        patch.setattr("clfractal.files.moving._frame", _interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            clf("animate", "scene.yaml", "-o", "film.mkv", "--frames", "0-1")
+    assert clf("animate", "scene.yaml", "-o", "film.mkv", "--frames", "2-3", "--resume").status == 0
+    assert len(decoded(Path("film.mkv"))[0]) == 2
+    assert sorted(path.name for path in Path("film.mkv.partial").iterdir()) == ["000000.png", "000001.png"]
 
 
 @pytest.mark.parametrize("mode", ["pair", "multi_view"])

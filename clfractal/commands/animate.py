@@ -16,6 +16,7 @@ from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.progress import shown_rate
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
+from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, speaking_of
 from clfractal.files.film_kinds import CONTAINERS, Recipe
 from clfractal.files.inputs import refuse_overwriting
@@ -91,14 +92,12 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     with Kept(films, shell, resume=order.resume) as kept:
         if kept.pattern is not None:
             patterns.append(kept.pattern)
-            bits = 16 if any(film.bits > 8 for film in films) else 8
-            scene = scene.model_copy(update={"output": scene.output.model_copy(update={"png_bits": bits})})
         files = {number: tuple(frame_file(path, number) for path in patterns) for number in numbers}
         _check_files(scene, [*files.values()], [film.path for film in films])
         for film in films:
             if not film.tells_stereo:
                 shell.say(f"{film.path}: players are not told how it holds two pictures; choose it there")
-        counted = _render_frames(order, scene, files, _Count(shell, len(numbers), begun), shell)
+        counted = _render_frames(order, scene, files, _Count(shell, len(numbers), begun), kept, shell)
         if kept.pattern is not None:
             shell.state = lambda: f"{films[0].path}: interrupted; all frames are kept; --resume continues"
             kept.write([frame_file(kept.pattern, number) for number in numbers])
@@ -108,7 +107,12 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
 
 
 def _render_frames(
-    order: Order, scene: Scene, files: Mapping[int, tuple[Path, ...]], counted: _Count, shell: Shell
+    order: Order,
+    scene: Scene,
+    files: Mapping[int, tuple[Path, ...]],
+    counted: _Count,
+    kept: Kept,
+    shell: Shell,
 ) -> _Count:
     """Renders the frames that are not there yet."""
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
@@ -116,17 +120,26 @@ def _render_frames(
     from clfractal.work.engine import Engine
     from clfractal.work.frames import FilmScenes
 
+    with speaking_of(order.scene), doing("checking all frames"):
+        for number in files:
+            movement_of(scene).scene(number)
     engine = Engine(order.device, tell=shell.say)
     scenes = FilmScenes(engine, scene)
+    begun = False
     for number, paths in files.items():
         with speaking_of(order.scene), naming_options():
             job = engine.prepare(scenes.scene(number), precision=order.precision, samples=order.samples)
+        if not begun:
+            kept.begin()
+            begun = True
         shell.state = partial(counted.interrupted, number, paths[0])
         if order.resume and _is_there(job, paths):
             counted.kept += 1
             continue
-        long = counted.seconds_each > _LONG_FRAME or _partial(paths).exists()
-        state = render_one(job, engine, paths, shell, resume=order.resume, keep=long)
+        long = counted.seconds_each is None or counted.seconds_each > _LONG_FRAME or _partial(paths).exists()
+        state = render_one(
+            job, engine, paths, shell, resume=order.resume, keep=long, bits={kept.at(number): kept.bits}
+        )
         counted.rendered(state.rays)
     return counted
 
@@ -170,10 +183,10 @@ class _Count:
         self.kept, self._rendered, self._rays = 0, 0, 0
 
     @property
-    def seconds_each(self) -> float:
-        """The time that a frame takes; 0 as long as that is unknown."""
+    def seconds_each(self) -> float | None:
+        """The time that a frame takes; None as long as that is unknown: the first one waits for programs."""
         further = self._rendered - 1
-        return (time.perf_counter() - self._first) / further if further > 0 else 0.0
+        return (time.perf_counter() - self._first) / further if further > 0 else None
 
     def rendered(self, rays: int) -> None:
         """Counts a frame; now and then it is told how many are left."""
@@ -188,7 +201,7 @@ class _Count:
             self._told = now
             done = self._frames - left
             self._shell.say(
-                f"animate: {done} of {self._frames} frames, {left * self.seconds_each:.0f} s left"
+                f"animate: {done} of {self._frames} frames, {left * (self.seconds_each or 0):.0f} s left"
             )
 
     def interrupted(self, number: int, file: Path) -> str:

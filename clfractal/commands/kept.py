@@ -23,7 +23,7 @@ _OWN = re.compile(r"\d{6,}\.png(\..*)?|\..*\.tmp", re.ASCII)
 class Kept:
     """A folder with the frames of films, beside the first of them; without films there is none.
 
-    After an exception it stays, unless it is empty. When the films are whole it is removed.
+    It stays as long as frames are in it: those of the films are removed when these are whole.
 
     Args:
         films: what is written of the frames.
@@ -46,16 +46,23 @@ class Kept:
         """The name of the frames, with # for their numbers."""
         return self._folder / "######.png" if self._folder is not None else None
 
+    @property
+    def bits(self) -> int:
+        """Bits of the kept frames: what the films need."""
+        return 16 if any(film.bits > 8 for film in self._films) else 8
+
+    def at(self, number: int) -> Path | None:
+        """The file of a kept frame."""
+        return self._folder / f"{number:06d}.png" if self._folder is not None else None
+
     def __enter__(self) -> Self:
         if self._folder is None:
             return self
         try:
-            if self._folder.exists() and not self._resume:
-                self._shell.say(
-                    f"{self._folder}: earlier work is discarded; --resume would have continued it"
-                )
-                self._clear(self._folder)
-            self._folder.mkdir(exist_ok=True)
+            if self._folder.exists():
+                self._files()
+            else:
+                self._folder.mkdir()
         except OSError as error:
             raise file_error(self._folder, "cannot be used", error) from error
         return self
@@ -63,15 +70,19 @@ class Kept:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._folder is None:
-            return
-        if kind is None:
-            self._clear(self._folder)
-        if not any(self._folder.iterdir()):
+        if self._folder is not None and not any(self._folder.iterdir()):
             self._folder.rmdir()
 
+    def begin(self) -> None:
+        """Removes frames of earlier work, unless it is continued: when nothing in the order can be wrong any more."""
+        files = [] if self._folder is None or self._resume else self._files()
+        if files:
+            self._shell.say(f"{self._folder}: earlier work is discarded; --resume would have continued it")
+        for file in files:
+            file.unlink()
+
     def write(self, pictures: Sequence[Path]) -> None:
-        """Makes the films of the kept pictures.
+        """Makes the films of the kept pictures, which are removed when all films are whole.
 
         Raises:
             FileError: a film cannot be written.
@@ -81,11 +92,14 @@ class Kept:
         for film in self._films:
             with doing(f"writing {film.path}"):
                 write_film(film, pictures)
+        for picture in pictures:
+            picture.unlink(missing_ok=True)
 
-    def _clear(self, folder: Path) -> None:
-        files = list(folder.iterdir())
+    def _files(self) -> list[Path]:
+        """What lies in the folder; FileError if something is no frame."""
+        assert self._folder is not None
+        files = list(self._folder.iterdir())
         for file in files:
             if not _OWN.fullmatch(file.name):
-                raise FileError("holds a file that is no frame of a film; move it away", Where(str(file)))
-        for file in files:
-            file.unlink()
+                raise FileError("is no frame of a film; move it away", Where(str(file)))
+        return files

@@ -88,7 +88,7 @@ def animate(
             "-o",
             "--output",
             help="A picture file, as for render, with # for the frame's number: frame_####.exr; or a film: film.mp4,"
-            " .mkv, .mov or .webm; repeatable.  [default: SCENE_####.png]",
+            " .mkv or .mov; repeatable.  [default: SCENE_####.png]",
         ),
     ] = None,
     frames: Annotated[
@@ -106,9 +106,7 @@ def animate(
     ] = False,
     codec: Annotated[
         str | None,
-        typer.Option(
-            "--codec", help="Of films: h264, h265, av1, ffv1 or prores.  [default: by the file's name]"
-        ),
+        typer.Option("--codec", help="Of films: h264, h265, ffv1 or prores.  [default: by the file's name]"),
     ] = None,
     bits: Annotated[int | None, typer.Option("--bits", help="Of films: bits per channel.")] = None,
     chroma: Annotated[str | None, typer.Option("--chroma", help="Of films: 420, 422, 444 or rgb.")] = None,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clfractal.commands.progress import Reporter
 from clfractal.commands.unfinished import Unfinished
@@ -31,12 +32,14 @@ def render_one(
     *,
     resume: bool = False,
     keep: bool = False,
+    bits: Mapping[Path | None, int] | None = None,
 ) -> Progress:
     """Renders one picture and writes its files.
 
     Args:
         resume: whether to continue tiles that an earlier run has kept.
         keep: whether tiles are kept beside the first file until it is whole, however small the picture is.
+        bits: of PNG files that have others than the scene wants.
 
     Returns:
         The last state of the work.
@@ -46,12 +49,29 @@ def render_one(
     if not keep and 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
         films = JobFilms(job)
         state = _run(job, films.films, engine, reporter)
-        save_job(job, films.films, paths, header)
+        _save(job, films.films, paths, header, bits or {})
         return state
     with Unfinished(job, header, paths[0], shell, resume=resume) as unfinished:
         state = _run(job, unfinished.films, engine, reporter)
-        save_job(job, unfinished.films, paths, header)
+        _save(job, unfinished.films, paths, header, bits or {})
         return state
+
+
+def _save(
+    job: Job,
+    stores: Sequence[TiledStore],
+    paths: tuple[Path, ...],
+    header: Mapping[str, Any],
+    bits: Mapping[Path | None, int],
+) -> None:
+    usual = tuple(path for path in paths if path not in bits)
+    if usual:
+        save_job(job, stores, usual, header)
+    for path in paths:
+        if path in bits:
+            output = job.scene.output.model_copy(update={"png_bits": bits[path]})
+            wanted = job.scene.model_copy(update={"output": output})
+            save_job(replace(job, scene=wanted), stores, (path,), header)
 
 
 def _run(job: Job, stores: Sequence[TiledStore], engine: Engine, reporter: Reporter) -> Progress:

@@ -50,7 +50,7 @@ def write_loudness(order: SoundOrder, shell: Shell) -> None:
 
     refuse_stream(order.output, "give the table a name")
     _check(order)
-    bands = dict(_band(text) for text in order.bands) if order.bands else dict(BANDS)
+    bands = _bands(order.bands) if order.bands else dict(BANDS)
     check_output(order.output, (".csv",))
     refuse_overwriting([order.output], [order.sound])
     with doing(f"reading {order.sound}"):
@@ -59,7 +59,10 @@ def write_loudness(order: SoundOrder, shell: Shell) -> None:
     if frames > MAX_FRAMES:
         raise SceneError(f"makes {frames:,} frames, at most {MAX_FRAMES:,}", Where("--fps"))
     with doing(f"measuring {order.sound}"):
-        levels = loudness(sound, order.fps, frames, [(0.0, math.inf), *bands.values()])
+        try:
+            levels = loudness(sound, order.fps, frames, [(0.0, math.inf), *bands.values()])
+        except ValueError as error:
+            raise SceneError(str(error), Where("--band")) from error
         shaping = Shaping(order.normal, order.threshold, order.fade, order.gain)
         values = shaped(levels, order.fps, shaping)
     _write(order, ["level", *bands], values)
@@ -87,6 +90,16 @@ def _check(order: SoundOrder) -> None:
             raise SceneError(f"must be from {least:g} to {most:g}, got {value:g}", Where(option))
     if len(order.bands) > _MOST_BANDS:
         raise SceneError(f"must be at most {_MOST_BANDS} bands, got {len(order.bands)}", Where("--band"))
+
+
+def _bands(texts: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    found: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        name, band = _band(text)
+        if name in found:
+            raise SceneError(f"must have a name of its own, got {name!r} twice", Where("--band"))
+        found[name] = band
+    return found
 
 
 def _band(text: str) -> tuple[str, tuple[float, float]]:

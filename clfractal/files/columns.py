@@ -34,10 +34,15 @@ def read_columns(path: Path, wanted: Mapping[str, None], name: str) -> dict[str,
                 raise FileError(unknown_name("column", title, titles), Where(name, 1))
         places = {title: titles.index(title) for title in wanted}
         found: dict[str, list[float]] = {title: [] for title in wanted}
+        blank = 0
         for row in rows:
-            if any(cell.strip() for cell in row):
-                for title, place in places.items():
-                    found[title].append(_number(row, place, title, Where(name, rows.line_num)))
+            if not any(cell.strip() for cell in row):
+                blank = blank or rows.line_num
+                continue
+            if blank:  # else later rows would come a frame too early
+                raise FileError("must have a row for each frame, without blank ones", Where(name, blank))
+            for title, place in places.items():
+                found[title].append(_number(row, place, title, Where(name, rows.line_num)))
     except csv.Error as error:
         raise FileError(f"is no CSV table: {error}", Where(name, rows.line_num)) from error
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-CONTAINERS: Mapping[str, str] = {".mp4": "mp4", ".mkv": "matroska", ".mov": "mov", ".webm": "webm"}
+CONTAINERS: Mapping[str, str] = {".mp4": "mp4", ".mkv": "matroska", ".mov": "mov"}
 """FFmpeg's names of the files that hold films, by extension."""
 
 
@@ -19,6 +19,7 @@ class Codec:
         formats: FFmpeg's pixel formats by bits and chroma (420, 422, 444, or rgb); the first is the default.
         quality: the encoder's option for the quality, its range and its default; None: it has none.
         options: what else the encoder is told.
+        least_side: of a picture, pixels.
     """
 
     library: str
@@ -26,10 +27,13 @@ class Codec:
     formats: Mapping[tuple[int, str], str]
     quality: tuple[str, int, int, int] | None = None
     options: Mapping[str, str] = field(default_factory=dict)
+    least_side: int = 16
 
 
 _YUV8 = {(8, "420"): "yuv420p", (8, "422"): "yuv422p", (8, "444"): "yuv444p"}
 _YUV10 = {(10, "420"): "yuv420p10le", (10, "422"): "yuv422p10le", (10, "444"): "yuv444p10le"}
+# Not AV1: SVT-AV1 (4.1), the only encoder of it in av's wheels, makes the calling thread, and all that this starts later,
+# real-time ones of the highest priority where it runs as root; then other programs of the machine hardly run any more.
 CODECS: Mapping[str, Codec] = {
     "h264": Codec("libx264", (".mp4", ".mkv", ".mov"), {**_YUV8, **_YUV10}, ("crf", 0, 51, 16)),
     "h265": Codec(
@@ -38,18 +42,12 @@ CODECS: Mapping[str, Codec] = {
         {**_YUV10, **_YUV8},
         ("crf", 0, 51, 18),
         {"x265-params": "log-level=error"},
-    ),
-    "av1": Codec(
-        "libsvtav1",
-        (".webm", ".mp4", ".mkv"),
-        {(10, "420"): "yuv420p10le", (8, "420"): "yuv420p"},
-        ("crf", 1, 63, 16),
-        {"preset": "6"},
+        least_side=64,  # of smaller pictures x265 writes beyond its memory
     ),
     "ffv1": Codec("ffv1", (".mkv",), {(8, "rgb"): "bgr0", (16, "rgb"): "gbrp16le"}, None, {"level": "3"}),
     "prores": Codec("prores_ks", (".mov", ".mkv"), {(10, "422"): "yuv422p10le", (10, "444"): "yuv444p10le"}),
 }
-DEFAULTS: Mapping[str, str] = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores", ".webm": "av1"}
+DEFAULTS: Mapping[str, str] = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}
 """The codec of each kind of file, if none is named."""
 
 MATROSKA = {

@@ -7,7 +7,6 @@ ITU-R BT.709, in its limited range. The file tells so, with the primaries of BT.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -60,9 +59,11 @@ class Plan:
     @property
     def tells_stereo(self) -> bool:
         """Whether the file tells players how it holds two pictures."""
-        if self.stereo is None or self.swap:
-            return self.stereo is None
-        if self.path.suffix.lower() in (".mkv", ".webm"):
+        if self.stereo not in PACKING:  # one picture, or one of two colours
+            return True
+        if self.swap:
+            return False
+        if self.path.suffix.lower() == ".mkv":
             return self.stereo in MATROSKA
         return self.codec.library == "libx264" and self.stereo in PACKING
 
@@ -94,7 +95,7 @@ def plan_film(
     if stereo in ("pair", "multi_view"):
         raise FileError(f"cannot be a film of {stereo}; choose another stereo.mode, such as split", where)
     bits, chroma = _pixels(name, codec, recipe)
-    _check_size(size, chroma, where)
+    _check_size(size, chroma, codec.least_side, where)
     quality = codec.quality[3] if codec.quality is not None else None
     if recipe.quality is not None:
         if codec.quality is None:
@@ -119,7 +120,7 @@ def _pixels(name: str, codec: Codec, recipe: Recipe) -> tuple[int, str]:
     raise SceneError(f"does not fit: {name} has {known}", Where(option))
 
 
-def _check_size(size: tuple[int, int], chroma: str, where: Where) -> None:
+def _check_size(size: tuple[int, int], chroma: str, least: int, where: Where) -> None:
     wide, high = _halves(chroma)
     if size[0] % wide or size[1] % high:
         what = "width and height" if high == 2 else "width"
@@ -127,8 +128,8 @@ def _check_size(size: tuple[int, int], chroma: str, where: Where) -> None:
             f"needs an even {what} with chroma {chroma}, got {size[0]} x {size[1]}; change the size, or use --chroma 444",
             where,
         )
-    if max(size) > 16_384 or min(size) < 16:
-        raise FileError(f"cannot hold pictures of {size[0]} x {size[1]} pixels: 16 to 16,384", where)
+    if max(size) > 16_384 or min(size) < least:
+        raise FileError(f"cannot hold pictures of {size[0]} x {size[1]} pixels: {least} to 16,384", where)
 
 
 def _halves(chroma: str) -> tuple[int, int]:
@@ -138,8 +139,6 @@ def _halves(chroma: str) -> tuple[int, int]:
 
 def _library(codec: Codec) -> Any:
     """The package; FileError if it is not there, or was built without the codec."""
-    # The encoder of AV1 tells much about itself where nobody asks.
-    os.environ.setdefault("SVT_LOG", "1")
     try:
         import av
     except ImportError:
@@ -195,7 +194,7 @@ def _stream(plan: Plan, film: Any) -> Any:
     context.time_base = 1 / plan.fps
     context.framerate = plan.fps
     _tell_colors(context, plan)
-    if plan.stereo in MATROSKA and not plan.swap and plan.path.suffix.lower() in (".mkv", ".webm"):
+    if plan.stereo in MATROSKA and not plan.swap and plan.path.suffix.lower() == ".mkv":
         stream.metadata["stereo_mode"] = MATROSKA[plan.stereo]
     return stream
 

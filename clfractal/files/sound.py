@@ -80,8 +80,9 @@ def _decoded(form: bytes, data: bytes, name: str) -> Sound:
     if not (1 <= channels <= 64 and _RATES[0] <= rate <= _RATES[1] and width == channels * bits // 8):
         raise FileError("is damaged: its form makes no sense", Where(name))
     whole = data[: len(data) // width * width]
-    numbers = _numbers(whole, kind, bits).reshape(-1, channels)
-    samples = numbers.mean(axis=1, dtype=np.float64).astype(np.float32)
+    with np.errstate(all="ignore"):  # what is out of range is refused below
+        numbers = _numbers(whole, kind, bits).reshape(-1, channels)
+        samples = numbers.mean(axis=1, dtype=np.float64).astype(np.float32)
     if not len(samples):
         raise FileError("holds no sound", Where(name))
     if not np.isfinite(samples).all():

@@ -9,7 +9,7 @@ the sphere. How far along such a curve a time is, is again a monotone cubic. So 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from math import acos, isclose, sin, sqrt
+from math import acos, dist, isclose, sin, sqrt
 from typing import Protocol, TypeAlias
 
 Values: TypeAlias = tuple[float, ...]
@@ -133,7 +133,7 @@ def unit(a: Values) -> Values:
 
 def apart(a: Values, b: Values) -> float:
     """The distance between two places."""
-    return sqrt(sum((x - y) ** 2 for x, y in zip(a, b, strict=True)))
+    return dist(a, b)
 
 
 def _across(a: Values) -> Values:

@@ -7,12 +7,12 @@ is).
 """
 
 from collections.abc import Sequence
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from math import exp, log
 
-from clfractal.scene.curves import Curve, Monotone, Path, Values, apart, span_of, turned, unit
+from clfractal.scene.curves import Monotone, Path, Values, apart, span_of, turned, unit
 
-_PANELS = 32  # of Simpson's rule, between two keys
+_PANELS = 256  # of Simpson's rule, between two keys
 
 
 class Distance:
@@ -38,52 +38,60 @@ class EvenTarget:
     def __init__(
         self, times: Sequence[float], targets: Sequence[Values], distance: Distance, *, closed: bool = False
     ) -> None:
-        self._times, self._distance = tuple(times), distance
-        parts = [self._area(times[i], times[i + 1]) for i in range(len(times) - 1)]
-        self._whole = sum(parts)
-        self._ends = [0.0, *(part / self._whole for part in accumulate(parts))] if parts else [0.0]
-        self._path = Path(self._ends, targets, closed=closed)
+        self._distance = distance
+        edges = [times[0]]
+        for before, after in pairwise(times):
+            edges += [before + (after - before) * panel / _PANELS for panel in range(1, _PANELS)] + [after]
+        self._edges = edges
+        self._areas = [0.0, *accumulate(self._area(before, after) for before, after in pairwise(edges))]
+        self._path = Path(self._areas[::_PANELS], targets, closed=closed)
 
     def _area(self, begin: float, end: float) -> float:
-        """The integral of the distance over a time, by Simpson's rule."""
-        step = (end - begin) / _PANELS
-        inner = sum((4 if i % 2 else 2) * self._distance.number(begin + i * step) for i in range(1, _PANELS))
-        return (self._distance.number(begin) + inner + self._distance.number(end)) * step / 3
+        """The integral of the distance over a short time, by Simpson's rule."""
+        first, middle, last = (self._distance.number(time) for time in (begin, 0.5 * (begin + end), end))
+        return (first + 4 * middle + last) * (end - begin) / 6
 
     def at(self, time: float) -> Values:
         """As a `Curve`."""
-        index, share = span_of(self._times, time)
+        if len(self._edges) == 1:
+            return self._path.at(0.0)
+        index, share = span_of(self._edges, time)
         if share in (0.0, 1.0):
-            return self._path.at(self._ends[min(index + int(share), len(self._ends) - 1)])
-        return self._path.at(self._ends[index] + self._area(self._times[index], time) / self._whole)
+            return self._path.at(self._areas[index + int(share)])
+        return self._path.at(self._areas[index] + self._area(self._edges[index], time))
 
 
 class Around:
-    """A camera's place, by direction and distance from a target that may move.
+    """Where a camera is from its target: a direction and a distance.
 
     Args:
         times: of the keys, rising.
         places: the camera's, one for each; none of them is at the target.
-        target: where the camera looks.
+        targets: where it looks then.
     """
 
     def __init__(
-        self, times: Sequence[float], places: Sequence[Values], target: Curve, *, closed: bool = False
+        self,
+        times: Sequence[float],
+        places: Sequence[Values],
+        targets: Sequence[Values],
+        *,
+        closed: bool = False,
     ) -> None:
-        seen = [target.at(time) for time in times]
-        self.target = target
-        self.distance = Distance(times, distances(places, seen), closed=closed)
-        directions = [
-            unit(tuple(x - y for x, y in zip(place, at, strict=True)))
-            for place, at in zip(places, seen, strict=True)
+        offsets = [
+            tuple(x - y for x, y in zip(place, target, strict=True))
+            for place, target in zip(places, targets, strict=True)
         ]
-        self._direction = Path(times, directions, turned, closed=closed)
+        self._at_keys = dict(zip(times, offsets, strict=True))
+        self.distance = Distance(times, distances(places, targets), closed=closed)
+        self._direction = Path(times, [unit(offset) for offset in offsets], turned, closed=closed)
 
     def at(self, time: float) -> Values:
-        """As a `Curve`."""
+        """The way from the target to the camera."""
+        if time in self._at_keys:
+            return self._at_keys[time]
         distance = self.distance.number(time)
-        seen, direction = self.target.at(time), self._direction.at(time)
-        return tuple(x + distance * y for x, y in zip(seen, direction, strict=True))
+        return tuple(distance * x for x in self._direction.at(time))
 
 
 def distances(places: Sequence[Values], targets: Sequence[Values]) -> list[float]:

@@ -89,6 +89,8 @@ class Movement:
             columns.append(values)
         for component in zip(*columns, strict=True):
             found |= {component.index(min(component)), component.index(max(component))}
+        if mover.target.kind == "whole":  # of which some may be no choice
+            found |= set({round(values[0]): frame for frame, values in enumerate(columns)}.values())
         return found
 
 

@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, log
+from math import exp, isfinite, log
 from typing import Any, TypeAlias
 
-from clfractal.errors import FileError, SceneError, Where
+from clfractal.errors import FileError, FormulaError, SceneError, Where
 from clfractal.formulas.catalog import safe_path
 from clfractal.formulas.evaluate import as_function
 from clfractal.formulas.parser import parse
@@ -31,6 +31,11 @@ At: TypeAlias = Callable[[float], Values]
 """The value at a place in the film, in frames from its beginning, which may lie between two."""
 
 _NAMES = ("frame", "t", "u")
+# Keys nearer to each other, frames, are at the same time.
+_SAME_TIME = 1e-6
+# As of a camera and its target: parts of their coordinates.
+_TOO_NEAR = 1e-14
+_LARGEST = 700.0  # of a logarithm: what is larger is beyond all ranges
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +56,8 @@ class Mover:
         """The value as the scene has it: a number, or a tuple of them."""
         found = self.at(frame)
         if self.target.kind == "whole":
+            if not isfinite(found[0]):
+                raise FormulaError(f"is not a finite number at frame {frame:g}", self.where)
             return round(found[0])
         return found if len(found) > 1 else found[0]
 
@@ -106,21 +113,31 @@ class Movers:
     # -- keys
 
     def _by_keys(self, name: str) -> At:
+        place = self._flight_of(name)
+        if place == name:
+            return self._flight(name)
+        curve = (self._even_target(place, name) if place is not None else None) or self._curve(name)
+        clock = self._clock(name)
+        return lambda frame: curve.at(clock(frame))
+
+    def _clock(self, name: str) -> Callable[[float], float]:
+        """From a frame to the time between a track's keys that it shows."""
         track = self.animation.tracks[name]
         times, _, closed = self._keys(name)
-        curve = self._flight(name) or self._curve(name)
-        last = times[-1] if len(times) > 1 else None
-        repeat = "loop" if closed and self.animation.loop else track.repeat
-        if repeat == "none" or last is None:
-            return curve.at
-        first, period = times[0], last - times[0]
+        loops = closed and self.animation.loop
+        repeat = "loop" if loops else track.repeat
+        first, period = times[0], times[-1] - times[0]
+        if repeat == "none" or period == 0:
+            return lambda frame: frame
 
-        def repeated(frame: float) -> Values:
+        def time_of(frame: float) -> float:
+            if frame < first and not loops:
+                return first
             turns, rest = divmod(frame - first, period)
             backwards = repeat == "ping_pong" and turns % 2 == 1
-            return curve.at(first + (period - rest if backwards else rest))
+            return first + (period - rest if backwards else rest)
 
-        return repeated
+        return time_of
 
     def _keys(self, name: str) -> tuple[list[float], list[Values], bool]:
         """Times and values of a track's keys, and whether they are a ring.
@@ -137,6 +154,8 @@ class Movers:
         ends_meet = len(values) > 2 and same(values[0], values[-1])
         if self.animation.loop and track.repeat == "none" and len(values) > 1:
             end = times[0] + self.animation.count
+            if abs(times[-1] - end) < _SAME_TIME:  # seconds are rounded
+                times[-1] = end
             if times[-1] > end or (times[-1] == end and not ends_meet):
                 key = f"keys.{len(times) - 1}"
                 raise self._wrong(
@@ -181,59 +200,69 @@ class Movers:
             return Spans(times, values, ways, smooth, _geometric)
         return _components(times, values, ways, closed=closed)
 
-    def _flight(self, name: str) -> Curve | None:
-        """The curve of a camera that flies round its target, or of the target of such a camera; None of anything else."""
-        target = self.targets[name]
-        camera = target.path[:-1]
-        place = self.names.get((*camera, "position"))
-        if place is None or not is_camera_place(self.scene, (*camera, "position")):
+    def _flight_of(self, name: str) -> str | None:
+        """The track of the position of a camera that flies round its target, if this is it, or its target's; else None."""
+        path = self.targets[name].path
+        place = self.names.get((*path[:-1], "position"))
+        if path[-1] not in ("position", "target") or place is None:
             return None
-        if target.path[-1] not in ("position", "target") or not self._flies_around(place):
-            return None
-        seen = self.names.get((*camera, "target"))
-        times, places, _ = self._keys(place)
-        found = self._around(place, seen)
-        if target.path[-1] == "target":
-            return found.target
-        return Spans(times, places, [None] * (len(times) - 1), found, straight)
+        flies = is_camera_place(self.scene, self.targets[place].path) and self._flies_around(place)
+        return place if flies else None
 
     def _flies_around(self, name: str) -> bool:
         track = self.animation.tracks[name]
         if track.keys is None or len(track.keys) < 2:
             return False
-        smooth = all(way is None for way in self._ways(name, len(track.keys) - 1))
+        smooth = self._is_smooth(name)
         if track.around_target and not smooth:
             raise self._wrong(name, "around_target", "applies to a smooth track")
         return smooth if track.around_target is None else track.around_target
 
-    def _around(self, place: str, seen: str | None) -> Around:
-        times, places, closed = self._keys(place)
-        target = self._seen(place, seen, times, places, closed=closed)
-        for index, (time, at) in enumerate(zip(times, places, strict=True)):
-            if same(target.at(time), at):
-                raise self._wrong(
-                    place, f"keys.{index}.value", f"must differ from the camera's target at frame {time:g}"
-                )
-        return Around(times, places, target, closed=closed)
+    def _is_smooth(self, name: str) -> bool:
+        track = self.animation.tracks[name]
+        return track.keys is not None and all(way is None for way in self._ways(name, len(track.keys) - 1))
 
-    def _seen(
-        self, place: str, seen: str | None, times: Sequence[float], places: Sequence[Values], *, closed: bool
-    ) -> Curve:
-        """Where the camera looks."""
-        if seen is None:
-            camera: Any = self.scene
-            for part in self.targets[place].path[:-1]:
-                camera = camera[int(part)] if isinstance(camera, tuple) else getattr(camera, part)
-            return _Constant(camera.target)
-        if self.animation.tracks[seen].keys is None:
-            return _Function(self._mover(seen).at)
+    def _flight(self, place: str) -> At:
+        """The place of a camera: its way from the target, by the clock of its own track, from where the target is then."""
+        target_at = self._seen(place)
+        times, places, closed = self._keys(place)
+        targets = [target_at(time) for time in times]
+        for index, (time, at, target) in enumerate(zip(times, places, targets, strict=True)):
+            if not all(map(isfinite, target)):
+                raise self._wrong(
+                    place, f"keys.{index}", f"needs a target, which is not finite at frame {time:g}"
+                )
+            if apart(at, target) <= _TOO_NEAR * max(map(abs, (*at, *target))):
+                message = f"must differ from the camera's target at frame {time:g}"
+                raise self._wrong(place, f"keys.{index}.value", message)
+        around = Around(times, places, targets, closed=closed)
+        clock = self._clock(place)
+        return lambda frame: tuple(
+            x + y for x, y in zip(target_at(frame), around.at(clock(frame)), strict=True)
+        )
+
+    def _seen(self, place: str) -> At:
+        """Where the camera looks, by frame."""
+        path = self.targets[place].path[:-1]
+        seen = self.names.get((*path, "target"))
+        if seen is not None:
+            return self._mover(seen).at
+        camera: Any = self.scene
+        for part in path:
+            camera = camera[int(part)] if isinstance(camera, tuple) else getattr(camera, part)
+        target: Values = camera.target
+        return lambda frame: target
+
+    def _even_target(self, place: str, seen: str) -> Curve | None:
+        """The target of a flight, if its keys are at the same times as those of the camera; None otherwise."""
+        times, places, closed = self._keys(place)
         own_times, targets, own_closed = self._keys(seen)
-        smooth = all(way is None for way in self._ways(seen, len(own_times) - 1))
-        if own_times != list(times) or not smooth or own_closed != closed:
-            return self._curve(seen)
+        same_clock = self.animation.tracks[place].repeat == self.animation.tracks[seen].repeat
+        if own_times != times or own_closed != closed or not same_clock or not self._is_smooth(seen):
+            return None
         ways = [apart(a, b) for a, b in zip(places, targets, strict=True)]
         if min(ways) <= 0:
-            return self._curve(seen)
+            return None
         return EvenTarget(times, targets, Distance(times, ways, closed=closed), closed=closed)
 
     # -- expressions and tables
@@ -284,22 +313,6 @@ class Movers:
         return at
 
 
-class _Constant:
-    def __init__(self, value: Values) -> None:
-        self._value = value
-
-    def at(self, time: float) -> Values:
-        return self._value
-
-
-class _Function:
-    def __init__(self, function: At) -> None:
-        self._function = function
-
-    def at(self, time: float) -> Values:
-        return self._function(time)
-
-
 class _Exponential:
     """Numbers whose logarithms follow a curve."""
 
@@ -307,7 +320,7 @@ class _Exponential:
         self._logarithms = logarithms
 
     def at(self, time: float) -> Values:
-        return tuple(exp(number) for number in self._logarithms.at(time))
+        return tuple(exp(min(number, _LARGEST)) for number in self._logarithms.at(time))
 
 
 class _Together:
@@ -338,4 +351,4 @@ def _together(times: Sequence[float], values: Sequence[Values], *, closed: bool)
 
 def _geometric(a: Values, b: Values, share: float) -> Values:
     """The numbers that are reached from `a` by a part of the factor to `b`."""
-    return tuple(x * (y / x) ** share for x, y in zip(a, b, strict=True))
+    return tuple(exp(min(log(x) + share * (log(y) - log(x)), _LARGEST)) for x, y in zip(a, b, strict=True))

@@ -105,7 +105,7 @@ def _below(value: Any, path: Sequence[str], depth: int) -> Any:
     if isinstance(value, Mapping):
         return value.get(part)  # whether there is such a parameter the formula tells
     if isinstance(value, tuple):
-        if not part.isdecimal() or int(part) >= len(value):
+        if not (part.isdecimal() and part == str(int(part)) and int(part) < len(value)):
             entries = f"entries 0 to {len(value) - 1}" if value else "no entries"
             raise SceneError(f"cannot move: {shown} has {entries}")
         return value[int(part)]
@@ -137,7 +137,8 @@ def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
             annotation = str(type(owner).model_fields[key].annotation)
             if "float" not in annotation or "Literal" in annotation:
                 raise SceneError("cannot move: it is null, and would be no number")
-            return "direction" if key in _DIRECTIONS else "place" if key in _PLACES else "number"
+            several = "tuple" in annotation
+            return "direction" if key in _DIRECTIONS else "place" if several else "number"
     if isinstance(value, (Section, Mapping)):
         known = _keys_of(value) if isinstance(value, Section) else list(value)
         listing = f"keys, {', '.join(known)}" if known else f"values, such as {'.'.join(path)}.NAME"
@@ -169,7 +170,9 @@ def _size(owner: Any, key: str, kind: Kind, value: Any) -> int | None:
         return None
     if isinstance(value, tuple):
         return len(value)
-    return 3 if value is None and kind in ("place", "direction") else 1
+    if value is None and kind == "place":  # how many, the schema tells
+        return None
+    return 3 if value is None and kind == "direction" else 1
 
 
 def with_values(scene: Scene, values: Mapping[tuple[str, ...], Any], **others: Any) -> Scene:

@@ -37,8 +37,8 @@ def at_frame(scene: Scene | str | Path | Mapping[str, Any], frame: float) -> Sce
 class FilmScenes:
     """The scenes of a film's frames, as they are rendered.
 
-    What a scene leaves to be measured is measured in frame 0 where all frames must have the same (`output.exposure`,
-    `stereo.fit`), whichever frames are rendered; what a camera is focused on is measured in each frame.
+    `output.exposure: auto` is measured in frame 0, whichever frames are rendered, so that all have the same. What follows
+    the camera, `camera.focus` and `stereo.fit`, is measured in each frame.
 
     Raises:
         SceneError, FormulaError, FileError: the scene has no animation, or a track is wrong.
@@ -61,13 +61,10 @@ class FilmScenes:
             DeviceError, KernelBuildError: the quick look failed that frame 0 needs.
         """
         found = self.movement.scene(number)
-        update: dict[str, Any] = {}
-        if isinstance(found.output.exposure, str):
-            exposure = self._measured().output.exposure
-            update["output"] = found.output.model_copy(update={"exposure": exposure})
-        if found.stereo is not None and found.stereo.fit is not None:
-            update["stereo"] = self._measured().stereo
-        return found.model_copy(update=update) if update else found
+        if not isinstance(found.output.exposure, str):
+            return found
+        output = found.output.model_copy(update={"exposure": self._measured().output.exposure})
+        return found.model_copy(update={"output": output})
 
     def _measured(self) -> Scene:
         """Frame 0 with numbers in the place of what is to be measured."""

@@ -48,11 +48,21 @@ def loudness(
 
     Args:
         bands: lowest and highest frequency of each, Hz; a frequency at the upper end belongs to the next band.
+
+    Raises:
+        ValueError: a band is too narrow, or beyond the sound's frequencies.
     """
     width = 2 * max(int(sound.rate * max(_WINDOW, 2 / fps) / 2), 8)
     window = np.hanning(width + 1)[:-1]
     frequencies = np.fft.rfftfreq(width, 1 / sound.rate)
     inside = [(frequencies >= low) & (frequencies < high) for low, high in bands]
+    for (low, high), chosen in zip(bands, inside, strict=True):
+        if not chosen.any():
+            least = sound.rate / width
+            raise ValueError(
+                f"{low:g}-{high:g} Hz holds no frequency that is told apart: they are {least:g} Hz apart, up to"
+                f" {sound.rate / 2:g} Hz"
+            )
     # Each frequency but 0 and the highest stands for two of the whole transform.
     twice = np.where((frequencies == 0) | (frequencies == sound.rate / 2), 1.0, 2.0)
     scale = twice / (width * (window**2).sum())

@@ -181,6 +181,53 @@ def test_position_and_target_fly_together() -> None:
     assert max(steps) < 1.01 * min(steps)
 
 
+def test_a_camera_follows_a_target_with_a_clock_of_its_own() -> None:
+    """It keeps its distance of 3 from where the target is, however either of them repeats."""
+    circle = [[3.0, 0, 0], [0.0, 3, 0], [-3.0, 0, 0], [0.0, -3, 0], [3.0, 0, 0]]
+    there = keys(*((2 * i, row) for i, row in enumerate(circle)), repeat="loop")
+    target: dict[str, Any] = {"expression": ["t", "0", "2*u"]}
+    moved = {
+        "camera.position": keys(*((2 * i, [x, y, z]) for i, (x, y, z) in enumerate(circle)), repeat="loop")
+    }
+    still = moving(moved)
+    assert [math.hypot(*place) for place in values(still, "camera.position")] == pytest.approx([3.0] * 21)
+    both = moving(
+        {
+            "camera.position": there,
+            "camera.target": keys((0, [0.0, 0, 0]), (5, [0.0, 0, 1]), repeat="ping_pong"),
+        }
+    )
+    for frame in range(21):
+        camera = clfractal.at_frame(both, frame).camera
+        assert 2.9 < math.dist(camera.position, camera.target) < 3.3
+    assert clfractal.at_frame(moving({"camera.target": target, **moved}), 10).camera.target == (1, 0, 1)
+
+
+def test_before_its_first_key_a_repeating_track_rests() -> None:
+    for repeat in ("loop", "ping_pong"):
+        track = keys((5, 0.0), (10, 1.0), interpolation="linear", repeat=repeat)
+        assert values(moving({"coloring.offset": track}), "coloring.offset")[:6] == [0.0] * 6
+
+
+@pytest.mark.parametrize("seconds", [8.3, 4.1, 0.7])
+def test_a_loop_may_end_with_its_first_key_in_seconds(seconds: float) -> None:
+    wave = ((0, 0), (seconds / 3, 1), (2 * seconds / 3, -1), (seconds, 0))
+    track = {"keys": [{"time": time, "value": value} for time, value in wave]}
+    scene = moving({"coloring.offset": track}, fps=30, frames=None, duration=seconds, loop=True)
+    found = values(scene, "coloring.offset")
+    assert found[1] > 0
+    assert found[-1] == pytest.approx(-found[1], rel=1e-6)
+
+
+def test_what_is_null_has_as_many_numbers_as_the_schema_says() -> None:
+    base: dict[str, Any] = {"formula": {"name": "quaternion_mandelbrot"}}
+    scene = moving({"formula.julia": keys((0, [0.1, 0, 0, 0]), (20, [0.3, 0, 0, 0]))}, base=base)
+    assert clfractal.at_frame(scene, 10).formula.julia == pytest.approx((0.2, 0, 0, 0))
+    base = {"camera": {"position": [0, -3, 0], "f_number": 2}}
+    scene = moving({"camera.focus_on": keys((0, [0.0, 0.5]), (20, [1.0, 0.5]))}, base=base)
+    assert clfractal.at_frame(scene, 10).camera.focus_on == pytest.approx((0.5, 0.5))  # type: ignore[union-attr]
+
+
 def test_a_table_moves_a_value(tmp_path: Path) -> None:
     rows = "\n".join(f"{frame}, {0.1 * frame}" for frame in range(21))
     (tmp_path / "sound.csv").write_text(f"frame, bass\n{rows}\n")
@@ -240,6 +287,9 @@ REFUSED = {
     "camera..fov: {expression: '1'}": "must name a value by its dotted keys, such as camera.position",
     "formula.parameters: {expression: '1'}": "cannot move as a whole: name one of its values, such as"
     " formula.parameters.NAME",
+    "camera.position.02: {expression: '1'}": "cannot move: camera.position has entries 0 to 2",
+    "camera.target: {expression: ['1e200*u', '0', '0']}": "must be at most 1000000",
+    "formula.iterations: {expression: '8 + 1/(frame - 2)'}": "is not a finite number at frame 2",
     "image.width: {expression: '1'}": "cannot move: it is the same for all frames of a film",
     "output.quality: {expression: '1'}": "cannot move: it says how files are written; only output.exposure can move",
     "renderer.samples: {expression: '1'}": "cannot move: it is a whole number, and decides how the picture is made",
@@ -323,6 +373,7 @@ TABLES = {
     "treble\n" + "1\n" * 21: "sound.csv:1: unknown column 'bass'; known: treble",
     "bass\n1\nx\n": "sound.csv:3: column 'bass' must hold finite numbers, got 'x'",
     "a,bass\n1\n": "sound.csv:2: column 'bass' must hold finite numbers, got ''",
+    "bass\n1\n\n2\n": "sound.csv:3: must have a row for each frame, without blank ones",
     'bass\n"1': "sound.csv:2: is no CSV table: unexpected end of data",
 }
 

@@ -186,7 +186,7 @@ def test_spans_go_their_own_ways() -> None:
 
 
 def test_a_dive_nears_its_target_by_the_same_factor_each_second() -> None:
-    around = Around([0.0, 10.0], [(0.0, -3.0, 0.0), (0.0, -3e-6, 0.0)], Path([0.0], [(0.0, 0.0, 0.0)]))
+    around = Around([0.0, 10.0], [(0.0, -3.0, 0.0), (0.0, -3e-6, 0.0)], [(0.0, 0.0, 0.0)] * 2)
     found = [apart(around.at(float(time)), (0.0, 0.0, 0.0)) for time in range(11)]
     factors = np.divide(found[1:], found[:-1])
     np.testing.assert_allclose(factors, 10**-0.6, rtol=1e-9)
@@ -208,8 +208,20 @@ def test_a_target_moves_by_the_same_part_of_the_picture_each_second() -> None:
     assert target.at(10.0) == pytest.approx((0.52, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("least", [1e-3, 1e-6, 1e-9])
+def test_a_steep_dive_meets_its_target(least: float) -> None:
+    """The distance falls by equal factors, so the target's way is known: as far as the distance has fallen."""
+    times = [0.0, 239.0]
+    distance = Distance(times, [3.0, least])
+    target = EvenTarget(times, [(0.0, 0.0, 0.0), (0.65, 0.0, 0.0)], distance)
+    for time in (1.0, 100.0, 200.3, 230.0, 238.0, 238.9):
+        now = distance.number(time)
+        left = 0.65 - target.at(time)[0]
+        assert left == pytest.approx(0.65 * (now - least) / (3 - least), abs=1e-4 * now + 1e-15)
+
+
 def test_a_flight_round_a_still_target_keeps_its_distance() -> None:
     rows = [(3.0, 0.0, 0.0), (0.0, 3.0, 0.0), (-3.0, 0.0, 1e-9)]
-    around = Around([0.0, 1.0, 2.0], rows, Path([0.0], [(0.0, 0.0, 0.0)]))
+    around = Around([0.0, 1.0, 2.0], rows, [(0.0, 0.0, 0.0)] * 3)
     for time in np.linspace(0, 2, 41):
         assert apart(around.at(float(time)), (0.0, 0.0, 0.0)) == pytest.approx(3)
