@@ -16,10 +16,10 @@ from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.progress import shown_rate
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
+from clfractal.commands.slices import check_numbered
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, speaking_of
 from clfractal.files.film_kinds import CONTAINERS, Recipe
-from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 
@@ -93,7 +93,7 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
         if kept.pattern is not None:
             patterns.append(kept.pattern)
         files = {number: tuple(frame_file(path, number) for path in patterns) for number in numbers}
-        _check_files(scene, [*files.values()], [film.path for film in films])
+        check_numbered(scene, [*files.values()], [film.path for film in films])
         for film in films:
             if not film.tells_stereo:
                 shell.say(f"{film.path}: players are not told how it holds two pictures; choose it there")
@@ -243,22 +243,6 @@ def _check_pattern(path: Path) -> None:
 
 def _partial(paths: tuple[Path, ...]) -> Path:
     return paths[0].with_name(paths[0].name + PARTIAL)
-
-
-def _check_files(scene: Scene, files: list[tuple[Path, ...]], films: list[Path]) -> None:
-    """Checks all files before anything is rendered."""
-    from clfractal.pictures.formats import Content, check_output
-    from clfractal.pictures.outputs import output_files
-
-    written, content = [*films], Content.of(scene)
-    for paths in files:
-        for path in paths:
-            for file in output_files(scene.stereo, path):
-                if paths is files[0] or file.exists() or file.is_symlink():
-                    check_output(file, content)
-                written.append(file)
-        written.append(_partial(paths))
-    refuse_overwriting(written, scene.files)
 
 
 def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:

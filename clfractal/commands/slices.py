@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -63,7 +64,7 @@ def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
         raise SceneError(f"must be cut_plane for slices, got {scene.renderer.type}", where)
     numbers = range(stack.start, stack.count + 1)
     files = [_numbered(order.outputs, number, stack.count) for number in numbers]
-    _check_files(scene, files)
+    check_numbered(scene, files)
     scenes = [slice_scene(scene, stack, number) for number in numbers]
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands.numbered import render_one
@@ -129,12 +130,12 @@ def _numbered(outputs: tuple[Path, ...], number: int, count: int) -> tuple[Path,
     return tuple(path.with_name(f"{path.stem}_{number:0{digits}d}{path.suffix}") for path in paths)
 
 
-def _check_files(scene: Scene, files: list[tuple[Path, ...]]) -> None:
-    """Checks all files before anything is rendered."""
+def check_numbered(scene: Scene, files: list[tuple[Path, ...]], others: Sequence[Path] = ()) -> None:
+    """Checks the files of all pictures of a command, and others that it writes, before anything is rendered."""
     from clfractal.pictures.formats import Content, check_output
     from clfractal.pictures.outputs import output_files
 
-    written, content = [], Content.of(scene)
+    written, content = [*others], Content.of(scene)
     for paths in files:
         for path in paths:
             for file in output_files(scene.stereo, path):
