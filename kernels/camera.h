@@ -1,3 +1,5 @@
+#include "view.h"
+
 // One View makes all rays: a plane with an eye behind it, at infinity for an orthographic camera.
 typedef struct {
     vec origin;       // scene units
@@ -11,36 +13,37 @@ typedef struct {
 #define RAY_NOTHING_KNOWN ((real)(REAL_LARGEST))
 
 // The ray through the picture at (x, y), in pixels from the top left corner, and through the lens at (lens_x, lens_y), in
-// lens radii from its middle.
-INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, __constant const struct View *view) {
+// lens radii from its middle; `time` is when the shutter lets it in (see view.h).
+INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, real time, __constant const struct View *view) {
     const real across = x - (real)(view->center_x);
     const real below = y - (real)(view->center_y);
-    const vec on_plane = vec_along(vec_along(vec_splat(view->center), across, vec_splat(view->right)), below, vec_splat(view->down));
+    const vec on_plane = vec_along(vec_along(VIEW_VEC(view, center, time), across, VIEW_VEC(view, right, time)), below,
+                                   VIEW_VEC(view, down, time));
     ray r;
     r.near = R(0.0);
     r.far = (real)(REAL_LARGEST);
     r.known = RAY_NOTHING_KNOWN;
     if (view->perspective) {
         // Relative to the eye, so that a far-off camera loses no more digits than it must.
-        const vec from_eye = vec_sub(on_plane, vec_splat(view->eye));
+        r.origin = VIEW_VEC(view, eye, time);
+        const vec from_eye = vec_sub(on_plane, r.origin);
         const real inverse = R(1.0) / sqrt(vec_dot(from_eye, from_eye));
-        r.origin = vec_splat(view->eye);
         r.direction = vec_scale(from_eye, inverse);
         r.footprint = R(0.0);
-        r.spread = (real)(view->pixel_size) * inverse;
+        r.spread = VIEW_NUMBER(view, pixel_size, time) * inverse;
 #if HAS_LENS
         // A thin lens: whatever its point, all rays of a pixel meet again in the plane of focus.
-        const real to_focus = (real)(view->focus_distance) / vec_dot(r.direction, vec_splat(view->axis));
-        const vec on_lens = vec_along(vec_along(vec_of(R(0.0), R(0.0), R(0.0)), lens_x * (real)(view->lens_radius),
-                                                vec_splat(view->side)),
-                                      lens_y * (real)(view->lens_radius), vec_splat(view->up));
+        const real to_focus = VIEW_NUMBER(view, focus_distance, time) / vec_dot(r.direction, VIEW_VEC(view, axis, time));
+        const real lens_radius = VIEW_NUMBER(view, lens_radius, time);
+        const vec on_lens = vec_along(vec_along(vec_of(R(0.0), R(0.0), R(0.0)), lens_x * lens_radius, VIEW_VEC(view, side, time)),
+                                      lens_y * lens_radius, VIEW_VEC(view, up, time));
         r.direction = vec_normalize(vec_sub(vec_scale(r.direction, to_focus), on_lens));
         r.origin = vec_add(r.origin, on_lens);
 #endif
     } else {
         r.origin = on_plane;
-        r.direction = vec_splat(view->axis);
-        r.footprint = (real)(view->pixel_size);
+        r.direction = VIEW_VEC(view, axis, time);
+        r.footprint = VIEW_NUMBER(view, pixel_size, time);
         r.spread = R(0.0);
     }
     return r;
@@ -57,4 +60,9 @@ INLINE mask ray_clip(ray *r, __constant const scalar *center, real radius) {
     r->near = fmax(r->near, middle - half_chord);
     r->far = fmin(r->far, middle + half_chord);
     return less(R(0.0), half_square) & less(r->near, r->far);
+}
+
+// How far a point lies from the eye along the view's axis.
+INLINE real depth_of(vec point, real time, __constant const struct View *view) {
+    return vec_dot(vec_sub(point, VIEW_VEC(view, eye, time)), VIEW_VEC(view, axis, time));
 }

@@ -4,6 +4,7 @@
 #include "numbers/dual.h"
 #include "vectors.h"
 #include "structs.h"
+#include "view.h"
 #include "formula.h"
 #include "orbit.h"
 #include "sampling.h"
@@ -16,6 +17,7 @@
 // What a shot reads.
 typedef struct {
     __constant const struct View *view;
+    __constant const struct Sampling *sampling;
     __constant const struct PlaneSettings *settings;
     __constant const struct Orbit *orbit;
     __constant const scalar *k;
@@ -25,15 +27,16 @@ typedef struct {
 
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
     const real from_center_x = at->x - (real)(w.view->center_x), from_center_y = at->y - (real)(w.view->center_y);
-    const vec right = vec_splat(w.view->right), down = vec_splat(w.view->down);
+    const real time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
+    const vec right = VIEW_VEC(w.view, right, time), down = VIEW_VEC(w.view, down, time);
     shot s;
-    s.point = vec_along(vec_along(vec_splat(w.view->center), from_center_x + across, right), from_center_y + below, down);
+    s.point = vec_along(vec_along(VIEW_VEC(w.view, center, time), from_center_x + across, right), from_center_y + below, down);
     const escaped e = plane_escape(s.point, active, SMOOTH, w.settings->periodicity, w.orbit, w.k);
     s.radiance = escape_color(e, w.colors, w.palette);
     s.hit = active;
     s.coverage = R(1.0);
     s.depth = R(0.0);
-    s.normal = vec_scale(vec_splat(w.view->axis), R(-1.0));
+    s.normal = vec_scale(VIEW_VEC(w.view, axis, time), R(-1.0));
     s.smooth = e.count;
     s.steps = e.applications;
     cost->steps += pick(active, R(1.0), R(0.0));
@@ -46,7 +49,7 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
 __kernel void cut_plane(PASS_BUFFERS, __constant const struct PlaneSettings *settings, __constant const struct Orbit *orbit,
                         __constant const scalar *k, __constant const struct EscapeColors *colors,
                         __global const float *palette, PASS_SPAN) {
-    const world w = {view, settings, orbit, k, colors, palette};
+    const world w = {view, sampling, settings, orbit, k, colors, palette};
     const pass span = PASS;
     render_packet((int)get_global_id(0) + first_packet, (int)get_global_id(1), span, w);
 }

@@ -9,18 +9,19 @@ INLINE pixel sums_before(stage s, const place_in_pass *here) {
 }
 
 CALLED ray eye_ray(const aim *a, __constant const struct View *view) {
-    return camera_ray(a->x, a->y, a->lens_x, a->lens_y, view);
+    return camera_ray(a->x, a->y, a->lens_x, a->lens_y, a->time, view);
 }
 
 INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     real across, below;
     sample_offset(s.span, &here->at, s.sample, &across, &below);
-    aim a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0)};
+    aim a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0), R(0.0)};
 #if HAS_LENS
     const bits seed = pixel_seed(here->at.columns, here->at.rows, (uint)s.span.sampling->seed, PURPOSE_LENS);
     unit_square((bits)((uint)s.sample), seed, &a.lens_x, &a.lens_y);
     unit_disk(a.lens_x, a.lens_y, &a.lens_x, &a.lens_y);
 #endif
+    a.time = shutter_time(here->at.columns, here->at.rows, (uint)s.span.sampling->seed, s.sample);
     return a;
 }
 

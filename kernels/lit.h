@@ -57,14 +57,14 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
 }
 
 // Goes on along the mirrored ray.
-INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, const spot *here, world w) {
+INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const spot *here, world w) {
     spot seen_first = *here;
     if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
     so_far->through *= (real)(w.material->reflection);
     so_far->origin = vec_along(here->point, here->cone * (real)(w.settings->shadow_lift), here->normal);
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);
     so_far->footprint = here->cone;
-    so_far->spread = from_eye.spread + (from_eye.footprint / fmax(depth_of(seen_first.seen, w.view), here->cone));
+    so_far->spread = from_eye.spread + (from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone));
     STATE_KEEP(s, *so_far, STATE_PATH);
     ray r = {so_far->origin, so_far->direction, R(0.0), (real)(REAL_LARGEST), so_far->footprint, so_far->spread,
              RAY_NOTHING_KNOWN};
@@ -89,7 +89,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     result.normal = vec_pick(bare, face.normal, result.normal);
     result.smooth = pick(bare, face.count, result.smooth);
 #endif
-    result.depth = depth_of(result.point, w.view);
+    result.depth = depth_of(result.point, a.time, w.view);
     color background = sky(from_eye.direction, a.y, 0, w);
 #if HAS_FOG
     const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
@@ -104,7 +104,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #if PLANES > 0
     plane_layers layers;
     STATE_RECALL(s, layers, STATE_LAYERS);
-    result = planes_into(result, seen, background, layers, w.view);
+    result = planes_into(result, seen, background, layers, a.time, w.view);
 #endif
     return result;
 }

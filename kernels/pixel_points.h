@@ -27,7 +27,7 @@ INLINE bits points_seed(const packet_pixels *at, int sample, world w) {
     return pixel_seed(at->columns, at->rows, (uint)w.settings->seed + (uint)sample * 0x9e3779b9u, PURPOSE_POINTS);
 }
 
-INLINE pixel_points points_begin(ray pixel_ray, touch touched, bits seed, world w) {
+INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits seed, world w) {
     pixel_points p;
     p.seed = seed;
     p.cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
@@ -41,7 +41,7 @@ INLINE pixel_points points_begin(ray pixel_ray, touch touched, bits seed, world 
 #if GEOMETRIC
     p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
     p.toward = vec_scale(pixel_ray.direction, R(-1.0));
-    const vec side = vec_splat(w.view->side);
+    const vec side = VIEW_VEC(w.view, side, time);
     p.right = vec_normalize(vec_along(side, -vec_dot(side, p.toward), p.toward));
     p.up = vec_cross(p.toward, p.right);
     p.sums = plane_none();
@@ -59,7 +59,7 @@ INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed,
     for (int turn = 0; turn < POINTS; ++turn) {
         real across, below;
         point_offset(point_of_turn(turn), seed, &across, &below);
-        ray r = camera_ray(a.x + across, a.y + below, a.lens_x, a.lens_y, w.view);
+        ray r = camera_ray(a.x + across, a.y + below, a.lens_x, a.lens_y, a.time, w.view);
         r.near = fmax(touched.t - (real)(w.settings->point_start) * cone, R(0.0));
         r.known = touched.t;
         send_clipped(s, turn, r, R(0.0), mask_of(touched.touched), w);

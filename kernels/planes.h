@@ -38,7 +38,7 @@ INLINE mask planes_cut(ray *r, real *face, plane_set set) {
 }
 
 // Puts the planes into a shot whose radiance is still that of the object alone, not over any background.
-INLINE shot planes_into(shot s, color object, color background, plane_layers layers, __constant const struct View *view) {
+INLINE shot planes_into(shot s, color object, color background, plane_layers layers, real time, __constant const struct View *view) {
     const color far = color_add(layers.behind, color_scale(background, layers.behind_through));
     const color middle = color_mix(far, object, s.coverage);
     s.radiance = color_add(layers.front, color_scale(middle, layers.front_through));
@@ -48,6 +48,6 @@ INLINE shot planes_into(shot s, color object, color background, plane_layers lay
     s.point = vec_pick(seen, layers.point, s.point);
     s.normal = vec_pick(seen, layers.normal, s.normal);
     s.smooth = pick(seen, layers.count, s.smooth);
-    s.depth = pick(seen, vec_dot(vec_sub(layers.point, vec_splat(view->eye)), vec_splat(view->axis)), s.depth);
+    s.depth = pick(seen, depth_of(layers.point, time, view), s.depth);
     return s;
 }

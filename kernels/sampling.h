@@ -29,6 +29,7 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_AMBIENT 3u
 #define PURPOSE_ENVIRONMENT 4u
 #define PURPOSE_LIGHT 5u
+#define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0
 #define FILTER_TENT 1
@@ -94,6 +95,15 @@ INLINE void unit_square(bits index, bits seed, real *u, real *v) {
     row ^= row >> 16;
     *u = unit_of_bits(reversed(scramble_reversed(place, hash_bits(seed + 0x9e3779b9u))));
     *v = unit_of_bits(reversed(scramble_reversed(row, hash_bits(seed + 0x3c6ef372u))));
+}
+
+// When a sample of each lane's pixel is taken: 0 is where the shutter opens, and 1 where it closes.
+INLINE real shutter_time(const int *columns, const int *rows, uint seed, int sample) {
+    real time = R(0.0), unused;
+#if HAS_MOTION
+    unit_square((bits)((uint)sample), pixel_seed(columns, rows, seed, PURPOSE_TIME), &time, &unused);
+#endif
+    return time;
 }
 
 // Sine and cosine of an angle given in turns, at most an eighth of one either way: Taylor's series, right to a bit or two.

@@ -55,6 +55,3 @@ INLINE void tally_met(tally *cost, encounter met, int of_surface) {
     cost->bad += met.bad;
 }
 
-INLINE real depth_of(vec point, __constant const struct View *view) {
-    return vec_dot(vec_sub(point, vec_splat(view->eye)), vec_splat(view->axis));
-}

@@ -5,7 +5,8 @@ typedef struct {
     real wanted;           // whether the pixel takes this sample
     real x, y;             // pixels from the picture's top left corner
     real offset;           // distance squared from the pixel's middle, pixels
-    real lens_x, lens_y;   // lens radii from its middle; kept with HAS_LENS only
+    real lens_x, lens_y;   // lens radii from its middle; kept with HAS_LENS or HAS_MOTION only
+    real time;             // while the shutter is open; likewise
 } aim;
 
 // What was found first.
@@ -61,7 +62,7 @@ typedef struct {
 #define COLORING_PER_POINT \
     (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
 // Numbers that are kept of an aim, and of a spot.
-#define AIM_NUMBERS (NUMBERS_OF(aim) - (HAS_LENS ? 0 : 2))
+#define AIM_NUMBERS (NUMBERS_OF(aim) - (HAS_LENS || HAS_MOTION ? 0 : 3))
 #define SPOT_NUMBERS (NUMBERS_OF(spot) - (COLORING_PER_POINT ? 2 : 0))
 
 #define STATE_AIM 0
@@ -86,7 +87,7 @@ typedef char state_has_room[STATE_FACET(NORMAL_COUNT) <= STATE_NUMBERS ? 1 : -1]
 
 INLINE aim aim_kept(__global const scalar *state, int stride) {
     aim a;
-    a.lens_x = a.lens_y = R(0.0);
+    a.lens_x = a.lens_y = a.time = R(0.0);
     numbers_recall((real *)&a, AIM_NUMBERS, state + STATE_AIM * stride, stride);
     return a;
 }

@@ -75,11 +75,11 @@ STAGE(send_points) {
 }
 
 // The spot of a pixel with several points.
-INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, sighting *first, tally *cost, world w) {
+INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, real time, sighting *first, tally *cost, world w) {
     touch touched;
     STATE_RECALL(s, touched, STATE_TOUCH);
     first->steps = cost->steps;
-    pixel_points points = points_begin(pixel_ray, touched, points_seed(at, s.sample, w), w);
+    pixel_points points = points_begin(pixel_ray, time, touched, points_seed(at, s.sample, w), w);
     for (int turn = 0; turn < POINTS; ++turn) {
         const encounter met = queue_met(s.q, turn, s.slot);
         tally_met(cost, met, 1);
@@ -106,7 +106,7 @@ STAGE(find_spots) {
     spot found;
 #if POINTS > 1
     if (bounce == 0) {
-        found = spot_of_points(s, &here.at, r, &at_first, &cost, w);
+        found = spot_of_points(s, &here.at, r, a.time, &at_first, &cost, w);
     } else
 #endif
     {
@@ -146,7 +146,7 @@ STAGE(light_spots) {
     path_add(s, &so_far, direction, a.y, &found, gathered, last, w);
     if (!last) {
         STATE_KEEP(s, cost, STATE_TALLY);
-        path_mirror(s, &so_far, direction, eye_ray(&a, view), &found, w);
+        path_mirror(s, &so_far, direction, eye_ray(&a, view), a.time, &found, w);
         return;
     }
     end_shots(s, a, so_far.seen, &found, cost, w);

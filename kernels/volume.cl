@@ -44,7 +44,8 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     unit_square((bits)((uint)sample), seed, &lens_x, &lens_y);
     unit_disk(lens_x, lens_y, &lens_x, &lens_y);
 #endif
-    return take_shot(at->x + across, at->y + below, lens_x, lens_y, active, w, &cost->steps);
+    const real time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
+    return take_shot(at->x + across, at->y + below, lens_x, lens_y, time, active, w, &cost->steps);
 }
 
 #include "packets.h"

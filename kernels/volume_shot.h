@@ -19,8 +19,8 @@ INLINE color background_of(real y, world w) {
     return color_mix(color_splat(w.material->background_top), color_splat(w.material->background_bottom), share);
 }
 
-INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, world w, real *steps) {
-    const ray r = camera_ray(x, y, lens_x, lens_y, w.view);
+INLINE shot take_shot(real x, real y, real lens_x, real lens_y, real time, mask wanted, world w, real *steps) {
+    const ray r = camera_ray(x, y, lens_x, lens_y, time, w.view);
     const vec to_viewer = vec_scale(r.direction, R(-1.0));
     ray kept = r;
     mask active = wanted;
@@ -51,14 +51,14 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, mask wanted, wor
     s.hit = e.found;
     s.radiance = color_add(e.light, color_scale(background, e.through));
     s.point = vec_along(r.origin, e.t, r.direction);
-    s.depth = vec_dot(vec_sub(s.point, vec_splat(w.view->eye)), vec_splat(w.view->axis));
+    s.depth = depth_of(s.point, time, w.view);
     s.normal = e.normal;
     s.smooth = pick(e.on_plane, e.value, e.value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset));
     s.steps = looked;
     *steps += looked;
 #if PLANES > 0 && SURFACE
     const real distance = pick(s.hit, e.t, (real)(REAL_LARGEST));
-    s = planes_into(s, e.light, background, planes_seen(r, distance, wanted, w.planes), w.view);
+    s = planes_into(s, e.light, background, planes_seen(r, distance, wanted, w.planes), time, w.view);
 #endif
     return s;
 }

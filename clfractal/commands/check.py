@@ -83,7 +83,10 @@ def _moves(scene: Scene, animation: Animation) -> list[str]:
     last = animation.count - 1
     seconds = animation.count / animation.fps
     loop = ", begins again without a seam" if animation.loop else ""
-    lines = [f"animation: {animation.count} frames, {seconds:.6g} s at {animation.fps:g} per second{loop}"]
+    blur = f", each exposed for {animation.shutter:.4g} of a frame" if animation.shutter else ""
+    lines = [
+        f"animation: {animation.count} frames, {seconds:.6g} s at {animation.fps:g} per second{loop}{blur}"
+    ]
     for mover in movement_of(scene).movers:
         track = animation.tracks[mover.name]
         if track.keys is not None:

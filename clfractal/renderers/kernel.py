@@ -18,7 +18,7 @@ from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers.passes import sampling_record, slots
 from clfractal.renderers.plan import PlannedView
-from clfractal.renderers.records import view_record
+from clfractal.renderers.records import view_records
 from clfractal.renderers.resources import Resources
 
 KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
@@ -111,8 +111,8 @@ class TileKernel(ABC):
         """All arguments that stay the same from one launch to the next, in the kernel's order."""
         image, transparent = self.scene.image, self.scene.background == "transparent"
         return [
-            view_record(
-                self.view.camera,
+            view_records(
+                self.view.poses or (self.view.camera,),
                 image.width,
                 image.height,
                 self.plan,

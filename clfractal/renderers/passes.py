@@ -65,6 +65,7 @@ def pass_defines(plan: Plan) -> dict[str, object]:
         "LANES": plan.lanes,
         "REAL_IS_DOUBLE": int(plan.precision == "float64"),
         "TILE": TILE,
+        "HAS_MOTION": int(plan.moving),
         **_numbered("CHANNEL", (name.replace(".", "") for name in CHANNELS)),
         "CHANNEL_COUNT": len(CHANNELS),
         **_numbered("KEPT", _KEPT),

@@ -13,6 +13,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.files.channels import check_channels
 from clfractal.optics.view import View, scene_view
 from clfractal.pictures.tiles import Region
+from clfractal.renderers.shutter import Shutter
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
@@ -43,6 +44,7 @@ class Plan:
             in these.
         finished_samples: rays per pixel of the finished picture, where that is not `samples`; 0: it is. A coarse picture
             looks like the finished one.
+        moving: whether the view moves while the picture is taken.
     """
 
     precision: Precision
@@ -52,6 +54,7 @@ class Plan:
     channels: tuple[str, ...]
     divider: int = 1
     finished_samples: int = 0
+    moving: bool = False
 
     @property
     def averaged(self) -> int:
@@ -68,12 +71,46 @@ class PlannedView:
         plan: how it is rendered.
         eye: whose view it is, of a stereo scene.
         number: which of the layout's views it is.
+        shutter: when it is taken, if anything moves meanwhile.
+        poses: the view at equal steps of that time, from its beginning to its end, if it moves.
+        changing: whether each sample has a scene of its own: see `at_sample`.
     """
 
     scene: Scene
     plan: Plan
     eye: Eye = MIDDLE
     number: int = 0
+    shutter: Shutter | None = None
+    poses: tuple[View, ...] = ()
+    changing: bool = False
+
+    def exposed(self, shutter: Shutter | None) -> PlannedView:
+        """The same view, taken while a shutter is open.
+
+        Raises:
+            SceneError, FormulaError: a value is out of its range meanwhile; at its track.
+        """
+        if shutter is None:
+            return self
+        moving, changing = shutter.moves_view(), shutter.moves_others(self.plan.samples)
+        if not (moving or changing):
+            return self
+        poses = shutter.poses(shutter.opens, shutter.closes) if moving else ()
+        plan = replace(self.plan, moving=moving)
+        return replace(self, plan=plan, shutter=shutter, poses=poses, changing=changing)
+
+    def at_sample(self, sample: int) -> PlannedView:
+        """The view as one of its samples sees it: the scene in the middle of the sample's part of the time.
+
+        Raises:
+            SceneError, FormulaError: a value is out of its range then; at its track.
+        """
+        if self.shutter is None or not self.changing:
+            return self
+        start, end = self.shutter.part(sample, self.plan.samples)
+        scene, eye = self.shutter.seen((start + end) / 2)
+        poses = self.shutter.poses(start, end) if self.plan.moving else ()
+        return replace(self, scene=scene, eye=eye, poses=poses)
 
     @property
     def size(self) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +36,7 @@ VIEW = Struct(
         Field("pixel_size", "real", 0, "height of a pixel on the plane, scene units"),
         Field("perspective", "int", 0, "1: rays leave the eye; 0: rays are parallel to the axis"),
         Field("height", "int", 0, "height of the picture, pixels"),
+        Field("spans", "int", 0, "between the poses of a view that moves; else 0"),
         Field("region_left", "int", 0, "first column to render"),
         Field("region_top", "int", 0, "first row to render"),
         Field("region_right", "int", 0, "first column right of the region"),
@@ -161,10 +162,10 @@ def struct_text() -> str:
     return "".join(struct.c_text() for struct in STRUCTS)
 
 
-def view_record(
-    view: View, width: int, height: int, plan: Plan, precision: Precision, *, footprint: int = 1
+def view_records(
+    poses: Sequence[View], width: int, height: int, plan: Plan, precision: Precision, *, footprint: int = 1
 ) -> Record:
-    """A View for a picture of `width` x `height` pixels, of which the plan's region is rendered.
+    """The poses of a view for a picture of `width` x `height` pixels, of which the plan's region is rendered.
 
     With a divider d pixel (x, y) of the plan is the picture's pixel (d x + d / 2, d y + d / 2), with the very same ray: a
     coarse picture shows what the finished one will show there.
@@ -173,27 +174,31 @@ def view_record(
         footprint: how many of the picture's pixels the cone of a ray is wide.
     """
     coarse, region = plan.divider, plan.region
-    values = {
-        "center": view.center,
-        "right": view.side * (view.width / width * coarse),
-        "down": view.up * (-view.height / height * coarse),
-        "eye": view.origin,
-        "axis": view.axis,
-        "side": view.side,
-        "up": view.up,
-        "lens_radius": view.lens_radius,
-        "focus_distance": view.focus_distance,
-        "center_x": (width - (coarse > 1)) / 2 / coarse,
-        "center_y": (height - (coarse > 1)) / 2 / coarse,
-        "pixel_size": view.pixel_size(height) * footprint,
-        "perspective": int(view.eye is not None),
-        "height": -(-height // coarse),
-        "region_left": region.x,
-        "region_top": region.y,
-        "region_right": region.right,
-        "region_bottom": region.bottom,
-    }
-    return VIEW.value(precision, values)
+
+    def values(view: View) -> dict[str, object]:
+        return {
+            "center": view.center,
+            "right": view.side * (view.width / width * coarse),
+            "down": view.up * (-view.height / height * coarse),
+            "eye": view.origin,
+            "axis": view.axis,
+            "side": view.side,
+            "up": view.up,
+            "lens_radius": view.lens_radius,
+            "focus_distance": view.focus_distance,
+            "center_x": (width - (coarse > 1)) / 2 / coarse,
+            "center_y": (height - (coarse > 1)) / 2 / coarse,
+            "pixel_size": view.pixel_size(height) * footprint,
+            "perspective": int(view.eye is not None),
+            "height": -(-height // coarse),
+            "spans": len(poses) - 1,
+            "region_left": region.x,
+            "region_top": region.y,
+            "region_right": region.right,
+            "region_bottom": region.bottom,
+        }
+
+    return VIEW.array(precision, [values(view) for view in poses])
 
 
 def step_scale(scene: Scene) -> float:

@@ -64,7 +64,9 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "POINTS": several_points(scene),
         # A binary search ends where the surface is; a march, somewhere within the point's footprint.
         "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
+        # Rays are marched as they were sent.
         "HAS_LENS": 0,
+        "HAS_MOTION": 0,
     }
 
 
@@ -221,7 +223,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             "surface",
             "surface.cl",
             feature_defines(scene, plan),
-            *(("send_cones",) if has_cones(scene) else ()),
+            *(("send_cones",) if has_cones(scene, plan) else ()),
             "begin_shots",
             *points,
             "find_spots",

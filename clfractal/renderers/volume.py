@@ -154,15 +154,7 @@ class VolumeKernel(TileKernel):
 
     @cached_property
     def _grid_key(self) -> str:
-        """What the grid follows from: the solid, and how it is filled; of the transfer only what decides what is stored."""
-        settings, given = settings_of(self.scene), self.scene.given
-        shown = settings.model_dump(
-            mode="json",
-            exclude={*Sampled.model_fields, "transfer", "level", "step", "shadows", "opacity_limit"},
-        )
-        solid = self.scene.formula.mapping() if given is None else given.digest
-        seen = shows_outside(settings) if given is None else least_visible(settings, given)
-        return json.dumps([solid, shown, seen, self.plan.precision, self.plan.lanes])
+        return grid_key(self.scene, self.plan)
 
     def _fill(self) -> Grid:
         given, device, on_compile = self.scene.given, self.resources.device, self.resources.on_compile
@@ -186,6 +178,18 @@ class VolumeKernel(TileKernel):
             normal_radius=settings.normal_radius,
             on_compile=on_compile,
         )
+
+
+def grid_key(scene: Scene, plan: Plan) -> str:
+    """What the grid follows from: the solid, and how it is filled; of the transfer only what decides what is stored."""
+    settings, given = settings_of(scene), scene.given
+    shown = settings.model_dump(
+        mode="json",
+        exclude={*Sampled.model_fields, "transfer", "level", "step", "shadows", "opacity_limit"},
+    )
+    solid = scene.formula.mapping() if given is None else given.digest
+    seen = shows_outside(settings) if given is None else least_visible(settings, given)
+    return json.dumps([solid, shown, seen, plan.precision, plan.lanes])
 
 
 def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:

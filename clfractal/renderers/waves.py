@@ -45,10 +45,11 @@ def asks_formula(coloring: Coloring) -> bool:
     return coloring.by in ("thickness", "layer_distance", "trap")
 
 
-def has_cones(scene: Scene) -> bool:
-    """Whether a cone for each block of pixels goes before the rays: those through a lens have no common one."""
+def has_cones(scene: Scene, plan: Plan) -> bool:
+    """Whether a cone for each block of pixels goes before the rays: those through a lens, or of a view that moves, have no
+    common one."""
     lens = isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0
-    return scene.surface.search == "distance" and not lens
+    return scene.surface.search == "distance" and not lens and not plan.moving
 
 
 def light_turns(scene: Scene) -> int:
@@ -69,22 +70,23 @@ def march_kernels(plan: Plan) -> tuple[str, ...]:
 
 def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterator[Stage]:
     """The stages of a launch for samples from the first up to the second."""
-    if has_cones(scene) and samples[0] < samples[1]:
+    cones = has_cones(scene, plan)
+    if cones and samples[0] < samples[1]:
         yield Stage("send_cones", "packets of rays", 1, of="blocks")
         yield Stage("march_rays", "rays", 1, {"goal": GOAL_CONE}, of="blocks")
     # A launch without samples only writes what pixels have.
     for sample in range(*samples):
-        yield from _sample(scene, sample, march_kernels(plan))
+        yield from _sample(scene, sample, march_kernels(plan), cones=cones)
 
 
-def _sample(scene: Scene, sample: int, marching: tuple[str, ...]) -> Iterator[Stage]:
+def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool) -> Iterator[Stage]:
     points, after = scene.surface.used_points.count, light_turns(scene)
     steps = scene.surface.search == "steps"
 
     def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
         return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
 
-    yield stage("begin_shots", int(has_cones(scene)))
+    yield stage("begin_shots", int(cones))
     if scene.cut_planes:
         yield stage("find_faces")
     for bounce in range(bounces(scene) + 1):

@@ -136,6 +136,23 @@ Duration = Annotated[
     Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)],
     AlsoAs(_seconds, {"type": "string", "pattern": f"^{_SECONDS.pattern}$"}),
 ]
+_DEGREES = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(deg|degrees)\s*")
+
+
+def _part_of_turn(value: Any) -> Any:
+    """`180 deg` as a part of a turn."""
+    found = _DEGREES.fullmatch(value) if isinstance(value, str) else None
+    if found is not None:
+        return float(found[1]) / 360
+    if isinstance(value, str):
+        raise problem(f"must be a part of a frame, as 0.5, or '180 deg', got {value[:40]!r}")
+    return value
+
+
+Opening = Annotated[
+    Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)],
+    AlsoAs(_part_of_turn, {"type": "string", "pattern": f"^{_DEGREES.pattern}$"}),
+]
 Tracks = Annotated[dict[Text, Track], Field(max_length=MAX_TRACKS)]
 
 
@@ -153,6 +170,14 @@ class Animation(Section):
     noise: Literal["new", "fixed"] = Field(
         "new", description="whether each frame has random places of its own, or all have the same"
     )
+    shutter: Opening = Field(
+        0.0,
+        description="motion blur: how long each picture is exposed, as a part of a frame, or in degrees of a turning "
+        "shutter, as '180 deg'; 0: one moment",
+    )
+    frame: Moment | None = Field(
+        None, description="the frame that a still of the scene shows; null: the scene's own values"
+    )
     tracks: Tracks = Field(
         {}, description="values that move, by their dotted keys, such as `camera.position`"
     )
@@ -163,6 +188,8 @@ class Animation(Section):
             raise problem("needs one of frames and duration")
         if self.duration is not None and self.duration * self.fps > MAX_FRAMES:
             raise problem(f"must be at most {MAX_FRAMES:,} frames", "duration")
+        if self.frame is not None and self.frame > self.count - (not self.loop):
+            raise problem(f"must be one of the frames 0 to {self.count - 1}, got {self.frame:g}", "frame")
         return self
 
     @model_validator(mode="after")

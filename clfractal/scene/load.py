@@ -73,6 +73,7 @@ def load_scene(
         scene.note_files((*text.files, *files))
         with _located(document):
             check_scene(scene)
+            scene = _at_own_frame(scene)
     scene.note_files(files)
     return scene
 
@@ -203,6 +204,15 @@ def check_scene(scene: Scene) -> None:
         from clfractal.scene.movement import movement_of
 
         movement_of(scene).check(check_parts)
+
+
+def _at_own_frame(scene: Scene) -> Scene:
+    """The scene with the values of the frame that it says a still shows."""
+    if scene.animation is None or scene.animation.frame is None:
+        return scene
+    from clfractal.scene.movement import movement_of
+
+    return movement_of(scene).still(scene.animation.frame)
 
 
 def _check_names(scene: Scene) -> None:

@@ -29,26 +29,38 @@ class Movement:
         self.movers = Movers(scene, self.animation, self.targets).made()
 
     def values(self, frame: float) -> dict[str, Any]:
-        """The value of each track at a frame."""
-        return {mover.name: mover.value(frame) for mover in self.movers}
+        """The value of each track at a frame; after the end of a film that begins again, those of its beginning."""
+        time = frame % self.animation.count if self.animation.loop else frame
+        return {mover.name: mover.value(time) for mover in self.movers}
 
     def scene(self, frame: float) -> Scene:
-        """The scene as it is at a frame, which may lie between two; it has no animation of its own.
+        """A frame of the film as a still, with all values in the places of the tracks, and noise of its own.
+
+        The frame may lie between two. The scene keeps its animation only if the shutter makes that a part of the picture.
 
         Raises:
             SceneError: a value is out of its range then, or the formula has no meaning with it; at its track.
         """
+        seeds = _seeds(self._scene, int(frame)) if self.animation.noise == "new" else {}
+        own = self.animation.model_copy(update={"frame": float(frame)}) if self.animation.shutter else None
+        return self._made(frame, seeds, own)
+
+    def instant(self, time: float) -> Scene:
+        """The scene at a moment of the film, frames, with the noise that it has; errors as above."""
+        return self._made(time, {}, None)
+
+    def still(self, frame: float) -> Scene:
+        """The same, with its animation; errors as above."""
+        return self._made(frame, {}, self.animation)
+
+    def _made(self, frame: float, others: dict[tuple[str, ...], Any], animation: Animation | None) -> Scene:
         try:
-            return self._scene_at(frame)
+            values = self.values(frame)
+            by_path = {mover.target.path: values[mover.name] for mover in self.movers}
+            found = with_values(self._scene, {**by_path, **others}, animation=animation)
+            _ = found.chain
         except ClfractalError as error:
             raise self._blamed(error, frame) from error
-
-    def _scene_at(self, frame: float) -> Scene:
-        values = {mover.target.path: mover.value(frame) for mover in self.movers}
-        if self.animation.noise == "new":
-            values |= _seeds(self._scene, int(frame))
-        found = with_values(self._scene, values)
-        _ = found.chain
         return found
 
     def _blamed(self, error: ClfractalError, frame: float) -> ClfractalError:
@@ -64,7 +76,7 @@ class Movement:
 
     def check(self, check_parts: Callable[[Scene], None]) -> None:
         """Raises ClfractalError if a frame's scene is wrong: every frame at which one of the values is extreme is tried."""
-        tried = {0, self.animation.count - 1}
+        tried: set[float] = {0, self.animation.count - 1}
         for mover in self.movers:
             tried |= self._extremes(mover)
         for frame in sorted(tried):
@@ -74,24 +86,36 @@ class Movement:
             except ClfractalError as error:
                 raise self._blamed(error, frame) from error
 
-    def _extremes(self, mover: Mover) -> set[int]:
-        """The frames with the least and the largest of each component.
+    def _extremes(self, mover: Mover) -> set[float]:
+        """The times with the least and the largest of each component.
 
         Raises:
             FormulaError: a value is no finite number.
         """
-        found: set[int] = set()
+        found: set[float] = set()
         columns: list[Values] = []
-        for frame in range(self.animation.count):
-            values = mover.at(frame)
+        times = self._times()
+        for time in times:
+            values = mover.at(time)
             if not all(isfinite(value) for value in values):
-                raise FormulaError(f"is not a finite number at frame {frame}", mover.where)
+                raise FormulaError(f"is not a finite number at frame {time:g}", mover.where)
             columns.append(values)
         for component in zip(*columns, strict=True):
-            found |= {component.index(min(component)), component.index(max(component))}
+            found |= {times[component.index(min(component))], times[component.index(max(component))]}
         if mover.target.kind == "whole":  # of which some may be no choice
-            found |= set({round(values[0]): frame for frame, values in enumerate(columns)}.values())
+            found |= set(
+                {round(values[0]): time for time, values in zip(times, columns, strict=True)}.values()
+            )
         return found
+
+    def _times(self) -> list[float]:
+        """Every frame, and while its shutter is open the middle and the end of that."""
+        count, shutter = self.animation.count, self.animation.shutter
+        if shutter == 0:
+            return [float(frame) for frame in range(count)]
+        shares = (0.0, 0.5 * shutter, shutter)
+        times = (frame + share for frame in range(count) for share in shares)
+        return [time % count if self.animation.loop else min(time, count - 1.0) for time in times]
 
 
 def movement_of(scene: Scene) -> Movement:

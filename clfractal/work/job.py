@@ -183,6 +183,8 @@ class Job:
         scene = self.resolved()
         del scene["output"], scene["bookmarks"], scene["animation"]
         found: dict[str, Any] = {}
+        if view.shutter is not None:
+            found["shutter"] = view.shutter.told()
         if side is not None:
             scene["stereo"] = {key: value for key, value in scene["stereo"].items() if key not in _SHOWN}
             scene["image"] = view.scene.image.model_dump()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 from contextlib import closing
+from dataclasses import dataclass
 from functools import partial as partial_of
 
 import numpy as np
@@ -29,6 +30,8 @@ ViewOutlet = Callable[[int, cl.Buffer, cl.Buffer, int], None]
 _NO_TILES = np.zeros(0, np.int32)
 _NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
 
+# Device memory for what samples of scenes of their own keep for the next one, unless a picture is made in passes.
+_KEPT_BETWEEN_SAMPLES = 256 << 20
 # Device memory for passes that the user is told of before it is taken.
 _WORTH_TELLING = 1 << 28
 
@@ -67,13 +70,8 @@ class LocalExecutor:
         for item in items:
             if len(item.tiles) == 0:
                 continue
-            view = job.views[item.view]
-            drawing = self._drawing(item.view, view, len(item.tiles), token)
-            partial = item.samples != (0, view.plan.samples)
-            if partial:
-                drawing.keep(TileGrid(view.plan.region).count)
-            outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
-            yield from _launched(drawing, item, self.budget_seconds, token, keep=partial, outlet=outlet)
+            for turn in self._turns(job.views[item.view], item, token):
+                yield from self._launched(turn, token)
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
 
@@ -107,6 +105,32 @@ class LocalExecutor:
         self._outputs = OutputBuffers(self.device)
         self.kept = Kept()
 
+    def _turns(self, view: PlannedView, item: WorkItem, token: CancelToken | None) -> Generator[_Turn]:
+        """An item's work, in turns that have one scene each: all of it, or one sample of some tiles."""
+        partial, count = item.samples != (0, view.plan.samples), TileGrid(view.plan.region).count
+        if not view.changing:
+            yield _Turn(view, item, item.tiles if partial else None, count)
+            return
+        some = len(item.tiles)
+        if not partial:  # what samples leave for the next one is kept only while they are made
+            drawing = self._drawing(item.view, view.at_sample(0), 1, token)
+            some = count = min(max(_KEPT_BETWEEN_SAMPLES // drawing.kept_bytes(1), 1), some)
+        first, end = item.samples
+        for begin in range(0, len(item.tiles), some):
+            tiles = item.tiles[begin : begin + some]
+            places = tiles if partial else np.arange(len(tiles), dtype=np.int32)
+            for sample in range(first, end):
+                part = WorkItem(item.view, tiles, (sample, sample + 1))
+                yield _Turn(view.at_sample(sample), part, places, count, last=sample + 1 == end)
+
+    def _launched(self, turn: _Turn, token: CancelToken | None) -> Generator[Result]:
+        item = turn.item
+        drawing = self._drawing(item.view, turn.view, len(item.tiles), token)
+        if turn.kept is not None:
+            drawing.keep(turn.room)
+        outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
+        yield from _launched(drawing, turn, self.budget_seconds, token, outlet=outlet)
+
     def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
         # Put back only when it is complete: one whose update failed is half of each view.
         drawing = self._drawings.pop(number, None) or Drawing(self.device, self._outputs)
@@ -115,17 +139,31 @@ class LocalExecutor:
         return drawing
 
 
+@dataclass(frozen=True, slots=True)
+class _Turn:
+    """A part of an item for which the drawing need not change.
+
+    Attributes:
+        view: what is drawn.
+        item: the part.
+        kept: for each tile its place among those that are kept between passes; None: none are.
+        room: how many tiles are kept.
+        last: whether its tiles are finished by it.
+    """
+
+    view: PlannedView
+    item: WorkItem
+    kept: Tiles | None
+    room: int
+    last: bool = True
+
+
 def _launched(
-    drawing: Drawing,
-    item: WorkItem,
-    budget_seconds: float,
-    token: CancelToken | None,
-    *,
-    keep: bool,
-    outlet: Outlet | None,
+    drawing: Drawing, turn: _Turn, budget_seconds: float, token: CancelToken | None, *, outlet: Outlet | None
 ) -> Generator[Result]:
     """Launches an item's tiles and gives them as they are finished."""
-    cutter = _Cutter(drawing, item, keep=keep)
+    item = turn.item
+    cutter = _Cutter(drawing, item, turn.kept)
     pace = drawing.pace
     pace.seconds = budget_seconds / IN_FLIGHT
     pace.most = float(drawing.capacity * cutter.per_tile)
@@ -140,7 +178,7 @@ def _launched(
             if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
                 # Only a part of a tile is done: there is nothing to read yet.
                 yield Result(item.view, _NO_TILES, _NO_FILM, tally)
-            elif outlet is not None:
+            elif outlet is not None and turn.last:
                 # Only now: a launch that was cancelled has left unfinished tiles.
                 drawing.hand_over(span, outlet)
                 yield Result(item.view, span.tiles, _NO_FILM, tally)
@@ -148,7 +186,8 @@ def _launched(
                 film, sums = drawing.collect(span)
                 for name, count in zip(STATISTICS, sums, strict=True):
                     setattr(tally, name, int(count))
-                yield Result(item.view, span.tiles, film, tally)
+                done = (span.tiles, film) if turn.last else (_NO_TILES, _NO_FILM)
+                yield Result(item.view, *done, tally)
             tally = Tally()
 
 
@@ -159,8 +198,8 @@ class _Cutter:
     or if one work-group is still too heavy some of its samples, down to one sample of one packet.
     """
 
-    def __init__(self, drawing: Drawing, item: WorkItem, *, keep: bool) -> None:
-        self.drawing, self.item, self.keep = drawing, item, keep
+    def __init__(self, drawing: Drawing, item: WorkItem, kept: Tiles | None) -> None:
+        self.drawing, self.item, self.kept = drawing, item, kept
         self.first, self.end = item.samples
         self.per_tile = drawing.packets * (self.end - self.first)
         self.place = 0  # of the next tile
@@ -181,8 +220,8 @@ class _Cutter:
         return Part(event, float(amount), span, begun)
 
     def _next(self, size: float) -> Span | None:
-        tiles, drawing = self.item.tiles, self.drawing
-        left = len(tiles) - self.place
+        drawing = self.drawing
+        left = len(self.item.tiles) - self.place
         if self.packets == (0, 0):
             if left == 0:
                 return None
@@ -191,7 +230,7 @@ class _Cutter:
                 # The last launch is not much shorter than the others: no core idles long at the end.
                 if count < left < 1.5 * count:
                     count = (left + 1) // 2
-                chosen = tiles[self.place : self.place + count]
+                chosen = slice(self.place, self.place + count)
                 self.place += count
                 return self._span(chosen, (0, drawing.packets), self.item.samples, last=True)
             self.packets = self._some_packets(0, size)
@@ -199,7 +238,7 @@ class _Cutter:
         packets, sample = self.packets, self.sample
         width = packets[1] - packets[0]
         samples = (sample, min(sample + max(int(size / width), 1), self.end))
-        chosen = tiles[self.place : self.place + 1]
+        chosen = slice(self.place, self.place + 1)
         last = samples[1] == self.end and packets[1] == drawing.packets
         span = self._span(chosen, packets, samples, last=last)
         if samples[1] < self.end:
@@ -218,14 +257,14 @@ class _Cutter:
         count = max(int(size / samples) // group * group, group) if size >= group else max(int(size), 1)
         return first, min(first + min(count, self.drawing.wave.packets), self.drawing.packets)
 
-    def _span(self, tiles: Tiles, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
-        mode = 0
-        if self.keep or samples[1] < self.end:
+    def _span(self, chosen: slice, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
+        tiles, mode = self.item.tiles[chosen], 0
+        if self.kept is not None or samples[1] < self.end:
             mode |= PASS_KEEP
             self.drawing.keep(1)
         if samples[0] > self.first:
             mode |= PASS_ADD
-        kept = tiles if self.keep else np.zeros(len(tiles), np.int32)
+        kept = self.kept[chosen] if self.kept is not None else np.zeros(len(tiles), np.int32)
         span = Span(tiles, packets, samples, mode, kept, self.slot)
         if last:
             self.slot = (self.slot + 1) % SLOTS

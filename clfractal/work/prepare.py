@@ -16,6 +16,7 @@ from clfractal.pictures.modes import picture_size
 from clfractal.pictures.tiles import Region
 from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region
+from clfractal.renderers.shutter import shutter_of
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
@@ -75,7 +76,9 @@ def prepare(
             plan = Plan(used, lanes, samples if samples is not None else view.renderer.samples, needed, names)
             numbers.append(len(views))
             places.append(place)
-            views.append(PlannedView(view, plan, own_eye, number))
+            planned = PlannedView(view, plan, own_eye, number)
+            side = eye.name if scene.stereo is not None else None
+            views.append(planned.exposed(shutter_of(scene, side, number)))
         if seen.layout is None:
             return Identity(numbers[0])
         size = (seen.image.width, seen.image.height)

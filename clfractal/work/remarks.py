@@ -121,7 +121,7 @@ def _of_view(seen: _Seen) -> list[str]:
         )
         clear = ", so alpha is 0 everywhere" if seen.scene.background == "transparent" else ""
         return [why.replace(";", f"{clear};", 1)] if why else []
-    found = _of_solid(seen)
+    found = [*_of_solid(seen), *_of_motion(seen)]
     if isinstance(renderer, SurfaceRenderer) and seen.bad > BAD_SHARE * seen.steps:
         scale = renderer.step_scale if renderer.step_scale is not None else seen.scene.chain.step_scale
         found.append(
@@ -129,6 +129,24 @@ def _of_view(seen: _Seen) -> list[str]:
             f" below {scale:.3g}, such as {scale / 2:.2g}, helps"
         )
     return found
+
+
+def _of_motion(seen: _Seen) -> list[str]:
+    """What motion blur costs a volume."""
+    view = seen.views[0]
+    if not (view.changing and isinstance(view.scene.renderer, VolumeRenderer)):
+        return []
+    from clfractal.renderers.volume import grid_key
+
+    count = view.plan.samples
+    parts = (view.at_sample(sample) for sample in range(count))
+    filled = len({grid_key(part.scene, part.plan) for part in parts})
+    if filled == 1:
+        return []
+    return [
+        f"motion blur fills {filled} grids for each picture, because what is in the volume moves; fewer"
+        " renderer.samples, or animation.shutter 0, are faster"
+    ]
 
 
 def _why_no_surface(seen: _Seen) -> str:

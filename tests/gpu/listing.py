@@ -37,6 +37,7 @@ _OFTEN: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     },
     "lens": {"": {}, "lens": {"camera": {"f_number": 0.5}}},
     "noise": {"": {}, "noise": {"renderer": {"noise": 0.01, "samples": 64}}},
+    "motion": {"": {}, "motion": {"animation": {"frames": 2, "shutter": 0.5, "frame": 0}}},
 }
 # What a scene says for each value of a feature: sections that are put together.
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
@@ -89,6 +90,7 @@ _CUT_PLANE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "counts": {"smooth": {}, "stepped": {"renderer": {"colors": {"mode": "stepped"}}}},
     "noise": _OFTEN["noise"],
+    "motion": _OFTEN["motion"],
 }
 _APART = {frozenset({("coloring", "residual"), ("points", "")})}  # a plane needs points
 _FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}

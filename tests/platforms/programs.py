@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -70,6 +71,8 @@ def of_scene(
 ) -> Iterator[Named]:
     """The programs that render a scene, each by what it does; a volume's for a grid of such values in so many buffers."""
     plan = make_plan(scene, precision=precision, lanes=count, channels=CHANNELS)
+    # What moves meanwhile makes no difference to the texts.
+    plan = replace(plan, moving=scene.animation is not None and scene.animation.shutter > 0)
     if scene.renderer.type == "volume":
         grid: Any = SimpleNamespace(kind=values, values=(None,) * pools)
         yield "volume", volume.program_text(scene, plan, grid)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from clfractal.device.select import Device
 from clfractal.pictures.film import Film
 from clfractal.renderers import records, surface, waves
 from clfractal.renderers.kernel import BLOCK
+from clfractal.renderers.plan import make_plan
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,
@@ -67,7 +69,7 @@ def rendered(scene: Scene, device: Device) -> tuple[Film, int]:
 
 def without_cones(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (surface, waves):
-        monkeypatch.setattr(module, "has_cones", lambda scene: False)
+        monkeypatch.setattr(module, "has_cones", lambda scene, plan: False)
 
 
 @pytest.mark.parametrize(("formula", "camera"), MOST_STEPS)
@@ -130,10 +132,13 @@ def test_a_ray_whose_cone_ended_inside_begins_anew(
     assert (np.abs(np.linalg.norm(points, axis=-1) - BALL_RADIUS)[hit] < 0.02).all()
 
 
-def test_rays_through_a_lens_and_the_search_by_steps_have_no_cones() -> None:
-    assert waves.has_cones(scene_of(FORMULAS["hast"], CAMERAS["perspective"], SIZE))
+def test_rays_without_a_common_cone_have_none() -> None:
+    """Those through a lens, of a view that moves, or that are searched by steps."""
+    scene = scene_of(FORMULAS["hast"], CAMERAS["perspective"], SIZE)
+    plan = make_plan(scene, precision="float32", lanes=1)
+    assert waves.has_cones(scene, plan)
+    assert not waves.has_cones(scene, replace(plan, moving=True))
     lens = {**CAMERAS["perspective"], "f_number": 2.8, "focus_distance": 2.0}
-    assert not waves.has_cones(scene_of(FORMULAS["hast"], lens, SIZE))
-    assert not waves.has_cones(
-        scene_of(FORMULAS["hast"], CAMERAS["perspective"], SIZE, renderer={"search": "steps"})
-    )
+    assert not waves.has_cones(scene_of(FORMULAS["hast"], lens, SIZE), plan)
+    by_steps = scene_of(FORMULAS["hast"], CAMERAS["perspective"], SIZE, renderer={"search": "steps"})
+    assert not waves.has_cones(by_steps, plan)
