@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands.animate import Part, frame_file
+from clfractal.commands.film_parts import Part, frame_file
 from clfractal.errors import SceneError
 from clfractal.files.exr import read_exr
 from clfractal.work import run as work
@@ -118,8 +118,13 @@ def test_frames_of_another_scene_are_refused(clf: InProcess) -> None:
     before = Path("f0.png").read_bytes()
     ended = clf("animate", "scene.yaml", "-o", "f#.png", "--resume", "--set", "material.ambient=0.3")
     assert ended.is_one_line(2, "f0.png: is a frame of another scene, or of other settings; remove it")
-    Path("f2.png").write_bytes(before[:100])
+    whole = Path("f2.png").read_bytes()
+    Path("f2.png").write_text("my notes")
     assert clf("animate", "scene.yaml", "-o", "f#.png", "--resume").is_one_line(2, "f2.png: ")
+    assert Path("f2.png").read_text() == "my notes"
+    Path("f2.png").write_bytes(whole[:100])
+    assert clf("animate", "scene.yaml", "-o", "f#.png", "--resume").status == 0
+    assert len(Path("f2.png").read_bytes()) > 0.9 * len(whole)
     assert Path("f0.png").read_bytes() == before
 
 

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-import re
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clfractal.commands.film_parts import (
+    Part,
+    check_pattern,
+    frame_file,
+    is_film,
+    missing,
+    ranges,
+    shown_ranges,
+)
 from clfractal.commands.kept import Kept
 from clfractal.commands.order import PARTIAL, naming_options
 from clfractal.commands.pipes import piped, refuse_stream
@@ -19,7 +27,8 @@ from clfractal.commands.shell import Shell
 from clfractal.commands.slices import check_numbered
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, speaking_of
-from clfractal.files.film_kinds import CONTAINERS, Recipe
+from clfractal.files.film_kinds import Recipe
+from clfractal.files.whole import is_whole
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 
@@ -27,39 +36,9 @@ if TYPE_CHECKING:
     from clfractal.files.moving import Plan
     from clfractal.work.job import Job
 
-_MOST_DIGITS = 12
 _LINE_SECONDS = 2.0
 # Frames that took longer keep their tiles while they are in work, seconds.
 _LONG_FRAME = 2.0
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """The frames to render: `--frames A-B:STEP`, `A-B`, `A` or all of them."""
-
-    text: str | None = None
-
-    def numbers(self, count: int) -> range:
-        """The frames of a film of `count` frames.
-
-        Raises:
-            SceneError: the text has another form, or names a frame that the film does not have.
-        """
-        if self.text is None:
-            return range(count)
-        found = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9})(?::(\d{1,9}))?)?", self.text.strip(), re.ASCII)
-        if found is None:
-            raise SceneError(
-                f"must be A-B, A-B:STEP or a number, such as 0-119:2; got {self.text[:60]!r}",
-                Where("--frames"),
-            )
-        first = int(found[1])
-        last, step = int(found[2] or first), int(found[3] or 1)
-        if step < 1 or last < first:
-            raise SceneError(f"must go upwards, got {self.text[:60]!r}", Where("--frames"))
-        if last >= count:
-            raise SceneError(f"must be frames 0 to {count - 1} of the film, got {last}", Where("--frames"))
-        return range(first, last + 1, step)
 
 
 def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
@@ -73,7 +52,7 @@ def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> Non
     """
     for path in order.outputs:
         refuse_stream(path, "frames are several files")
-        _check_pattern(path)
+        check_pattern(path)
     with piped(shell, order.scene, [(path, "") for path in order.outputs]) as files:
         _animate(replace(order, scene=files.source, folder=files.folder), part, recipe, shell)
 
@@ -86,9 +65,9 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
         animation = movement_of(scene).animation
     numbers = part.numbers(animation.count)
     films = _planned_films(order, scene, recipe, animation.fps)
-    patterns = [path for path in order.outputs if not _is_film(path)]
+    patterns = [path for path in order.outputs if not is_film(path)]
     if not order.outputs:
-        patterns = [Path(f"{Path(order.scene).stem}_####.png")]
+        patterns = [_usual(order)]
     with Kept(films, shell, resume=order.resume) as kept:
         if kept.pattern is not None:
             patterns.append(kept.pattern)
@@ -104,6 +83,46 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     shell.state = lambda: "clfractal: interrupted"
     named = [f"{files[numbers[0]][0]} to {files[numbers[-1]][0].name}"] if patterns[0] != kept.pattern else []
     shell.say(f"{', '.join([*named, *(str(film.path) for film in films)])}: {counted.summary()}")
+    others = [number for number in range(animation.count) if number not in numbers]
+    lacking = _missing(scene, [path for path in patterns if path != kept.pattern], others)
+    if lacking:
+        shell.say(f"{len(lacking)} frames of the film are missing: {shown_ranges(lacking)}")
+
+
+def list_missing(order: Order, part: Part, shell: Shell) -> None:
+    """Prints which frames of numbered pictures are missing, or not whole: a line for each range, as `--frames` takes it.
+
+    Raises:
+        ClfractalError: anything wrong with the input.
+    """
+    if any(is_film(path) for path in order.outputs):
+        raise SceneError("applies to numbered pictures; a film is only made whole", Where("--missing"))
+    for path in order.outputs:
+        refuse_stream(path, "frames are several files")
+        check_pattern(path)
+    with piped(shell, order.scene, ()) as files:
+        scene = ordered_scene(replace(order, scene=files.source, folder=files.folder))
+        with speaking_of(order.scene):
+            numbers = part.numbers(movement_of(scene).animation.count)
+        patterns = [*order.outputs] or [_usual(order)]
+        for found in ranges(_missing(scene, patterns, numbers)):
+            shell.print(found)
+
+
+def _usual(order: Order) -> Path:
+    """The name of frames where none is given."""
+    return Path(f"{Path(order.scene).stem}_####.png")
+
+
+def _missing(scene: Scene, patterns: Sequence[Path], numbers: Sequence[int]) -> list[int]:
+    """The frames of which a file is missing; without patterns there are none."""
+    from clfractal.pictures.outputs import output_files
+
+    files = (
+        [file for pattern in patterns for file in output_files(scene.stereo, frame_file(pattern, number))]
+        for number in numbers
+    )
+    return missing(numbers, files)
 
 
 def _render_frames(
@@ -144,13 +163,9 @@ def _render_frames(
     return counted
 
 
-def _is_film(path: Path) -> bool:
-    return path.suffix.lower() in CONTAINERS
-
-
 def _planned_films(order: Order, scene: Scene, recipe: Recipe, fps: float) -> list[Plan]:
     """The film files of an order, checked."""
-    films = [path for path in order.outputs if _is_film(path)]
+    films = [path for path in order.outputs if is_film(path)]
     given = {
         "--codec": recipe.codec,
         "--bits": recipe.bits,
@@ -218,35 +233,12 @@ class _Count:
         return f"{self._rendered} frames{kept}, {seconds:.2f} s, {shown_rate(self._rays / seconds)}"
 
 
-def frame_file(pattern: Path, number: int) -> Path:
-    """The file of a frame: its number stands for the last row of `#` in the pattern's name, with as many digits or more."""
-    head, signs, tail = _split(pattern.name)
-    return pattern.with_name(f"{head}{number:0{len(signs)}d}{tail}")
-
-
-def _split(name: str) -> tuple[str, str, str]:
-    found = re.fullmatch(r"(.*?)(#+)([^#]*)", name, re.DOTALL)
-    assert found is not None
-    return found[1], found[2], found[3]
-
-
-def _check_pattern(path: Path) -> None:
-    where = Where(str(path))
-    if _is_film(path):
-        return
-    if "#" not in path.name:
-        example = f"{path.stem}_####{path.suffix}"
-        raise FileError(f"must have # where the frame's number goes, such as {example}", where)
-    if len(_split(path.name)[1]) > _MOST_DIGITS:
-        raise FileError(f"must have at most {_MOST_DIGITS} # in a row", where)
-
-
 def _partial(paths: tuple[Path, ...]) -> Path:
     return paths[0].with_name(paths[0].name + PARTIAL)
 
 
 def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:
-    """Whether all files of a frame are there.
+    """Whether all files of a frame are there, and whole.
 
     Raises:
         FileError: one of them is of another scene, or holds none.
@@ -255,7 +247,7 @@ def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:
     from clfractal.pictures.outputs import output_files
 
     files = [file for path in paths for file in output_files(job.scene.stereo, path)]
-    there = [file for file in files if file.exists()]
+    there = [file for file in files if is_whole(file)]
     wanted = job.header()["scene"]
     for file in there:
         if read_scene_text(file) != wanted:

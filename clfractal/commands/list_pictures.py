@@ -104,6 +104,13 @@ def animate(
     resume: Annotated[
         bool, typer.Option("--resume", help="Keep frames that are there, and continue the one in work.")
     ] = False,
+    preview: Annotated[
+        Path | None,
+        typer.Option("--preview", metavar="FILE", help="Write a sheet of small frames instead."),
+    ] = None,
+    missing: Annotated[
+        bool, typer.Option("--missing", help="Print which frames are missing, as --frames takes them.")
+    ] = False,
     codec: Annotated[
         str | None,
         typer.Option("--codec", help="Of films: h264, h265, ffv1 or prores.  [default: by the file's name]"),
@@ -118,7 +125,9 @@ def animate(
     verbose: Verbose = False,
 ) -> Work:
     """Render the frames of a scene's animation to numbered picture files, or films."""
-    from clfractal.commands.animate import Part, animate_scene
+    from clfractal.commands.animate import animate_scene, list_missing
+    from clfractal.commands.film_parts import Part
+    from clfractal.commands.film_sheet import preview_film
     from clfractal.commands.order import Order
     from clfractal.files.film_kinds import Recipe
 
@@ -135,6 +144,10 @@ def animate(
     )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
     recipe = Recipe(codec, bits, chroma, crf)
+    if missing:
+        return lambda: list_missing(order, Part(frames), shell)
+    if preview is not None:
+        return lambda: preview_film(order, preview, Part(frames), shell)
     return lambda: animate_scene(order, Part(frames), recipe, shell)
 
 

@@ -1,0 +1,107 @@
+"""Which frames of a film are asked for, which are there, and their numbers as text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from clfractal.errors import FileError, SceneError, Where
+from clfractal.files.film_kinds import CONTAINERS
+from clfractal.files.whole import is_whole
+
+_MOST_DIGITS = 12
+_MOST_RANGES = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The frames to render: `--frames A-B:STEP`, `A-B`, `A` or all of them."""
+
+    text: str | None = None
+
+    def numbers(self, count: int) -> range:
+        """The frames of a film of `count` frames.
+
+        Raises:
+            SceneError: the text has another form, or names a frame that the film does not have.
+        """
+        if self.text is None:
+            return range(count)
+        found = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9})(?::(\d{1,9}))?)?", self.text.strip(), re.ASCII)
+        if found is None:
+            raise SceneError(
+                f"must be A-B, A-B:STEP or a number, such as 0-119:2; got {self.text[:60]!r}",
+                Where("--frames"),
+            )
+        first = int(found[1])
+        last, step = int(found[2] or first), int(found[3] or 1)
+        if step < 1 or last < first:
+            raise SceneError(f"must go upwards, got {self.text[:60]!r}", Where("--frames"))
+        if last >= count:
+            raise SceneError(f"must be frames 0 to {count - 1} of the film, got {last}", Where("--frames"))
+        return range(first, last + 1, step)
+
+
+def is_film(path: Path) -> bool:
+    """Whether a file is a film, by its name."""
+    return path.suffix.lower() in CONTAINERS
+
+
+def frame_file(pattern: Path, number: int) -> Path:
+    """The file of a frame: its number stands for the last row of `#` in the pattern's name, with as many digits or more."""
+    head, signs, tail = _split(pattern.name)
+    return pattern.with_name(f"{head}{number:0{len(signs)}d}{tail}")
+
+
+def check_pattern(path: Path) -> None:
+    """Raises FileError if a file that is no film has no place for the frame's number."""
+    where = Where(str(path))
+    if is_film(path):
+        return
+    if "#" not in path.name:
+        example = f"{path.stem}_####{path.suffix}"
+        raise FileError(f"must have # where the frame's number goes, such as {example}", where)
+    if len(_split(path.name)[1]) > _MOST_DIGITS:
+        raise FileError(f"must have at most {_MOST_DIGITS} # in a row", where)
+
+
+def missing(numbers: Iterable[int], files: Iterable[Sequence[Path]]) -> list[int]:
+    """The frames of which a file is not there, or is not whole.
+
+    Args:
+        numbers: of the frames.
+        files: of each frame.
+
+    Raises:
+        FileError: a file cannot be read.
+    """
+    return [
+        number
+        for number, paths in zip(numbers, files, strict=True)
+        if not all(is_whole(path) for path in paths)
+    ]
+
+
+def ranges(numbers: Sequence[int]) -> Iterator[str]:
+    """Numbers in order, as `--frames` takes them: `3`, `5-9`."""
+    begin = 0
+    for place in range(1, len(numbers) + 1):
+        if place == len(numbers) or numbers[place] != numbers[place - 1] + 1:
+            first, last = numbers[begin], numbers[place - 1]
+            yield str(first) if first == last else f"{first}-{last}"
+            begin = place
+
+
+def shown_ranges(numbers: Sequence[int]) -> str:
+    """The same in one line, which names only the first of many."""
+    found = list(ranges(numbers))
+    left = f" and {len(found) - _MOST_RANGES} more" if len(found) > _MOST_RANGES else ""
+    return ", ".join(found[:_MOST_RANGES]) + left
+
+
+def _split(name: str) -> tuple[str, str, str]:
+    found = re.fullmatch(r"(.*?)(#+)([^#]*)", name, re.DOTALL)
+    assert found is not None
+    return found[1], found[2], found[3]

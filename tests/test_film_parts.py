@@ -1,0 +1,130 @@
+"""Frames of a film that are there, are not, or are not whole; and the sheet that shows a film before it is rendered."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+import clfractal
+from clfractal.commands.film_parts import Part, ranges, shown_ranges
+from clfractal.commands.film_sheet import MOST_FRAMES, spread
+from clfractal.files.whole import is_whole
+from tests.shell import InProcess
+
+SCENE = """version: 1
+formula: {name: mandelbulb, iterations: 4}
+image: {width: 40, height: 24}
+camera: {position: [0, -3, 0]}
+animation:
+  fps: 10
+  frames: 6
+  tracks:
+    camera.position: {keys: [{frame: 0, value: [0, -3, 0]}, {frame: 5, value: [1.6, -2, 0.8]}]}
+    lights.0.intensity: {expression: "1 + frame"}
+"""
+
+
+@pytest.fixture
+def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
+    monkeypatch.chdir(tmp_path)
+    Path("scene.yaml").write_text(SCENE)
+    return InProcess(capfd)
+
+
+@given(st.sets(st.integers(0, 60)))
+def test_ranges_name_the_numbers(numbers: set[int]) -> None:
+    found = list(ranges(sorted(numbers)))
+    again = [number for text in found for number in Part(text).numbers(61)]
+    assert again == sorted(numbers)
+    gaps = sum(number + 1 not in numbers for number in numbers)
+    assert len(found) == gaps
+
+
+def test_only_the_first_ranges_of_many_are_shown() -> None:
+    assert shown_ranges([1, 2, 3, 7]) == "1-3, 7"
+    assert shown_ranges(range(0, 30, 2)) == "0, 2, 4, 6, 8, 10, 12, 14 and 7 more"
+
+
+@given(st.integers(1, 5000), st.integers(1, 7))
+def test_a_sheet_shows_the_whole_film_evenly(count: int, step: int) -> None:
+    numbers = range(0, count, step)
+    found = spread(numbers)
+    assert (found[0], found[-1]) == (numbers[0], numbers[-1])
+    assert len(found) == min(len(numbers), MOST_FRAMES)
+    assert sorted(set(found)) == found
+    if len(found) > 1:
+        gaps = np.diff(found) / step
+        assert gaps.max() - gaps.min() <= 1
+
+
+@pytest.mark.parametrize("name", ["a.exr", "a.png", "a.jpg", "a.webp"])
+def test_a_file_that_is_cut_short_anywhere_is_not_whole(name: str, tmp_path: Path) -> None:
+    film = clfractal.render(clfractal.at_frame(SCENE, 0))
+    path = tmp_path / name
+    film.save(path)
+    assert is_whole(path)
+    data = path.read_bytes()
+    for length in {*range(0, len(data), max(len(data) // 40, 1)), len(data) - 1, len(data) - 2}:
+        path.write_bytes(data[:length])
+        assert not is_whole(path), length
+    path.unlink()
+    assert not is_whole(path)
+
+
+def test_missing_frames_are_listed_and_rendered(clf: InProcess) -> None:
+    listed = ("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--missing")
+    assert clf(*listed).out.split() == ["0-5"]
+    ended = clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--frames", "1-3")
+    assert ended.err.splitlines()[-1] == "3 frames of the film are missing: 0, 4-5"
+    Path("p3.png").write_bytes(Path("p3.png").read_bytes()[:-5])
+    Path("f_02.exr").write_bytes(Path("f_02.exr").read_bytes()[:-5])
+    assert clf(*listed).out.split() == ["0", "2-5"]
+    assert clf(*listed, "--frames", "1-2").out.split() == ["2"]
+    before = os.stat("f_01.exr").st_mtime_ns
+    ended = clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--resume")
+    assert ended.status == 0, ended
+    assert "5 frames, 1 were there already" in ended.err
+    assert os.stat("f_01.exr").st_mtime_ns == before
+    listed_at_last = clf(*listed)
+    assert (listed_at_last.out, listed_at_last.err, listed_at_last.status) == ("", "", 0)
+
+
+def test_the_missing_of_a_film_or_of_no_pattern(clf: InProcess) -> None:
+    ended = clf("animate", "scene.yaml", "-o", "film.mp4", "--missing")
+    assert (ended.status, ended.err.count("\n")) == (2, 1)
+    assert "--missing: applies to numbered pictures" in ended.err
+    ended = clf("animate", "scene.yaml", "-o", "a.png", "--missing")
+    assert (ended.status, "must have # where the frame's number goes" in ended.err) == (2, True)
+    assert clf("animate", "scene.yaml", "--missing").out.split() == ["0-5"]
+
+
+def test_a_sheet_of_small_frames(clf: InProcess) -> None:
+    ended = clf("animate", "scene.yaml", "--preview", "sheet.png", "--frames", "0-5:2")
+    assert ended.status == 0, ended
+    assert ended.err.splitlines()[-1].startswith("sheet.png: 3 of 6 frames, ")
+    with Image.open("sheet.png") as sheet:
+        pixels = np.asarray(sheet, float)
+    # Three pictures of 40 x 24 in a row, with gaps of 8 between; the light grows from frame to frame.
+    assert pixels.shape[:2] == (40, 3 * 48 + 8)
+    means = [pixels[8:32, 8 + 48 * place : 48 + 48 * place].mean() for place in range(3)]
+    assert means[0] < means[1] < means[2]
+    assert [path.name for path in Path().iterdir() if path.suffix == ".exr"] == []
+
+
+def test_a_sheet_goes_alone(clf: InProcess) -> None:
+    for options, message in (
+        (("--preview", "s.png", "-o", "f_##.png"), "--preview: writes a sheet alone"),
+        (("--preview", "s.gif"), "s.gif"),
+        (("--preview", "scene.yaml"), "scene.yaml"),
+        (("--preview", "s.png", "--frames", "9"), "--frames: must be frames 0 to 5"),
+    ):
+        ended = clf("animate", "scene.yaml", *options)
+        assert (ended.status, ended.err.count("\n")) == (2, 1), ended
+        assert message in ended.err
+    assert Path("scene.yaml").read_text() == SCENE
