@@ -23,6 +23,7 @@ from clfractal.device.advice import install_hint
 from clfractal.device.cache_folder import drivers_problem, set_drivers_folder
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
+from clfractal.device.unknown_cpu import name_processor
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, Where, unknown_name
 
 # pyopencl's own cache holds only how arguments are passed. It lies in the home folder, where one may not be able to
@@ -349,9 +350,10 @@ def _find() -> list[Device]:
             # OCL_ICD_VENDORS).
             if cl_device.int_ptr not in seen:
                 seen.add(cl_device.int_ptr)
-                found.append(
-                    Device(_describe(f"{platform_index}:{device_index}", platform, cl_device), cl_device)
-                )
+                info = _describe(f"{platform_index}:{device_index}", platform, cl_device)
+                if is_pocl(info):
+                    name_processor(cl_device.int_ptr)
+                found.append(Device(info, cl_device))
     return found
 
 
