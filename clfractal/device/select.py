@@ -10,7 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache as cache_of_calls
 from functools import cached_property
 from typing import Any, Literal
@@ -351,8 +351,9 @@ def _find() -> list[Device]:
             if cl_device.int_ptr not in seen:
                 seen.add(cl_device.int_ptr)
                 info = _describe(f"{platform_index}:{device_index}", platform, cl_device)
-                if is_pocl(info):
-                    name_processor(cl_device.int_ptr)
+                processor = name_processor(cl_device.int_ptr) if is_pocl(info) else None
+                if processor is not None:  # what was measured under the wrong name does not count
+                    info = replace(info, driver=f"{info.driver}, {processor.decode()}")
                 found.append(Device(info, cl_device))
     return found
 

@@ -26,8 +26,9 @@ Read = Callable[[int, int], bytes]
 _TRIPLE = b"x86_64-unknown-linux-gnu"
 # Names that are wrong; and those that are, only if the processor has what the best name needs.
 _UNKNOWN, _TOO_OLD = b"generic", frozenset({b"znver1", b"znver2", b"znver3"})
-# Most bytes of a device's record, and of a pointer.
-_RECORD, _POINTER = 4096, 8
+# Bytes of a device's record that are looked at, in which PoCL has its texts; and of a pointer. Behind a record there may be
+# that of another device.
+_RECORD, _POINTER = 768, 8
 # Names that LLVM 14 knows, the best first, and what a processor must have for each, as Linux calls it.
 _KNOWN: tuple[tuple[bytes, frozenset[str]], ...] = (
     (
@@ -39,16 +40,21 @@ _KNOWN: tuple[tuple[bytes, frozenset[str]], ...] = (
     (b"haswell", frozenset({"avx2", "fma", "bmi1", "bmi2", "movbe", "f16c", "abm"})),
     (b"x86-64", frozenset()),
 )
-# Texts that drivers point to, for as long as the process lives.
-_texts: list[ctypes.Array[ctypes.c_char]] = []
+# By device: the text that its record points to now, for as long as the process lives.
+_texts: dict[int, ctypes.Array[ctypes.c_char]] = {}
 
 
 def name_processor(device: int) -> bytes | None:
-    """Gives PoCL's device the processor that its compiler should build for; its name, or None if nothing was to do.
+    """Gives PoCL's device the processor that its compiler should build for; a second call does nothing.
+
+    Returns:
+        The name that the device was given; None if it has a right one of its own.
 
     Args:
         device: the address of its record, which is what an OpenCL device is to a program.
     """
+    if device in _texts:
+        return _texts[device].value
     if sys.platform != "linux" or struct.calcsize("P") != _POINTER:
         return None
     with suppress(OSError), open("/proc/self/mem", "rb", buffering=0) as memory:
@@ -63,8 +69,7 @@ def name_processor(device: int) -> bytes | None:
         place = place_of_name(device, read, best=name == _KNOWN[0][0])
         if place is None:
             return None
-        text = ctypes.create_string_buffer(name)
-        _texts.append(text)
+        text = _texts[device] = ctypes.create_string_buffer(name)
         ctypes.memmove(place, struct.pack("<Q", ctypes.addressof(text)), _POINTER)
         return name
     return None

@@ -47,6 +47,11 @@ def test_the_name_of_an_older_processor_is_wrong_for_one_with_wide_vectors() -> 
     assert place_of_name(0x1000, memory.read, best=True) == 0x1000 + 2 * 8
 
 
+def test_the_record_of_a_neighbour_is_not_looked_at() -> None:
+    memory = Memory(*[b"text"] * 100, TRIPLE, b"generic")
+    assert place_of_name(0x1000, memory.read) is None
+
+
 @pytest.mark.parametrize(
     "texts",
     [
@@ -81,11 +86,12 @@ def test_features_are_read_where_linux_tells_them(tmp_path: Path) -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads Linux's file of a process's memory")
 def test_memory_of_the_process_itself_is_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(unknown_cpu, "processor_features", frozenset)
+    monkeypatch.setattr(unknown_cpu, "_texts", {})
     texts = [ctypes.create_string_buffer(text) for text in (b"pthread", TRIPLE, b"generic")]
     record = (ctypes.c_uint64 * 512)(*(ctypes.addressof(text) for text in texts))
     assert unknown_cpu.name_processor(ctypes.addressof(record)) == b"x86-64"
     assert ctypes.string_at(record[2]) == b"x86-64"
-    assert unknown_cpu.name_processor(ctypes.addressof(record)) is None
+    assert unknown_cpu.name_processor(ctypes.addressof(record)) == b"x86-64"
     assert unknown_cpu.name_processor(8) is None  # where there is no memory
 
 
