@@ -22,7 +22,7 @@ from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel
 from clfractal.renderers.passes import STATISTICS, kept_numbers
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Resources
-from clfractal.work.stages import CAPACITY, Span, Stages, Wave, group_of, number_count, wave_of
+from clfractal.work.stages import CAPACITY, Kernels, Span, Stages, Wave, group_of, number_count, wave_of
 
 TILE_PIXELS = TILE * TILE
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
@@ -97,6 +97,7 @@ class Drawing:
         self.wave = Wave(0, 0, [])
         self.build_ms = 0.0
         self.pace = Pace(1.0)
+        self._kernels: Kernels | None = None
         self._stages: Stages | None = None
         self._programs: list[program.Program] = []
         self._texts: list[ProgramText] = []
@@ -145,9 +146,10 @@ class Drawing:
         self.outputs.fit_wave(self.wave.sizes)
         self._upload(arguments)
         self._kept_count = len(kept_numbers(plan, view.scene.renderer))
-        self._stages = Stages(
-            self.device, kernel, self.wave, self.group, list(zip(self._texts, built, strict=True))
-        )
+        if other or self._kernels is None:
+            named = list(zip(self._texts, built, strict=True))
+            self._kernels = Kernels(self.device, named, number_count(kernel))
+        self._stages = Stages(self.device, kernel, self.wave, self.group, self._kernels)
 
     @property
     def watched(self) -> list[Watched]:

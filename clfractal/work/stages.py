@@ -99,20 +99,43 @@ def group_of(stage: Stage, lanes: int, group: int) -> tuple[int, ...]:
     return (group, 1) if stage.over == "pixels" else (group,)
 
 
+class Kernels:
+    """The kernels of some programs, for as long as these stay: pyopencl takes a millisecond to make one ready.
+
+    Args:
+        device: where.
+        built: the programs, and their texts.
+        numbers: how many numbers a launch sets, see `number_count`.
+    """
+
+    def __init__(
+        self, device: Device, built: Sequence[tuple[ProgramText, program.Program]], numbers: int
+    ) -> None:
+        self.device = device
+        self._kernels = {name: made.kernel(name) for text, made in built for name in text.kernels}
+        for kernel in self._kernels.values():
+            # With the types known all are set in the time that one takes without.
+            count = 2 + numbers
+            kernel.set_scalar_arg_dtypes([None] * (kernel.num_args - count) + [np.int32] * count)
+        self._groups: dict[tuple[str, tuple[int, ...]], tuple[int, ...]] = {}
+
+    def kernel(self, name: str) -> cl.Kernel:
+        """One of them."""
+        return self._kernels[name]
+
+    def group(self, name: str, wanted: tuple[int, ...]) -> tuple[int, ...]:
+        """The size of its work-groups: as is wanted, if the device can have them."""
+        if (name, wanted) not in self._groups:
+            self._groups[name, wanted] = fitting(self.device, self._kernels[name], wanted)
+        return self._groups[name, wanted]
+
+
 class Stages:
     """The kernels of a view, ready to be launched."""
 
-    def __init__(
-        self,
-        device: Device,
-        kernel: TileKernel,
-        wave: Wave,
-        group: int,
-        built: Sequence[tuple[ProgramText, program.Program]],
-    ) -> None:
+    def __init__(self, device: Device, kernel: TileKernel, wave: Wave, group: int, kernels: Kernels) -> None:
         self.device, self.kernel, self.wave, self.group = device, kernel, wave, group
-        self._kernels = {name: made.kernel(name) for text, made in built for name in text.kernels}
-        self._groups: dict[str, tuple[int, ...]] = {}
+        self._kernels = kernels
         self._stages: dict[tuple[int, int], list[Stage]] = {}
 
     def enqueue(self, span: Span, arguments: Sequence[Any]) -> tuple[cl.Event, cl.Event]:
@@ -135,7 +158,8 @@ class Stages:
 
     def _enqueue(self, stage: Stage, span: Span, tiles: range, arguments: Sequence[Any]) -> cl.Event:
         lanes, (first, end) = self.kernel.plan.lanes, span.packets
-        kernel, group = self._kernels[stage.kernel], self._group(stage)
+        kernel = self._kernels.kernel(stage.kernel)
+        group = self._kernels.group(stage.kernel, group_of(stage, lanes, self.group))
         numbers = [first, end, *span.samples, span.mode]
         size: tuple[int, ...] = (-(-(end - first) // self.group) * self.group, len(tiles))
         if self.kernel.waves:
@@ -150,16 +174,6 @@ class Stages:
                 size = (-(-rays // each) * group[0],)
         kernel.set_args(*arguments, *numbers)
         return cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
-
-    def _group(self, stage: Stage) -> tuple[int, ...]:
-        name = stage.kernel
-        if name not in self._groups:
-            kernel, lanes = self._kernels[name], self.kernel.plan.lanes
-            self._groups[name] = fitting(self.device, kernel, group_of(stage, lanes, self.group))
-            # With the types known all are set in the time that one takes without.
-            count = 2 + number_count(self.kernel)
-            kernel.set_scalar_arg_dtypes([None] * (kernel.num_args - count) + [np.int32] * count)
-        return self._groups[name]
 
     def _blocks(self, span: Span, tiles: int) -> int:
         """Blocks of pixels of which the launch has any."""
