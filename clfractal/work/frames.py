@@ -11,6 +11,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
+from clfractal.work.any_engine import AnyEngine
 from clfractal.work.engine import Engine
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ class FilmScenes:
         SceneError, FormulaError, FileError: the scene has no animation, or a track is wrong.
     """
 
-    def __init__(self, engine: Engine, scene: Scene) -> None:
+    def __init__(self, engine: AnyEngine, scene: Scene) -> None:
         self._engine, self.movement = engine, movement_of(scene)
         self._first: Scene | None = None
 
