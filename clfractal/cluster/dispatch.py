@@ -18,7 +18,7 @@ from uuid import uuid4
 from clfractal.cluster.link import Link, Lost, Tell
 from clfractal.cluster.message import Array, Message
 from clfractal.cluster.sizes import Pace
-from clfractal.errors import ClfractalError, DeviceError
+from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError
 from clfractal.pictures.tiles import TILE
 from clfractal.work.job import Job
 from clfractal.work.run import WorkItem
@@ -36,6 +36,7 @@ _TRIES = 3
 _URGENT = 500_000
 # Until it is believed that no fit worker follows one that is not.
 _OTHERS_SECONDS = 3.0
+_PAUSE_SECONDS = 0.05
 
 Submit = Callable[[Link], tuple[Any, Sequence[str] | None]]
 Collect = Callable[[Link, Any], Awaitable[Any]]
@@ -310,9 +311,8 @@ class Dispatcher:
             answer = await self._done(submit, collect)
         except ClfractalError as error:
             work.answers.put(error)
-        except Exception as error:
-            words = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-            work.answers.put(ClfractalError(f"{self._place}: a worker failed: {words}", status=3))
+        except Exception as error:  # a mistake of this program's
+            work.answers.put(_failed(self._place, error))
         else:
             seconds = max(answer.seconds - 1e-3 * answer.tally.build_ms, 1e-6)
             self.pace.learn(len(item.tiles), item.samples[1] - item.samples[0], seconds)
@@ -335,18 +335,21 @@ class Dispatcher:
         rounds = 0
         while True:
             link = await self.serving()
+            if link.client.status != "running":  # it is about to be seen that the scheduler is gone
+                await asyncio.sleep(_PAUSE_SECONDS)
+                continue
             future, among = submit(link)
             try:
-                await link.while_alive(_finished(future), among)
+                await link.while_alive(_finished(future), future, among)
                 if future.status == "finished":
-                    answer = await link.while_alive(collect(link, future), among)
+                    answer = await link.while_alive(collect(link, future), future, among)
                     if self._is_final(link, answer):
                         return answer
                 elif future.status == "error":
                     error = await future.exception()
                     rounds += 1
                     if type(error).__name__ != "KilledWorker":
-                        raise error
+                        raise _failed(self._place, error)
                     if rounds >= _ROUNDS:
                         raise DeviceError(f"{self._place}: {error}")
             except Lost:
@@ -354,7 +357,7 @@ class Dispatcher:
             finally:
                 with suppress(Exception):
                     future.release()
-            await asyncio.sleep(0.05)
+            await asyncio.sleep(_PAUSE_SECONDS)
 
     def _is_final(self, link: Link, answer: Any) -> bool:
         """Whether an answer counts; else the task is to be done again, by somebody else.
@@ -398,6 +401,12 @@ class Dispatcher:
             return link.client.submit(
                 tasks.kept, array, key=f"clfractal-kept-{digest}", priority=600_000, pure=False
             )
+
+
+def _failed(place: str, error: BaseException) -> ClfractalError:
+    """What is told of an exception that is none of ours."""
+    words = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+    return ClfractalError(f"{place}: a worker failed: {words}", status=STATUS_DEVICE_FAILED)
 
 
 async def _finished(future: Any) -> None:

@@ -28,6 +28,7 @@ SILENT_SECONDS = 20.0
 _LOOK_SECONDS = 0.5
 _ENLIST_SECONDS = 120.0
 _DIRECT_SECONDS = 2.0
+_DOUBTS = 6
 
 Tell = Callable[[str], None]
 T = TypeVar("T")
@@ -81,6 +82,11 @@ class Link:
         """Set, and replaced by another one, whenever who takes part has changed."""
         self.on_news: Callable[[], None] = lambda: None
         self.direct = False
+        self.under_way: dict[str, Any] = {}
+        """Futures that somebody waits for, by key."""
+        self._stuck: set[str] = set()
+        self._doubts = 0  # looks until it is believed that no task is stuck
+        self._unseen: set[str] = set()
         self._heard: dict[str, Heard] = {}
         self._enlisting: dict[str, asyncio.Task[None]] = {}
 
@@ -92,6 +98,7 @@ class Link:
                 if self.client.status != "running":
                     break
                 await self._look(info["workers"])
+                await self._find_stuck()
                 # A large cluster tells much: it is asked less often.
                 await asyncio.sleep((_LOOK_SECONDS if count else 0.1) * (1 + len(info["workers"]) / 100))
         except (OSError, TimeoutError, ValueError):
@@ -102,8 +109,8 @@ class Link:
             for task in self._enlisting.values():
                 task.cancel()
 
-    async def while_alive(self, awaited: Awaitable[T], among: Sequence[str] | None = None) -> T:
-        """What is awaited, as long as there is somebody who can bring it.
+    async def while_alive(self, awaited: Awaitable[T], future: Any, among: Sequence[str] | None = None) -> T:
+        """What is awaited of a future, as long as there is somebody who can bring it.
 
         Args:
             among: the workers that can; None: any.
@@ -112,9 +119,11 @@ class Link:
             Lost: there is nobody any more.
         """
         task = asyncio.ensure_future(awaited)
+        self.under_way[future.key] = future
         try:
             while not task.done():
-                if self.over or not self.serving or (among and not set(among) & set(self.serving)):
+                alive = not self.over and self.serving and future.key not in self._stuck
+                if not alive or (among and not set(among) & set(self.serving)):
                     raise Lost
                 news = asyncio.ensure_future(self.news.wait())
                 try:
@@ -124,8 +133,13 @@ class Link:
             if task.cancelled():  # as Dask calls what is lost with a connection
                 raise Lost
             return task.result()
+        except OSError as error:
+            # Of the connection: what a task has raised comes in another way.
+            raise Lost from error
         finally:
             task.cancel()
+            self.under_way.pop(future.key, None)
+            self._stuck.discard(future.key)
 
     def _changed(self) -> None:
         self.news.set()
@@ -159,6 +173,31 @@ class Link:
         if task is not None:
             task.cancel()
         if self.members.pop(address, None) is not None:
+            self._doubts = _DOUBTS
+            self._changed()
+
+    async def _find_stuck(self) -> None:
+        """After a loss: finds tasks that no worker has.
+
+        Where the last worker is gone before the next one has offered what our tasks ask for, Dask puts them aside, and does
+        not look at them again when it offers that.
+        """
+        if not self._doubts:
+            return
+        self._doubts -= 1
+        processing = await asyncio.wait_for(self.client.scheduler.processing(workers=None), ANSWER_SECONDS)
+        somewhere = {key for keys in processing.values() for key in keys}
+        unseen = {
+            key
+            for key, future in self.under_way.items()
+            if future.status == "pending" and key not in somewhere
+        }
+        # (Once may be while Dask moves them.)
+        found = unseen & self._unseen
+        self._unseen = unseen
+        if found:
+            self._stuck |= found
+            self._doubts = _DOUBTS
             self._changed()
 
     async def _dismiss(self, address: str) -> None:

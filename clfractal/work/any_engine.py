@@ -6,10 +6,10 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
 from clfractal import arguments
 from clfractal.device.cancel import CancelToken
@@ -25,6 +25,13 @@ if TYPE_CHECKING:
     from clfractal.work.look import Look
 
 SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
+
+
+class Elsewhere(Protocol):
+    """What renders outside of this process, such as a `clfractal.Cluster`."""
+
+    def engine(self) -> AnyEngine:
+        """An engine whose pictures are decided about, and rendered, there. Closing it leaves the rest as it is."""
 
 
 class AnyEngine(ABC):
@@ -106,8 +113,6 @@ class AnyEngine(ABC):
         Args:
             token: ends the render when any thread cancels it; `clfractal.Stopped` is then raised.
         """
-        from clfractal.work.films import JobFilms, Took
-
         start = time.perf_counter()
         arguments.function("progress", progress)
         check_token(token)
@@ -120,15 +125,39 @@ class AnyEngine(ABC):
                 channels=channels,
                 quality=quality,
             )
-            if job.stays_apart:
-                assert job.scene.stereo is not None
-                raise SceneError(
-                    f"{job.scene.stereo.mode} keeps the two eyes' pictures apart; use render_pair, or another mode",
-                    Where(path="stereo.mode"),
-                )
-            films = JobFilms(job)
-            state = run(job, films.films, self.executor, progress=progress, token=token)
-            return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
+            return self._film(job, start, progress, token)
+
+    def render_in_order(
+        self, scenes: Iterable[Scene], progress: ProgressCallback | None = None, **settings: Any
+    ) -> Generator[Film]:
+        """The pictures of scenes, one after the other; an engine may render some before they are asked for.
+
+        Arguments and errors as for `render`.
+        """
+        arguments.function("progress", progress)
+        with closing(self.in_order(scenes, lambda _: True, **settings)) as jobs:
+            start = time.perf_counter()
+            for job, _ in jobs:
+                with self._alone():
+                    film = self._film(job, start, progress, None)
+                yield film
+                start = time.perf_counter()
+
+    def _film(
+        self, job: Job, start: float, progress: ProgressCallback | None, token: CancelToken | None
+    ) -> Film:
+        """The picture of a job, in memory; `start` is when the call began, by `time.perf_counter`."""
+        from clfractal.work.films import JobFilms, Took
+
+        if job.stays_apart:
+            assert job.scene.stereo is not None
+            raise SceneError(
+                f"{job.scene.stereo.mode} keeps the two eyes' pictures apart; use render_pair, or another mode",
+                Where(path="stereo.mode"),
+            )
+        films = JobFilms(job)
+        state = run(job, films.films, self.executor, progress=progress, token=token)
+        return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
 
     def render_pair(
         self,

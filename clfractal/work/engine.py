@@ -13,7 +13,7 @@ from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import Device, choose
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
-from clfractal.work.any_engine import AnyEngine, SceneLike, check_token
+from clfractal.work.any_engine import AnyEngine, Elsewhere, SceneLike, check_token
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
@@ -176,3 +176,19 @@ class Engine(AnyEngine):
                 yield from refined(job, self.executor, token, looks_built_ms=self.looks_built_ms)
 
         return Refinement(films())
+
+
+def engine_on(device: str | None, executor: Elsewhere | None) -> AnyEngine:
+    """The engine of a device of this process, or of an executor that has its own devices.
+
+    Raises:
+        SceneError: both are given, or the executor is none.
+        DeviceError: no device, or an unknown one.
+    """
+    if executor is None:
+        return Engine(device)
+    if not callable(getattr(executor, "engine", None)) or isinstance(executor, type):
+        arguments.refuse("executor", "must be a clfractal.Cluster", arguments.plain(executor))
+    if device is not None:
+        arguments.refuse("device", "belongs to the cluster, as Cluster(address, device=...)", device)
+    return executor.engine()
