@@ -9,6 +9,7 @@ from typing import Any
 from clfractal.errors import DeviceError, FileError, SceneError, Where
 
 _MOST_LOCAL = 256
+_LEAST_PORT = 1023
 _PROTOCOLS = ("tcp", "tls", "ws", "wss", "ucx", "ucxx", "inproc")
 
 
@@ -45,7 +46,8 @@ class Place:
             found is None
             or found[2] == "local"
             or (found[1] or "tcp") not in _PROTOCOLS
-            or not 0 < int(found[3]) < 65536
+            # Small numbers are those of `local`, with a letter wrong: schedulers have none, unless it is said in full.
+            or not (0 if found[1] else _LEAST_PORT) < int(found[3]) < 65536
         ):
             raise SceneError(
                 f"must be a scheduler such as tcp://HOST:8786, or local:N for N workers here; got {text[:60]!r}",
