@@ -79,8 +79,8 @@ class Cluster:
         security: Dask's certificates for `tls://`, a `distributed.Security`; None: those of Dask's configuration.
 
     Raises:
-        SceneError: the address is none.
-        FileError: the package `distributed` is not installed.
+        SceneError: the address is none, or needs certificates and there are none.
+        FileError: the package `distributed` is not installed, or a certificate is not there.
         DeviceError: status 3, the scheduler does not answer within 10 s.
     """
 
@@ -97,6 +97,7 @@ class Cluster:
             arguments.refuse("address", "must be text such as tcp://HOST:8786 or local:4", address)
         self.place = Place.of(address)
         local.library()
+        local.check_certificates(self.place, security)
         from clfractal.cluster.tasks import Seat
 
         self._security = security

@@ -94,7 +94,7 @@ class Link:
         """Looks after the workers until the scheduler is gone."""
         try:
             for count in itertools.count():
-                info = await asyncio.wait_for(self.client.scheduler.identity(n_workers=-1), ANSWER_SECONDS)
+                info = await asyncio.wait_for(self.client.scheduler.identity(), ANSWER_SECONDS)
                 if self.client.status != "running":
                     break
                 await self._look(info["workers"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from clfractal.errors import DeviceError, FileError, SceneError, Where
@@ -67,6 +68,27 @@ def library() -> Any:
         where = Where(path="cluster")
         raise FileError("needs the package distributed: pip install 'clfractal[cluster]'", where) from None
     return distributed
+
+
+def check_certificates(place: Place, security: Any) -> None:
+    """Makes sure that an address of `tls://` comes with certificates, which Dask asks for only while it connects.
+
+    Raises:
+        SceneError: there are none.
+        FileError: one cannot be read.
+    """
+    if not place.address.startswith(("tls:", "wss:")):
+        return
+    used = security if security is not None else library().Security()
+    for option, file in (("ca-file", used.tls_ca_file), ("client.cert", used.tls_client_cert)):
+        if not file:
+            raise SceneError(
+                f"{place} needs certificates: Dask's configuration has no distributed.comm.tls.{option}",
+                Where(path="cluster"),
+            )
+        # (Dask also takes the text of a certificate.)
+        if "\n" not in file and not Path(file).is_file():
+            raise FileError("is not there; it is named in distributed.comm.tls", Where(file))
 
 
 async def start(workers: int) -> Any:

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -60,11 +60,16 @@ class Farm:
     Args:
         folder: where logs go.
         workers: how many there are at first, named w0, w1, ...
+        protocol: tcp or tls.
+        options: of the scheduler and of all workers.
     """
 
-    def __init__(self, folder: Path, workers: int = 2) -> None:
-        self.folder, self.port = folder, free_port()
-        self.address = f"tcp://127.0.0.1:{self.port}"
+    def __init__(
+        self, folder: Path, workers: int = 2, protocol: str = "tcp", options: Sequence[str] = ()
+    ) -> None:
+        self.folder, self.port, self._options = folder, free_port(), list(options)
+        self._protocol = protocol
+        self.address = f"{protocol}://127.0.0.1:{self.port}"
         self.scheduler: subprocess.Popen[bytes] | None = None
         self.workers: dict[str, subprocess.Popen[bytes]] = {}
         self._first = workers
@@ -86,6 +91,7 @@ class Farm:
     def start_scheduler(self) -> None:
         """Starts the scheduler, at the same address each time."""
         options = ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard", "--no-show"]
+        options += ["--protocol", self._protocol, *self._options]
         self.scheduler = self._start("distributed.cli.dask_scheduler", options, {}, "scheduler")
         deadline = time.monotonic() + 30
         while time.monotonic() < deadline:
@@ -100,6 +106,7 @@ class Farm:
         self._made += 1
         options = [self.address, "--name", name, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
         options += ["--local-directory", str(self.folder), "--memory-limit", "0"]
+        options += self._options
         # Two workers share the cores of a small machine.
         shared = {"POCL_MAX_PTHREAD_COUNT": "1", **(extra or {})}
         self.workers[name] = self._start("distributed.cli.dask_worker", options, shared, name)

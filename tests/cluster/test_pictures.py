@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, planes
 from tests.shell import process
 
 TILES = 8 * 6
+PREFIX = "DASK_DISTRIBUTED__COMM__TLS__"
 
 
 def test_a_picture_of_workers_here(folder: Path, picture: dict[str, bytes]) -> None:
@@ -93,3 +96,40 @@ def test_mistakes_keep_their_places(farm: Farm) -> None:
             clfractal.render(HEAVY, "cpu", executor=cluster)
     with pytest.raises(clfractal.SceneError, match=r"^executor: must be a clfractal.Cluster, got 'local:2'"):
         clfractal.render(HEAVY, executor="local:2")  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+def test_tls(folder: Path) -> None:
+    """As docs/cluster.md says; without a certificate nobody is let in."""
+    for line in (
+        "req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=authority -keyout ca.key -out ca.pem",
+        "req -newkey rsa:2048 -nodes -subj /CN=farm -keyout farm.key -out farm.csr",
+        "x509 -req -in farm.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 2 -out farm.pem",
+    ):
+        subprocess.run(["openssl", *line.split()], cwd=folder, check=True, capture_output=True)
+    files = ["--tls-ca-file", "ca.pem", "--tls-cert", "farm.pem", "--tls-key", "farm.key"]
+    order = [
+        "render",
+        "heavy.yaml",
+        "--size",
+        "64x48",
+        "--samples",
+        "2",
+        "--quiet",
+        "-o",
+        "out.exr",
+        "--cluster",
+    ]
+    names = {"CA_FILE": "ca.pem", "CLIENT__CERT": "farm.pem", "CLIENT__KEY": "farm.key"}
+    known = {f"{PREFIX}{name}": str(folder / file) for name, file in names.items()}
+    with Farm(folder, workers=1, protocol="tls", options=files) as farm:
+        ended = process([*order, farm.address], folder, known)
+        assert (ended.status, ended.err) == (0, "")
+        stranger = process([*order, farm.address], folder)
+        assert stranger.is_one_line(2, f"--cluster: {farm.address} needs certificates")
+        other = process([*order, farm.address], folder, {**known, f"{PREFIX}CA_FILE": "nowhere.pem"})
+        assert other.is_one_line(2, "nowhere.pem: is not there")
+        unsafe = process([*order, farm.address.replace("tls", "tcp")], folder)
+        assert unsafe.is_one_line(3, "does not answer within 10 s")
+    assert process([*order[:8], "own.exr"], folder).status == 0
+    assert planes(folder / "out.exr") == planes(folder / "own.exr")
