@@ -5,9 +5,11 @@
 #   make lint          style, types, import directions: with exact versions of tools, so that it says the same everywhere
 #   make view          the window (needs a display)
 #   make window        tests of the window, on a screen of their own (needs Xvfb, xdotool, openbox and Mesa)
+#   make cluster       tests of the cluster, with schedulers and workers that are killed (ARGUMENTS="-k film")
+#   make kills         200 workers killed at random, some fifteen minutes; no pixel may differ (ARGUMENTS="--kills 20 --seed 7")
 #   make soak          ten minutes of random events for the window, from a seed
 #   make locks         which versions the dependencies resolve to on Linux, macOS and Windows (tests/platforms/locks)
-#   make lowest        render, animate, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
+#   make lowest        render (on a cluster too), animate, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make truth         how near pictures are to the set, by brute force (ARGUMENTS="--formula mandelbulb")
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
@@ -35,7 +37,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test combinations window soak lint locks lowest bench truth mutate gpu-check portability install clean
+.PHONY: demo view test combinations window cluster kills soak lint locks lowest bench truth mutate gpu-check portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -49,17 +51,24 @@ view: $(VENV)/.viewer
 install: $(VENV)/.installed
 
 test: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window -m "not combination" $(PARALLEL) $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m "not combination" $(PARALLEL) $(ARGUMENTS)
 
 # Every formula, number type, lane count and normal that the usual tests show by examples.
 combinations: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window -m combination $(PARALLEL) $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m combination $(PARALLEL) $(ARGUMENTS)
 
 # Windows show what they show in time only if nothing else keeps the cores busy: so one test at a time. A screen, a window
 # manager and a hand on the mouse are programs of their own, so what fails is tried once more before it counts.
 window: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && export CLFRACTAL_EXPECT_INSTALLED=1 && { $(BIN)/python -P -m pytest tests/window $(ARGUMENTS) \
 		|| { echo "once more, what has failed:"; $(BIN)/python -P -m pytest tests/window --last-failed $(ARGUMENTS); }; }
+
+# Real processes that share the cores: one test at a time.
+cluster: $(VENV)/.cluster $(STAGE)/.linked
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest tests/cluster $(ARGUMENTS)
+
+kills: $(VENV)/.cluster $(STAGE)/.linked
+	cd $(STAGE) && $(BIN)/python -m tests.cluster.kills $(ARGUMENTS)
 
 soak: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && $(BIN)/python -P -m tests.window.soak $(or $(ARGUMENTS),--minutes 10)
@@ -85,6 +94,7 @@ lowest: $(LOWEST)/.installed
 		&& $$program render bulb.exr -o again.png -o again.jpg -o again.webp \
 		&& $$program render again.webp -o once-more.png && $$program probe again.jpg 48,27 \
 		&& $$program animate $$scene --set 'animation={frames: 2}' --size 96x54 --samples 1 -o film.mp4 && test -s film.mp4 \
+		&& $$program render $$scene --size 96x54 --samples 1 --cluster local:1 -o far.png && test -s far.png \
 		&& $$program voxelize $$scene --resolution 32 -o bulb.nrrd \
 		&& $$program mesh bulb.nrrd -o bulb.ply && $$program mesh $$scene --resolution 32 -o bulb.glb \
 		&& test -s bulb.exr -a -s bulb.png -a -s once-more.png -a -s again.jpg -a -s bulb.nrrd -a -s bulb.ply -a -s bulb.glb \
@@ -137,6 +147,10 @@ $(VENV)/.tested-with: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[test]'
 	@touch $@
 
+$(VENV)/.cluster: $(VENV)/.tested-with
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[cluster]'
+	@touch $@
+
 $(VENV)/.mutates-with: $(VENV)/.tested-with
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[mutate]'
 	@touch $@
@@ -154,7 +168,7 @@ $(LINT)/.installed: requirements-lint.txt | $(LINT)/bin/python
 $(LOWEST)/.installed: $(SOURCES) | $(LOWEST)/bin/python
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
 	$(LOWEST)/bin/uv pip compile --quiet --python $(LOWEST)/bin/python --resolution lowest-direct \
-		--only-binary :all: --extra mesh --extra viewer --extra film --output-file $(LOWEST)/versions.txt pyproject.toml
+		--only-binary :all: --extra mesh --extra viewer --extra film --extra cluster --output-file $(LOWEST)/versions.txt pyproject.toml
 	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST)/bin/python --only-binary :all: \
 		--requirement $(LOWEST)/versions.txt
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps .

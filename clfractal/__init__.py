@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from clfractal.api import render as render
     from clfractal.api import render_pair as render_pair
     from clfractal.api import voxelize as voxelize
+    from clfractal.cluster.cluster import Cluster as Cluster
     from clfractal.device.cancel import CancelToken as CancelToken
     from clfractal.device.select import devices as devices
     from clfractal.errors import ClfractalError as ClfractalError
@@ -55,6 +56,7 @@ _HOMES = {
     "render": "clfractal.api",
     "render_pair": "clfractal.api",
     "voxelize": "clfractal.api",
+    "Cluster": "clfractal.cluster.cluster",
     "CancelToken": "clfractal.device.cancel",
     "devices": "clfractal.device.select",
     "ClfractalError": "clfractal.errors",

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from clfractal.pictures.probe import Probe
     from clfractal.renderers.points import Distances
     from clfractal.scene.coloring import Coloring
+    from clfractal.work.any_engine import Elsewhere
     from clfractal.work.grids import Talk
     from clfractal.work.run import ProgressCallback
 
@@ -47,6 +48,7 @@ def render(
     region: tuple[int, int, int, int] | None = None,
     channels: Sequence[str] | None = None,
     quality: str | None = None,
+    executor: Elsewhere | None = None,
 ) -> Film:
     """Renders a scene into memory; a stereo scene's two pictures are combined by its mode (see `render_pair`).
 
@@ -61,6 +63,7 @@ def render(
         channels: names of the channels; None: the scene's `output.channels`.
         quality: `draft`, `good`, `final` or `print`: samples, noise and detail together, in the place of the scene's;
             `samples` wins.
+        executor: a `clfractal.Cluster` that renders in the place of a device of this process.
 
     Returns:
         A film: `film["R"]`, `film["Z"]`, ... are float32 arrays of shape (height, width) of the region;
@@ -71,9 +74,9 @@ def render(
         DeviceError: no device, an unknown one, too little memory on it, or it failed.
         KernelBuildError: the generated program does not compile.
     """
-    from clfractal.work.engine import Engine
+    from clfractal.work.engine import engine_on
 
-    with Engine(device) as engine:
+    with engine_on(device, executor) as engine:
         return engine.render(
             scene,
             progress,
@@ -94,6 +97,7 @@ def render_pair(
     samples: int | None = None,
     channels: Sequence[str] | None = None,
     quality: str | None = None,
+    executor: Elsewhere | None = None,
 ) -> tuple[Film, Film]:
     """Renders both eyes' pictures of a stereo scene into memory, for any `stereo.mode`.
 
@@ -102,9 +106,9 @@ def render_pair(
     Returns:
         The films of the left and the right eye, of the size of `image` (half of it in the squeezed modes).
     """
-    from clfractal.work.engine import Engine
+    from clfractal.work.engine import engine_on
 
-    with Engine(device) as engine:
+    with engine_on(device, executor) as engine:
         return engine.render_pair(
             scene, progress, precision=precision, samples=samples, channels=channels, quality=quality
         )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from clfractal.commands.engines import engine_of
 from clfractal.commands.film_parts import (
     Part,
     check_pattern,
@@ -34,6 +36,7 @@ from clfractal.scene.movement import movement_of
 
 if TYPE_CHECKING:
     from clfractal.files.moving import Plan
+    from clfractal.work.any_engine import AnyEngine
     from clfractal.work.job import Job
 
 _LINE_SECONDS = 2.0
@@ -134,32 +137,58 @@ def _render_frames(
     shell: Shell,
 ) -> _Count:
     """Renders the frames that are not there yet."""
-    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
-    from clfractal.commands.numbered import render_one
-    from clfractal.work.engine import Engine
-    from clfractal.work.frames import FilmScenes
-
     with speaking_of(order.scene), doing("checking all frames"):
         for number in files:
             movement_of(scene).scene(number)
-    engine = Engine(order.device, tell=shell.say)
+    with engine_of(order, shell) as engine:
+        return _render_on(engine, order, scene, files, counted, kept, shell)
+
+
+def _render_on(
+    engine: AnyEngine,
+    order: Order,
+    scene: Scene,
+    files: Mapping[int, tuple[Path, ...]],
+    counted: _Count,
+    kept: Kept,
+    shell: Shell,
+) -> _Count:
+    # Imported only now: mistakes in the input are reported without waiting for OpenCL.
+    from clfractal.commands.numbered import render_one
+    from clfractal.work.frames import FilmScenes
+
     scenes = FilmScenes(engine, scene)
+    coming = iter(files.values())
+
+    def is_missing(job: Job) -> bool:
+        return not (_is_there(job, next(coming)) if order.resume else False)
+
+    jobs = engine.in_order(
+        map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
+    )
     begun = False
-    for number, paths in files.items():
-        with speaking_of(order.scene), naming_options():
-            job = engine.prepare(scenes.scene(number), precision=order.precision, samples=order.samples)
-        if not begun:
-            kept.begin()
-            begun = True
-        shell.state = partial(counted.interrupted, number, paths[0])
-        if order.resume and _is_there(job, paths):
-            counted.kept += 1
-            continue
-        long = counted.seconds_each is None or counted.seconds_each > _LONG_FRAME or _partial(paths).exists()
-        state = render_one(
-            job, engine, paths, shell, resume=order.resume, keep=long, bits={kept.at(number): kept.bits}
-        )
-        counted.rendered(state.rays)
+    with closing(jobs):
+        for number, paths in files.items():
+            with speaking_of(order.scene), naming_options():
+                job, missing = next(jobs)
+            if not begun:
+                kept.begin()
+                begun = True
+            shell.state = partial(counted.interrupted, number, paths[0])
+            if not missing:
+                counted.kept += 1
+                continue
+            each = counted.seconds_each
+            state = render_one(
+                job,
+                engine,
+                paths,
+                shell,
+                resume=order.resume,
+                keep=each is None or each > _LONG_FRAME or _partial(paths).exists(),
+                bits={kept.at(number): kept.bits},
+            )
+            counted.rendered(state.rays)
     return counted
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from clfractal.commands.options import (
+    ClusterOption,
     DeviceOption,
     Overrides,
     Precision,
@@ -36,6 +37,7 @@ def render(
         ),
     ] = None,
     device: DeviceOption = None,
+    cluster: ClusterOption = None,
     precision: Precision = None,
     size: Size = None,
     overrides: Overrides = None,
@@ -65,6 +67,7 @@ def render(
         scene=scene,
         outputs=tuple(output or ()),
         device=device,
+        cluster=cluster,
         precision=precision,
         size=size,
         overrides=tuple(overrides or ()),
@@ -96,6 +99,7 @@ def animate(
         typer.Option("--frames", metavar="A-B:STEP", help="Render only these frames, counted from 0."),
     ] = None,
     device: DeviceOption = None,
+    cluster: ClusterOption = None,
     precision: Precision = None,
     size: Size = None,
     overrides: Overrides = None,
@@ -135,6 +139,7 @@ def animate(
         scene=scene,
         outputs=tuple(output or ()),
         device=device,
+        cluster=cluster,
         precision=precision,
         size=size,
         overrides=tuple(overrides or ()),

@@ -16,7 +16,7 @@ from clfractal.work.save import save_job
 if TYPE_CHECKING:
     from clfractal.commands.shell import Shell
     from clfractal.pictures.tiled import TiledStore
-    from clfractal.work.engine import Engine
+    from clfractal.work.any_engine import AnyEngine
     from clfractal.work.job import Job
     from clfractal.work.run import Progress
 
@@ -26,7 +26,7 @@ _IN_MEMORY = 1 << 28
 
 def render_one(
     job: Job,
-    engine: Engine,
+    engine: AnyEngine,
     paths: tuple[Path, ...],
     shell: Shell,
     *,
@@ -74,7 +74,7 @@ def _save(
             save_job(replace(job, scene=wanted), stores, (path,), header)
 
 
-def _run(job: Job, stores: Sequence[TiledStore], engine: Engine, reporter: Reporter) -> Progress:
+def _run(job: Job, stores: Sequence[TiledStore], engine: AnyEngine, reporter: Reporter) -> Progress:
     try:
         return run(job, stores, engine.executor, progress=reporter)
     finally:

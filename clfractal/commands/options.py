@@ -39,6 +39,14 @@ DeviceOption = Annotated[
     str | None,
     typer.Option("--device", help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]"),
 ]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Render on a Dask cluster: its scheduler, such as tcp://HOST:8786, or local:N for N workers here.",
+    ),
+]
 Resolution = Annotated[
     str | None,
     typer.Option(

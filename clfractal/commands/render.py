@@ -6,7 +6,9 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from clfractal.commands.engines import engine_of, shares_of
 from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
 from clfractal.commands.order import naming_options
@@ -18,6 +20,9 @@ from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+
+if TYPE_CHECKING:
+    from clfractal.work.any_engine import AnyEngine
 
 
 def render_scene(order: Order, shell: Shell) -> None:
@@ -58,16 +63,28 @@ def render_files(order: Order, shell: Shell) -> None:
     shell.mute_drivers()
     scene = ordered_scene(order)
     outputs = checked_outputs(order, scene, region)
+    with engine_of(order, shell) as engine:
+        _render(replace(order, outputs=outputs), shell, engine, scene, region, start)
+
+
+def _render(
+    order: Order,
+    shell: Shell,
+    engine: AnyEngine,
+    scene: Scene,
+    region: tuple[int, int, int, int] | None,
+    start: float,
+) -> None:
+    """Renders a scene that was checked; `start` is when the command began, by `time.perf_counter`."""
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands.unfinished import Unfinished
     from clfractal.pictures.outputs import output_files
     from clfractal.work import stats
-    from clfractal.work.engine import Engine
     from clfractal.work.remarks import remarks_of
     from clfractal.work.run import run
     from clfractal.work.save import save_job
 
-    engine = Engine(order.device, tell=shell.say)
+    outputs = order.outputs
     with speaking_of(order.scene), naming_options():
         job = engine.prepare(scene, region=region, samples=order.samples, precision=order.precision)
     if job.remark:
@@ -100,6 +117,9 @@ def render_files(order: Order, shell: Shell) -> None:
         comfort=comfort,
         remarks=remarks,
     )
+    shares = shares_of(engine)
+    if shares is not None:
+        values["workers"] = shares
     if order.stats is not None:
         stats.write_statistics(order.stats, values)
     files = [file for path in outputs for file in output_files(job.scene.stereo, path)]

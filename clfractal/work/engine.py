@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
-from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypeAlias
+from typing import TYPE_CHECKING
 
 from clfractal import arguments
 from clfractal.device.cancel import CancelToken
-from clfractal.device.forked import is_lost, use_opencl
+from clfractal.device.forked import is_lost
 from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import Device, choose
-from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
+from clfractal.work.any_engine import AnyEngine, Elsewhere, SceneLike, check_token
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
-from clfractal.work.run import ProgressCallback, run
 from clfractal.work.settle import is_settled, settled
 
 if TYPE_CHECKING:
@@ -31,10 +25,8 @@ if TYPE_CHECKING:
     from clfractal.work.look import Look
     from clfractal.work.refine import Refinement
 
-SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
-
-class Engine:
+class Engine(AnyEngine):
     """Renders scenes on one device, and keeps unchanged data from one to the next: programs, buffers, grids, maps.
 
         with clfractal.Engine() as engine:
@@ -53,6 +45,8 @@ class Engine:
         DeviceError: no device, or an unknown one.
     """
 
+    executor: LocalExecutor
+
     def __init__(
         self,
         device: str | Device | None = None,
@@ -68,18 +62,7 @@ class Engine:
         # A separate executor for looks: their size differs, so they would replace a picture's buffers.
         self._looking = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
         self._looking.kept = self.executor.kept
-        self._busy = threading.Lock()
-        self._closed = False
-        self.looks_built_ms = 0.0
-        """Building programs for the quick looks of the last `prepare`, milliseconds."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+        super().__init__()
 
     def close(self) -> None:
         """Frees the device's memory; the engine cannot be used afterwards. A second call does nothing."""
@@ -149,80 +132,6 @@ class Engine:
         self.looks_built_ms = self.device.loaded.building.milliseconds - built_before
         return job
 
-    def render(
-        self,
-        scene: SceneLike,
-        progress: ProgressCallback | None = None,
-        *,
-        precision: str | None = None,
-        samples: int | None = None,
-        region: tuple[int, int, int, int] | None = None,
-        channels: Sequence[str] | None = None,
-        quality: str | None = None,
-        token: CancelToken | None = None,
-    ) -> Film:
-        """Renders a scene into memory; arguments, result and errors as for `clfractal.render`.
-
-        Args:
-            token: ends the render when any thread cancels it; `clfractal.Stopped` is then raised.
-        """
-        from clfractal.work.films import JobFilms, Took
-
-        start = time.perf_counter()
-        arguments.function("progress", progress)
-        _check_token(token)
-        with self._alone():
-            job = self.prepare(
-                scene,
-                precision=precision,
-                samples=samples,
-                region=region,
-                channels=channels,
-                quality=quality,
-            )
-            if job.stays_apart:
-                assert job.scene.stereo is not None
-                raise SceneError(
-                    f"{job.scene.stereo.mode} keeps the two eyes' pictures apart; use render_pair, or another mode",
-                    Where(path="stereo.mode"),
-                )
-            films = JobFilms(job)
-            state = run(job, films.films, self.executor, progress=progress, token=token)
-            return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
-
-    def render_pair(
-        self,
-        scene: SceneLike,
-        progress: ProgressCallback | None = None,
-        *,
-        precision: str | None = None,
-        samples: int | None = None,
-        channels: Sequence[str] | None = None,
-        quality: str | None = None,
-        token: CancelToken | None = None,
-    ) -> tuple[Film, Film]:
-        """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
-        from clfractal.work.films import JobFilms, Took
-
-        start = time.perf_counter()
-        arguments.function("progress", progress)
-        _check_token(token)
-        with self._alone():
-            loaded = as_scene(scene)
-            if loaded.stereo is None:
-                raise SceneError("a pair needs a scene with a stereo section", Where(path="stereo"))
-            if loaded.stereo.mode not in ("pair", "split_half", "over_under_half"):
-                # The other modes may need only parts of a pair.
-                stereo = loaded.stereo.model_copy(update={"mode": "pair"})
-                loaded = loaded.model_copy(update={"stereo": stereo})
-            job = self.prepare(
-                loaded, precision=precision, samples=samples, channels=channels, quality=quality
-            )
-            films = JobFilms(job)
-            state = run(job, films.films, self.executor, progress=progress, token=token)
-            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
-            return eyes["left"], eyes["right"]
-
     def probe(self, scene: SceneLike, x: int, y: int, *, precision: str | None = None) -> Probe:
         """What lies at a pixel of a scene's picture; arguments, result and errors as for `clfractal.probe`."""
         from clfractal.work.probing import checked_pixel, probed
@@ -252,7 +161,7 @@ class Engine:
         """
         from clfractal.work.refine import Refinement, refined
 
-        _check_token(token)
+        check_token(token)
 
         def films() -> Generator[Film]:
             with self._alone():
@@ -268,21 +177,18 @@ class Engine:
 
         return Refinement(films())
 
-    @contextmanager
-    def _alone(self) -> Iterator[None]:
-        use_opencl()
-        if self._closed:
-            raise ClfractalError("this engine is closed")
-        if not self._busy.acquire(blocking=False):
-            raise ClfractalError(
-                "this engine is already in use; give each thread its own engine, or finish the refinement first"
-            )
-        try:
-            yield
-        finally:
-            self._busy.release()
 
+def engine_on(device: str | None, executor: Elsewhere | None) -> AnyEngine:
+    """The engine of a device of this process, or of an executor that has its own devices.
 
-def _check_token(token: Any) -> None:
-    if token is not None and not isinstance(token, CancelToken):
-        arguments.refuse("token", "must be a CancelToken", arguments.plain(token))
+    Raises:
+        SceneError: both are given, or the executor is none.
+        DeviceError: no device, or an unknown one.
+    """
+    if executor is None:
+        return Engine(device)
+    if not callable(getattr(executor, "engine", None)) or isinstance(executor, type):
+        arguments.refuse("executor", "must be a clfractal.Cluster", arguments.plain(executor))
+    if device is not None:
+        arguments.refuse("device", "belongs to the cluster, as Cluster(address, device=...)", device)
+    return executor.engine()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,8 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
-from clfractal.work.engine import Engine
+from clfractal.work.any_engine import AnyEngine, Elsewhere
+from clfractal.work.engine import engine_on
 
 if TYPE_CHECKING:
     from clfractal.pictures.film import Film
@@ -44,7 +46,7 @@ class FilmScenes:
         SceneError, FormulaError, FileError: the scene has no animation, or a track is wrong.
     """
 
-    def __init__(self, engine: Engine, scene: Scene) -> None:
+    def __init__(self, engine: AnyEngine, scene: Scene) -> None:
         self._engine, self.movement = engine, movement_of(scene)
         self._first: Scene | None = None
 
@@ -83,6 +85,7 @@ def frames(
     samples: int | None = None,
     channels: Sequence[str] | None = None,
     quality: str | None = None,
+    executor: Elsewhere | None = None,
 ) -> Iterator[tuple[int, Film]]:
     """Renders the frames of a scene's animation, one after the other, in one engine.
 
@@ -94,7 +97,7 @@ def frames(
     Args:
         scene: a Scene, or what `load_scene` takes; it needs an `animation`.
         numbers: the wanted frames, in any order, counted from 0; None: all.
-        device, progress, precision, samples, channels, quality: as for `clfractal.render`, for each frame.
+        device, progress, precision, samples, channels, quality, executor: as for `clfractal.render`, for each frame.
 
     Returns:
         An iterator of pairs: the frame's number, and its film.
@@ -107,18 +110,18 @@ def frames(
     wanted = _wanted(numbers, movement_of(found).animation.count)
 
     def rendered() -> Iterator[tuple[int, Film]]:
-        with Engine(device) as engine:
+        with engine_on(device, executor) as engine:
             scenes = FilmScenes(engine, found)
-            for number in wanted:
-                film = engine.render(
-                    scenes.scene(number),
-                    progress,
-                    precision=precision,
-                    samples=samples,
-                    channels=channels,
-                    quality=quality,
-                )
-                yield number, film
+            films = engine.render_in_order(
+                map(scenes.scene, wanted),
+                progress,
+                precision=precision,
+                samples=samples,
+                channels=channels,
+                quality=quality,
+            )
+            with closing(films):
+                yield from zip(wanted, films, strict=True)
 
     return rendered()
 

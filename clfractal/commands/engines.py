@@ -1,0 +1,54 @@
+"""The engine that an order asks for: of a device, or of a cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from clfractal.commands.order import Order
+from clfractal.commands.shell import Shell
+from clfractal.errors import FileError, SceneError, Where
+
+if TYPE_CHECKING:
+    from clfractal.work.any_engine import AnyEngine
+
+
+@contextmanager
+def engine_of(order: Order, shell: Shell) -> Iterator[AnyEngine]:
+    """The engine on which an order is rendered; of a cluster it is closed at the end.
+
+    Raises:
+        ClfractalError: there is no such device or cluster.
+    """
+    if order.cluster is None:
+        from clfractal.work.engine import Engine
+
+        yield Engine(order.device, tell=shell.say)
+        return
+    try:
+        from clfractal.cluster.cluster import Cluster
+
+        cluster = Cluster(order.cluster, device=order.device, tell=shell.say)
+    except (SceneError, FileError) as error:
+        if error.where.path != "cluster":
+            raise
+        raise type(error)(error.message, Where("--cluster")) from error
+    with cluster:
+        yield cluster.engine()
+
+
+def shares_of(engine: AnyEngine) -> list[dict[str, Any]] | None:
+    """What each worker of a cluster has done, for `--stats`; None without a cluster."""
+    from dataclasses import asdict
+
+    shares = getattr(engine.executor, "shares", None)
+    if shares is None:
+        return None
+    return [
+        {
+            name: round(value, 3) if isinstance(value, float) else value
+            for name, value in asdict(share).items()
+        }
+        for share in shares()
+    ]

@@ -1,0 +1,1 @@
+"""Tests with schedulers and workers that are real processes; `make cluster` runs them."""

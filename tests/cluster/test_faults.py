@@ -1,0 +1,219 @@
+"""Whatever is killed, stopped or lost: the same bits in the end, or one line and work that can be resumed."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+import clfractal
+from clfractal.cluster import dispatch, link
+from clfractal.files.exr import read_exr
+from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows, planes
+from tests.cluster.kills import kill_at_random
+from tests.shell import command, environment, process
+
+
+def test_workers_killed_during_a_picture(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
+    order = ["render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address]
+    with Client(folder, *order) as client:
+        kills = kill_at_random(farm, client, random.Random(1), most=4)
+        status, told = client.ended()
+    assert (status, kills) == (0, 4), told
+    assert planes(folder / "out.exr") == picture
+
+
+def test_workers_killed_during_a_film(folder: Path, farm: Farm, film: list[dict[str, bytes]]) -> None:
+    order = ["animate", "film.yaml", "-o", "frame_##.exr", "--cluster", farm.address]
+    with Client(folder, *order) as client:
+        kills = kill_at_random(farm, client, random.Random(2), most=3)
+        status, told = client.ended()
+    assert (status, kills > 0) == (0, True), told
+    assert [planes(folder / f"frame_{number:02d}.exr") for number in range(FRAMES)] == film
+
+
+def test_the_scheduler_returns(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
+    with Client(folder, "render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address) as client:
+        journal_grows(folder)
+        farm.kill_scheduler()
+        time.sleep(1)
+        farm.start_scheduler()
+        farm.add()
+        status, told = client.ended()
+    assert status == 0, told
+    lines = [line for line in told.splitlines() if line.startswith(farm.address)]
+    assert lines == [
+        f"{farm.address}: the scheduler is gone; waiting 60 s for it",
+        f"{farm.address}: the scheduler is back",
+    ]
+    assert planes(folder / "out.exr") == picture
+
+
+def test_the_scheduler_does_not_return(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
+    """One line, status 3; the journal is kept, and one machine ends what a cluster began."""
+    # (A minute is long for a test: the program is told a shorter one.)
+    shorter = "from clfractal.cluster import dispatch; dispatch.RETURN_SECONDS = 2.0"
+    program = f"{shorter}; from clfractal.cli import main; main()"
+    order = command("render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", farm.address)
+    running = subprocess.Popen(
+        [order[0], "-c", program, *order[order.index("render") :]],
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    journal_grows(folder)
+    farm.kill_scheduler()
+    _, told = running.communicate(timeout=60)
+    assert running.returncode == 3
+    assert told == f"{farm.address}: the scheduler is gone, and did not return in time\n"
+    ended = process(["render", "heavy.yaml", "-o", "out.exr", "--resume", "--stats", "s.json"], folder)
+    assert ended.status == 0, ended
+    assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
+    assert planes(folder / "out.exr") == picture
+
+
+def test_a_worker_that_stops_answering(farm: Farm, monkeypatch: pytest.MonkeyPatch, alone: Path) -> None:
+    monkeypatch.setattr(link, "SILENT_SECONDS", 3.0)
+    told: list[str] = []
+    stopped = farm.workers["w0"]
+    with clfractal.Cluster(farm.address, tell=told.append) as cluster:
+
+        def stop(state: clfractal.Progress) -> None:
+            if state.tiles_done < state.tiles / 2:
+                os.kill(stopped.pid, signal.SIGSTOP)
+
+        found = clfractal.render(HEAVY, progress=stop, executor=cluster)
+    whole, _ = read_exr(alone / "out.exr")
+    assert all(found[name].tobytes() == whole[name].tobytes() for name in ("R", "Z", "N.X"))
+    assert [line.partition(" (")[0] for line in told] == ["worker w0"]
+    assert told[0].endswith("does not answer; its work goes to others")
+
+
+def test_late_workers_join_and_early_ones_go(folder: Path, picture: dict[str, bytes]) -> None:
+    with Farm(folder, workers=0) as farm:
+        order = ["render", "heavy.yaml", "-o", "out.exr", "--stats", "s.json", "--cluster", farm.address]
+        with Client(folder, *order) as client:
+            first = farm.add()
+            journal_grows(folder)
+            farm.add()
+            time.sleep(2)
+            farm.kill(first)
+            status, told = client.ended()
+        assert status == 0, told
+    assert planes(folder / "out.exr") == picture
+    assert '"w0"' in (folder / "s.json").read_text()
+    assert '"w1"' in (folder / "s.json").read_text()
+
+
+def test_interrupts_end_the_work_of_the_workers(folder: Path, farm: Farm) -> None:
+    """A tile of minutes: its worker ends it as soon as nobody wants it."""
+    order = ["render", "heavy.yaml", "--set", "renderer.samples=20000", "-o", "out.exr"]
+    with Client(folder, *order, "--cluster", farm.address) as client:
+        deadline = time.monotonic() + 60
+        while not _at_work(farm) and time.monotonic() < deadline:
+            time.sleep(0.2)
+        time.sleep(2)
+        assert _at_work(farm)
+        start = time.monotonic()
+        client.process.send_signal(signal.SIGINT)
+        status, told = client.ended(10)
+        assert time.monotonic() - start < 1.5  # half a second, and what a busy machine adds
+        assert status == 130
+        assert told.splitlines()[-1] == "out.exr: interrupted before a tile was done"
+    # The same workers are free at once.
+    with clfractal.Cluster(farm.address) as cluster:
+        start = time.monotonic()
+        clfractal.render(HEAVY, executor=cluster, samples=1)
+        assert time.monotonic() - start < 20
+    assert set(farm.workers) == {"w0", "w1"}
+
+
+def _at_work(farm: Farm) -> bool:
+    from distributed import Client as DaskClient
+
+    with DaskClient(farm.address, set_as_default=False) as client:
+        return any("clfractal-tiles" in str(keys) for keys in client.processing().values())
+
+
+def test_a_killed_client_is_resumed(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
+    order = ["render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", farm.address]
+    with Client(folder, *order) as client:
+        journal_grows(folder)
+        assert client.running
+    ended = process([*order, "--resume", "--stats", "s.json"], folder)
+    assert ended.status == 0, ended
+    assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
+    assert planes(folder / "out.exr") == picture
+
+
+def test_a_full_disk(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
+    """The system lets the client write no more than a part of its journal."""
+    order = ["render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address, "--quiet"]
+    full = subprocess.run(
+        command(*order),
+        cwd=folder,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000)),
+        timeout=120,
+    )
+    assert (full.returncode, full.stderr.count("\n")) == (2, 1), full
+    assert full.stderr.startswith("out.exr.partial: ")
+    assert not (folder / "out.exr").exists()
+    assert process([*order, "--resume"], folder).status == 0
+    assert planes(folder / "out.exr") == picture
+
+
+def test_workers_of_another_version_or_without_a_device(folder: Path, farm: Farm) -> None:
+    for name in list(farm.workers):
+        farm.kill(name)
+    _other_program(folder / "other")
+    farm.add({"PYTHONPATH": str(folder / "other")})
+    farm.add({"CLFRACTAL_DEVICE": "abacus"})
+    order = ["render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address]
+    with Client(folder, *order) as client:
+        status, told = client.ended()
+    assert status == 3
+    lines = {line.partition(" (")[0]: line for line in told.splitlines() if line.startswith("worker")}
+    assert set(lines) == {"worker w2", "worker w3"}
+    assert "is left out: it has clfractal 9.9.9 (" in lines["worker w2"]
+    assert f"and this is clfractal {clfractal.__version__} (" in lines["worker w2"]
+    assert "is left out: unknown device 'abacus'" in lines["worker w3"]
+    assert f"{farm.address}: no worker is fit: " in told.splitlines()[-1]
+    assert not list(folder.glob("out.exr*"))
+    # One that is fit is enough.
+    farm.add()
+    assert process([*order, "--size", "64x48", "--quiet"], folder).status == 0
+
+
+def _other_program(where: Path) -> None:
+    """A copy of the program with another version."""
+    import shutil
+
+    home = Path(clfractal.__file__).resolve().parents[1]
+    for name in ("clfractal", "kernels", "scenes"):
+        if (home / name).exists():
+            shutil.copytree(home / name, where / name, ignore=shutil.ignore_patterns("__pycache__", "*.exr"))
+    init = where / "clfractal/__init__.py"
+    init.write_text(init.read_text().replace(f'"{clfractal.__version__}"', '"9.9.9"'))
+
+
+def test_nobody_answers(folder: Path) -> None:
+    start = time.monotonic()
+    address = f"127.0.0.1:{free_port()}"
+    ended = process(["render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", address], folder)
+    assert ended.is_one_line(3, f"tcp://{address}: the scheduler does not answer within 10 s")
+    assert time.monotonic() - start < 10 + 5
+    assert not list(folder.glob("out.exr*"))
+
+
+def test_the_limits_are_those_that_are_told() -> None:
+    assert (dispatch.RETURN_SECONDS, link.ANSWER_SECONDS) == (60, 10)

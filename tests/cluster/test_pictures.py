@@ -1,0 +1,135 @@
+"""A cluster gives the bits of one machine, for pictures and films, from the shell and from Python."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.scene import environment
+from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, planes
+from tests.shell import process
+
+TILES = 8 * 6
+PREFIX = "DASK_DISTRIBUTED__COMM__TLS__"
+
+
+def test_a_picture_of_workers_here(folder: Path, picture: dict[str, bytes]) -> None:
+    options = ["--cluster", "local:2", "--stats", "stats.json", "--quiet"]
+    ended = process(["render", "heavy.yaml", "-o", "out.exr", *options], folder)
+    assert (ended.status, ended.err) == (0, "")
+    assert planes(folder / "out.exr") == picture
+    stats = json.loads((folder / "stats.json").read_text())
+    workers = stats["workers"]
+    assert [worker["name"] for worker in workers] == ["0", "1"]
+    assert sum(worker["tiles"] for worker in workers) == TILES
+    assert all(worker["tiles"] > 0 and worker["bundles"] > 1 for worker in workers)
+    assert sum(worker["kernel_ms"] for worker in workers) == pytest.approx(stats["kernel_ms"], abs=1)
+    assert {worker["device"] for worker in workers} == {stats["device"]}
+
+
+def test_a_film(folder: Path, farm: Farm, film: list[dict[str, bytes]]) -> None:
+    ended = process(["animate", "film.yaml", "-o", "frame_##.exr", "--cluster", farm.address], folder)
+    assert ended.status == 0, ended
+    found = [folder / f"frame_{number:02d}.exr" for number in range(FRAMES)]
+    assert [planes(path) for path in found] == film
+    times = [path.stat().st_mtime_ns for path in found]
+    assert times == sorted(times)  # in order of need
+    assert list(folder.glob("*.partial")) == []
+
+
+def test_two_films_at_once(folder: Path, farm: Farm, film: list[dict[str, bytes]]) -> None:
+    order = ["animate", "film.yaml", "--cluster", farm.address]
+    with (
+        Client(folder, *order, "-o", "a_##.exr") as first,
+        Client(folder, *order, "-o", "b_##.exr") as second,
+    ):
+        assert (first.ended()[0], second.ended()[0]) == (0, 0)
+    for name in "ab":
+        assert [planes(folder / f"{name}_{number:02d}.exr") for number in range(FRAMES)] == film
+
+
+def test_python(farm: Farm, alone: Path) -> None:
+    with clfractal.Cluster(farm.address) as cluster:
+        whole = clfractal.render(HEAVY, executor=cluster, samples=2)
+        numbers = [5, 2]
+        shown = list(clfractal.frames(alone / "film.yaml", numbers=numbers, executor=cluster, samples=1))
+        assert sum(share.tiles for share in cluster.shares()) == TILES + 2 * 4 * 3
+    own = clfractal.render(HEAVY, samples=2)
+    assert all(np.array_equal(whole[name], own[name], equal_nan=True) for name in own.channels)
+    expected = list(clfractal.frames(alone / "film.yaml", numbers=numbers, samples=1))
+    assert [number for number, _ in shown] == numbers
+    for (_, found), (_, wanted) in zip(shown, expected, strict=True):
+        assert all(np.array_equal(found[name], wanted[name], equal_nan=True) for name in wanted.channels)
+    with pytest.raises(clfractal.ClfractalError, match="closed"):
+        clfractal.render(HEAVY, executor=cluster)
+
+
+def test_what_is_measured_first(farm: Farm) -> None:
+    """Exposure, focus and a stereo pair's screen are measured by a worker; a map and its pixels travel along."""
+    scene = {
+        "version": 1,
+        "formula": {"name": "mandelbulb", "iterations": 8},
+        "image": {"width": 96, "height": 64},
+        "camera": {"position": [0, -3, 0.4], "f_number": 4, "focus": "auto"},
+        "environment": {"name": environment.names()[0]},
+        "stereo": {"mode": "split", "fit": "auto"},
+        "output": {"exposure": "auto"},
+    }
+    with clfractal.Cluster(farm.address) as cluster:
+        found = clfractal.render(scene, executor=cluster)
+    own = clfractal.render(scene)
+    assert found.header["scene"] == own.header["scene"]
+    assert all(np.array_equal(found[name], own[name], equal_nan=True) for name in own.channels)
+
+
+def test_mistakes_keep_their_places(farm: Farm) -> None:
+    with clfractal.Cluster(farm.address) as cluster:
+        with pytest.raises(clfractal.SceneError, match=r"^region: must lie inside the picture"):
+            clfractal.render(HEAVY, executor=cluster, region=(0, 0, 9999, 10))
+        with pytest.raises(clfractal.SceneError, match=r"^device: belongs to the cluster"):
+            clfractal.render(HEAVY, "cpu", executor=cluster)
+    with pytest.raises(clfractal.SceneError, match=r"^executor: must be a clfractal.Cluster, got 'local:2'"):
+        clfractal.render(HEAVY, executor="local:2")  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+def test_tls(folder: Path) -> None:
+    """As docs/cluster.md says; without a certificate nobody is let in."""
+    for line in (
+        "req -x509 -newkey rsa:2048 -nodes -days 2 -subj /CN=authority -keyout ca.key -out ca.pem",
+        "req -newkey rsa:2048 -nodes -subj /CN=farm -keyout farm.key -out farm.csr",
+        "x509 -req -in farm.csr -CA ca.pem -CAkey ca.key -CAcreateserial -days 2 -out farm.pem",
+    ):
+        subprocess.run(["openssl", *line.split()], cwd=folder, check=True, capture_output=True)
+    files = ["--tls-ca-file", "ca.pem", "--tls-cert", "farm.pem", "--tls-key", "farm.key"]
+    order = [
+        "render",
+        "heavy.yaml",
+        "--size",
+        "64x48",
+        "--samples",
+        "2",
+        "--quiet",
+        "-o",
+        "out.exr",
+        "--cluster",
+    ]
+    names = {"CA_FILE": "ca.pem", "CLIENT__CERT": "farm.pem", "CLIENT__KEY": "farm.key"}
+    known = {f"{PREFIX}{name}": str(folder / file) for name, file in names.items()}
+    with Farm(folder, workers=1, protocol="tls", options=files) as farm:
+        ended = process([*order, farm.address], folder, known)
+        assert (ended.status, ended.err) == (0, "")
+        stranger = process([*order, farm.address], folder)
+        assert stranger.is_one_line(2, f"--cluster: {farm.address} needs certificates")
+        other = process([*order, farm.address], folder, {**known, f"{PREFIX}CA_FILE": "nowhere.pem"})
+        assert other.is_one_line(2, "nowhere.pem: is not there")
+        unsafe = process([*order, farm.address.replace("tls", "tcp")], folder)
+        assert unsafe.is_one_line(3, "does not answer within 10 s")
+    assert process([*order[:8], "own.exr"], folder).status == 0
+    assert planes(folder / "out.exr") == planes(folder / "own.exr")
