@@ -9,6 +9,7 @@ import typer
 
 from clfractal.commands.options import (
     DeviceOption,
+    DevicesOption,
     Overrides,
     Precision,
     Quality,
@@ -35,7 +36,7 @@ def render(
             help="An .exr, .png, .jpg or .webp file, or - for standard output; repeatable.  [default: SCENE with .png]",
         ),
     ] = None,
-    device: DeviceOption = None,
+    device: DevicesOption = None,
     precision: Precision = None,
     size: Size = None,
     overrides: Overrides = None,
@@ -64,7 +65,7 @@ def render(
     order = Order(
         scene=scene,
         outputs=tuple(output or ()),
-        device=device,
+        device=tuple(device) if device else None,
         precision=precision,
         size=size,
         overrides=tuple(overrides or ()),
@@ -95,7 +96,7 @@ def animate(
         str | None,
         typer.Option("--frames", metavar="A-B:STEP", help="Render only these frames, counted from 0."),
     ] = None,
-    device: DeviceOption = None,
+    device: DevicesOption = None,
     precision: Precision = None,
     size: Size = None,
     overrides: Overrides = None,
@@ -125,7 +126,7 @@ def animate(
     order = Order(
         scene=scene,
         outputs=tuple(output or ()),
-        device=device,
+        device=tuple(device) if device else None,
         precision=precision,
         size=size,
         overrides=tuple(overrides or ()),

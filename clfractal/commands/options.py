@@ -39,6 +39,14 @@ DeviceOption = Annotated[
     str | None,
     typer.Option("--device", help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]"),
 ]
+DevicesOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--device",
+        help="cpu, gpu, PLATFORM:DEVICE, or part of a name; cpu/2+2 for parts of one; all; repeatable."
+        "  [env: CLFRACTAL_DEVICE]",
+    ),
+]
 Resolution = Annotated[
     str | None,
     typer.Option(

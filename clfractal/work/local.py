@@ -25,6 +25,8 @@ from clfractal.work.stages import Span
 Tiles = npt.NDArray[np.int32]
 ViewOutlet = Callable[[int, cl.Buffer, cl.Buffer, int], None]
 """An `Outlet` for several views: the view's number, then as there."""
+Supply = Callable[[int], Tiles]
+"""Gives the tiles of a launch, at most so many; none if there are no more."""
 
 _NO_TILES = np.zeros(0, np.int32)
 _NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
@@ -42,6 +44,7 @@ class LocalExecutor:
         tell: called with a message if a program has to be compiled first, or if something does not fit.
 
     `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no films and no statistics.
+    `supply`, if it is set, gives each launch its tiles; an item then only tells which ones it may give.
     """
 
     def __init__(
@@ -56,6 +59,7 @@ class LocalExecutor:
         self.tell = tell
         self.kept = Kept()
         self.outlet: ViewOutlet | None = None
+        self.supply: Supply | None = None
         self._outputs = OutputBuffers(device)
         self._drawings: dict[int, Drawing] = {}
 
@@ -73,7 +77,8 @@ class LocalExecutor:
             if partial:
                 drawing.keep(TileGrid(view.plan.region).count)
             outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
-            yield from _launched(drawing, item, self.budget_seconds, token, keep=partial, outlet=outlet)
+            cutter = _Cutter(drawing, item, self.supply or _in_order(item.tiles), keep=partial)
+            yield from _launched(cutter, self.budget_seconds, token, outlet=outlet)
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
 
@@ -115,17 +120,26 @@ class LocalExecutor:
         return drawing
 
 
+def _in_order(tiles: Tiles) -> Supply:
+    """All tiles, as they are wanted."""
+    place = 0
+
+    def take(most: int) -> Tiles:
+        nonlocal place
+        left = len(tiles) - place
+        # The last launch is not much shorter than the others: no core idles long at the end.
+        count = (left + 1) // 2 if most < left < 1.5 * most else min(most, left)
+        place += count
+        return tiles[place - count : place]
+
+    return take
+
+
 def _launched(
-    drawing: Drawing,
-    item: WorkItem,
-    budget_seconds: float,
-    token: CancelToken | None,
-    *,
-    keep: bool,
-    outlet: Outlet | None,
+    cutter: _Cutter, budget_seconds: float, token: CancelToken | None, *, outlet: Outlet | None
 ) -> Generator[Result]:
     """Launches an item's tiles and gives them as they are finished."""
-    cutter = _Cutter(drawing, item, keep=keep)
+    drawing, item = cutter.drawing, cutter.item
     pace = drawing.pace
     pace.seconds = budget_seconds / IN_FLIGHT
     pace.most = float(drawing.capacity * cutter.per_tile)
@@ -159,13 +173,13 @@ class _Cutter:
     or if one work-group is still too heavy some of its samples, down to one sample of one packet.
     """
 
-    def __init__(self, drawing: Drawing, item: WorkItem, *, keep: bool) -> None:
-        self.drawing, self.item, self.keep = drawing, item, keep
+    def __init__(self, drawing: Drawing, item: WorkItem, take: Supply, *, keep: bool) -> None:
+        self.drawing, self.item, self.take, self.keep = drawing, item, take, keep
         self.first, self.end = item.samples
         self.per_tile = drawing.packets * (self.end - self.first)
-        self.place = 0  # of the next tile
         self.slot = 0
-        # The packets and the next sample of a tile that is rendered in parts; no packets between two tiles.
+        # A tile that is rendered in parts: its number, packets and next sample; no packets between two tiles.
+        self.tile = _NO_TILES
         self.packets = (0, 0)
         self.sample = self.first
 
@@ -181,32 +195,27 @@ class _Cutter:
         return Part(event, float(amount), span, begun)
 
     def _next(self, size: float) -> Span | None:
-        tiles, drawing = self.item.tiles, self.drawing
-        left = len(tiles) - self.place
+        drawing = self.drawing
         if self.packets == (0, 0):
-            if left == 0:
+            whole = int(min(size / self.per_tile, drawing.capacity))
+            in_parts = whole < 1 or drawing.wave.packets < drawing.packets
+            chosen = self.take(1 if in_parts else whole)
+            if not len(chosen):
                 return None
-            count = int(min(size / self.per_tile, drawing.capacity, left))
-            if count >= 1 and drawing.wave.packets >= drawing.packets:
-                # The last launch is not much shorter than the others: no core idles long at the end.
-                if count < left < 1.5 * count:
-                    count = (left + 1) // 2
-                chosen = tiles[self.place : self.place + count]
-                self.place += count
+            if not in_parts:
                 return self._span(chosen, (0, drawing.packets), self.item.samples, last=True)
+            self.tile = chosen
             self.packets = self._some_packets(0, size)
             self.sample = self.first
         packets, sample = self.packets, self.sample
         width = packets[1] - packets[0]
         samples = (sample, min(sample + max(int(size / width), 1), self.end))
-        chosen = tiles[self.place : self.place + 1]
         last = samples[1] == self.end and packets[1] == drawing.packets
-        span = self._span(chosen, packets, samples, last=last)
+        span = self._span(self.tile, packets, samples, last=last)
         if samples[1] < self.end:
             self.sample = samples[1]
         elif last:
             self.packets = (0, 0)
-            self.place += 1
         else:
             self.packets = self._some_packets(packets[1], size)
             self.sample = self.first

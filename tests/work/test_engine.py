@@ -122,6 +122,7 @@ def test_a_grid_that_nobody_asks_for_is_dropped(device: Device, monkeypatch: pyt
         engine.render(changed(VOLUME))
         for _ in range(3):
             engine.render(changed(BULB))
+        assert isinstance(engine.executor, LocalExecutor)
         assert engine.executor.kept._things == {}
         engine.render(changed(VOLUME))
     assert len(filled) == 2
