@@ -119,6 +119,7 @@ def _render_frames(
     from clfractal.commands.numbered import render_one
     from clfractal.work.engine import Engine
     from clfractal.work.frames import FilmScenes
+    from clfractal.work.remarks import mixed_kinds
 
     with speaking_of(order.scene), doing("checking all frames"):
         for number in files:
@@ -132,6 +133,8 @@ def _render_frames(
         if not begun:
             kept.begin()
             begun = True
+            if job.others:
+                shell.say(f"{order.scene}: {mixed_kinds(1 + len(job.others))}")
         shell.state = partial(counted.interrupted, number, paths[0])
         if order.resume and _is_there(job, paths):
             counted.kept += 1

@@ -35,7 +35,7 @@ def divided(device: cl.Device, counts: tuple[int, ...], shown: str) -> list[cl.D
     if min(counts) < 1:
         raise _refusal(f"{shown}: a part needs at least 1 compute unit, got {_sum(counts)}")
     if need > have:
-        raise _refusal(f"{shown} has {have} compute units, but {_sum(counts)} are {need}")
+        raise _refusal(f"{shown} has {have} compute units, but {need} are wanted")
     kind: Any = cl.device_partition_property.BY_COUNTS
     try:
         offered: Any = device.partition_properties

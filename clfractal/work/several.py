@@ -62,6 +62,7 @@ class SeveralExecutor:
         self.failures: dict[int, DeviceError | KernelBuildError] = {}
         """Why devices are left out, by their places in `executors`."""
         self._told: set[str] = set()
+        self._gave_up = False
         self._speeds = [1.0] * len(self.executors)
         self._measured = False
         # Of a picture in passes: which device has each tile of a view, -1 none.
@@ -198,7 +199,10 @@ class SeveralExecutor:
     ) -> Generator[Result]:
         running = set(range(len(numbers)))
         built = [0.0] * len(numbers)
+        missing = shared.count
         while running:
+            if not missing and not self._waits_for(shared, running):
+                return
             if token is not None:
                 token.check()
             try:
@@ -212,6 +216,7 @@ class SeveralExecutor:
                 built[told.device] += told.result.tally.build_ms
                 tally = replace(told.result.tally, build_ms=max(built) - before)
                 self._own(told.result, numbers[told.device])
+                missing -= len(told.result.tiles)
                 yield replace(told.result, tally=tally, maker=maker_of(executor.device.info))
                 continue
             running.discard(told.device)
@@ -224,6 +229,17 @@ class SeveralExecutor:
             yield Result(0, _NO_TILES, _NO_FILM, Tally(), remark=remark)
         if not shared.finished:  # the devices that are left have no part in this job
             raise self._nothing_left()
+
+    def _waits_for(self, shared: Shared, running: Iterable[int]) -> bool:
+        """Whether programs that are still being built are waited for, when all is done without them.
+
+        Once they are given up, so that a picture is there as soon as it can be. A second picture tells that there will be
+        more, and that their devices are worth waiting for.
+        """
+        if not any(shared.prepares(device) for device in running):
+            return False
+        waits, self._gave_up = self._gave_up, True
+        return waits
 
     def _offers(self, job: Job, items: Sequence[WorkItem], numbers: Sequence[int]) -> list[Offer]:
         """What is to be done, and which tiles belong to a device."""

@@ -87,6 +87,17 @@ class Shared:
         self._stopped = False
 
     @property
+    def count(self) -> int:
+        """Tiles that nobody has taken yet."""
+        with self._changed:
+            return sum(offer.count for offer in self._offers)
+
+    def prepares(self, device: int) -> bool:
+        """Whether a device has not come to its first launch yet."""
+        with self._changed:
+            return self._hands[device].began is None
+
+    @property
     def finished(self) -> bool:
         """Whether all tiles are done."""
         with self._changed:

@@ -18,6 +18,7 @@ from clfractal.scene.model import Scene
 from clfractal.voxels import fill
 from clfractal.work.drawing import Drawing
 from clfractal.work.engine import Engine
+from clfractal.work.local import LocalExecutor
 
 SIZE = {"width": 64, "height": 48}
 BULB = f"""
