@@ -40,7 +40,7 @@ PRECISIONS = ("auto", "float32", "float64")
 
 def render(
     scene: Scene | str | Path | Mapping[str, Any],
-    device: str | None = None,
+    device: str | Sequence[str] | None = None,
     progress: ProgressCallback | None = None,
     *,
     precision: str | None = None,
@@ -54,7 +54,8 @@ def render(
 
     Args:
         scene: a Scene, or what `load_scene` takes: a path, YAML text, or plain data.
-        device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; None: CLFRACTAL_DEVICE, else the best.
+        device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; None: CLFRACTAL_DEVICE, else the best. `all`, parts such
+            as `cpu/2+2` or a list of names are several devices, which render tiles side by side.
         progress: called with a `clfractal.Progress` after each batch of tiles; an exception in it ends
             the render.
         precision: `auto`, `float32` or `float64`; None: the scene's.
@@ -90,7 +91,7 @@ def render(
 
 def render_pair(
     scene: Scene | str | Path | Mapping[str, Any],
-    device: str | None = None,
+    device: str | Sequence[str] | None = None,
     progress: ProgressCallback | None = None,
     *,
     precision: str | None = None,

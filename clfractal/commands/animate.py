@@ -156,6 +156,7 @@ def _render_on(
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.commands.numbered import render_one
     from clfractal.work.frames import FilmScenes
+    from clfractal.work.remarks import mixed_kinds
 
     scenes = FilmScenes(engine, scene)
     coming = iter(files.values())
@@ -174,6 +175,8 @@ def _render_on(
             if not begun:
                 kept.begin()
                 begun = True
+                if job.others:
+                    shell.say(f"{order.scene}: {mixed_kinds(1 + len(job.others))}")
             shell.state = partial(counted.interrupted, number, paths[0])
             if not missing:
                 counted.kept += 1

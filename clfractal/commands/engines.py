@@ -29,13 +29,22 @@ def engine_of(order: Order, shell: Shell) -> Iterator[AnyEngine]:
     try:
         from clfractal.cluster.cluster import Cluster
 
-        cluster = Cluster(order.cluster, device=order.device, tell=shell.say)
+        cluster = Cluster(order.cluster, device=_of_worker(order), tell=shell.say)
     except (SceneError, FileError) as error:
         if error.where.path != "cluster":
             raise
         raise type(error)(error.message, Where("--cluster")) from error
     with cluster:
         yield cluster.engine()
+
+
+def _of_worker(order: Order) -> str | None:
+    """The device of each worker."""
+    named = order.device or ()
+    given = (named,) if isinstance(named, str) else tuple(named)
+    if len(given) > 1 or given == ("all",):
+        raise SceneError("must be one device, that of each worker, with --cluster", Where("--device"))
+    return given[0] if given else None
 
 
 def shares_of(engine: AnyEngine) -> list[dict[str, Any]] | None:

@@ -10,6 +10,7 @@ import typer
 from clfractal.commands.options import (
     ClusterOption,
     DeviceOption,
+    DevicesOption,
     Overrides,
     Precision,
     Quality,
@@ -36,7 +37,7 @@ def render(
             help="An .exr, .png, .jpg or .webp file, or - for standard output; repeatable.  [default: SCENE with .png]",
         ),
     ] = None,
-    device: DeviceOption = None,
+    device: DevicesOption = None,
     cluster: ClusterOption = None,
     precision: Precision = None,
     size: Size = None,
@@ -66,7 +67,7 @@ def render(
     order = Order(
         scene=scene,
         outputs=tuple(output or ()),
-        device=device,
+        device=tuple(device) if device else None,
         cluster=cluster,
         precision=precision,
         size=size,
@@ -98,7 +99,7 @@ def animate(
         str | None,
         typer.Option("--frames", metavar="A-B:STEP", help="Render only these frames, counted from 0."),
     ] = None,
-    device: DeviceOption = None,
+    device: DevicesOption = None,
     cluster: ClusterOption = None,
     precision: Precision = None,
     size: Size = None,
@@ -138,7 +139,7 @@ def animate(
     order = Order(
         scene=scene,
         outputs=tuple(output or ()),
-        device=device,
+        device=tuple(device) if device else None,
         cluster=cluster,
         precision=precision,
         size=size,

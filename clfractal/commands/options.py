@@ -47,6 +47,14 @@ ClusterOption = Annotated[
         help="Render on a Dask cluster: its scheduler, such as tcp://HOST:8786, or local:N for N workers here.",
     ),
 ]
+DevicesOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--device",
+        help="cpu, gpu, PLATFORM:DEVICE, or part of a name; cpu/2+2 for parts of one; all; repeatable."
+        "  [env: CLFRACTAL_DEVICE]",
+    ),
+]
 Resolution = Annotated[
     str | None,
     typer.Option(

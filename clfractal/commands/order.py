@@ -19,7 +19,7 @@ class Order:
 
     scene: str
     outputs: tuple[Path, ...] = ()
-    device: str | None = None
+    device: str | tuple[str, ...] | None = None
     precision: str | None = None
     size: str | None = None
     overrides: tuple[str, ...] = ()

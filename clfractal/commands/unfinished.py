@@ -49,6 +49,7 @@ class Unfinished:
                         view.plan.region,
                         job.view_header(number, header),
                         resume=resume,
+                        also=job.also_continues(number),
                     )
                 )
                 if discards:

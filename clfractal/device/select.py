@@ -23,6 +23,7 @@ from clfractal.device.advice import install_hint
 from clfractal.device.cache_folder import drivers_problem, set_drivers_folder
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
+from clfractal.device.subdevices import divided, without_parts
 from clfractal.device.unknown_cpu import name_processor
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, Where, unknown_name
 
@@ -31,6 +32,8 @@ from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError
 cl._PYOPENCL_NO_CACHE = True
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_DEVICE"
+ALL = "all"
+"""Names every device."""
 SPEEDS = "speeds"  # section of the cache: rays per second or the like, by `DeviceInfo.key`
 
 Kind = Literal["cpu", "gpu", "accelerator"]
@@ -44,7 +47,8 @@ class DeviceInfo:
     """The data of a device that are known without opening it. Memory is in bytes."""
 
     index: str
-    """Platform and device number as in `--device 0:0`, both counted from 0 in the loader's order."""
+    """Platform and device number as in `--device 0:0`, both counted from 0 in the loader's order; of a part of a device
+    also how it is divided, and which part it is, counted from 1: `0:0/1+1#2`."""
     name: str
     platform: str
     version: str
@@ -90,6 +94,7 @@ class Device:
         self.cl_device = cl_device
         self.properties = tuple(properties)
         self._make_context = make_context
+        self._parts: dict[tuple[int, ...], tuple[Device, ...]] = {}
         self.loaded = LoadedPrograms()
 
     def __repr__(self) -> str:
@@ -125,6 +130,23 @@ class Device:
     ) -> Device:
         """The same device with another context, whose buffers and programs are its own."""
         return Device(self.info, self.cl_device, properties, make_context)
+
+    def divided(self, counts: tuple[int, ...]) -> tuple[Device, ...]:
+        """Parts with so many compute units, each a device with a context of its own; the same ones at every call.
+
+        Raises:
+            DeviceError: see `subdevices.divided`.
+        """
+        if counts not in self._parts:
+            index = f"{self.info.index}/{'+'.join(map(str, counts))}"
+            found = divided(self.cl_device, counts, f"{self.info.index} {self.info.name}")
+            self._parts[counts] = tuple(
+                Device(
+                    replace(self.info, index=f"{index}#{number}", compute_units=units, gl_sharing=False), part
+                )
+                for number, (units, part) in enumerate(zip(counts, found, strict=True), 1)
+            )
+        return self._parts[counts]
 
     def buffer(self, nbytes: int, what: str, *, read_only: bool = False) -> cl.Buffer:
         """Allocate `nbytes` of device memory for `what` (used in the message).
@@ -184,7 +206,8 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     """The device that `spec` names, else the environment variable CLFRACTAL_DEVICE, else the best one.
 
     `spec` is `cpu`, `gpu`, `accelerator`, indices `PLATFORM:DEVICE`, or part of a device's or platform's name
-    (of its version, if no name fits), in any case of letters. Where several fit, the best is taken.
+    (of its version, if no name fits), in any case of letters. Where several fit, the best is taken. With `/N` behind it
+    it is N compute units of that device.
 
     Without `properties` the context is one that the process shares: what was compiled for an earlier picture is still
     loaded. With them (see `Device`) it is a new one.
@@ -200,7 +223,13 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     found = _found()
     if not found:
         raise drivers_problem() or DeviceError(install_hint())
-    spec = (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
+    spec, counts = without_parts(
+        (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
+    )
+    if spec.casefold() == ALL or len(counts) > 1:
+        raise DeviceError(
+            "names several devices, but this work takes one", Where("--device"), status=STATUS_BAD_INPUT
+        )
     fitting = _fitting(found, spec)
     if not fitting:
         raise drivers_problem() or _nothing_fits(found, spec)
@@ -211,6 +240,8 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
     wrong = drivers_problem() if is_pocl(best.info) else None
     if wrong is not None:
         raise wrong
+    if counts:
+        best = best.divided(counts)[0]
     return best.reopened(properties) if properties else best
 
 

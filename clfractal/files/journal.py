@@ -8,6 +8,9 @@ Layout, little-endian:
     bytes     the identity: JSON, the keys sorted
     records   uint32 tile index, uint32 CRC-32 of index and payload, payload: float32 [channels, 32, 32]
 
+The index has 24 bits; the highest 8 bits number who made the tile, 0 in a picture that one device makes. A number above 0
+is explained by a note, a record whose index is 0xFFFFFFFF and whose payload begins with a text: JSON with `number`.
+
 All records have one size, so a damaged one spoils no other, and the k-th one is found without an index.
 The header appears complete or not at all (by renaming); a record that was cut short by the writer's death is
 at the end of the file and is overwritten by the next one. Nothing is brought to the disk record by record:
@@ -44,6 +47,9 @@ SIDE = 32
 _HEAD = struct.Struct("<8sII")
 _RECORD = struct.Struct("<II")
 _LARGEST_IDENTITY = 16 << 20  # bytes
+_NOTE = 0xFFFFFFFF
+_INDEX_BITS = 24
+_MOST_MAKERS = 250
 
 
 class Journal:
@@ -61,6 +67,8 @@ class Journal:
         self._records = 0
         self._place = np.full(tile_count, -1, dtype=np.int64)  # record number of each tile
         self._done = np.zeros(tile_count, dtype=np.bool_)
+        self._makers = np.zeros(tile_count, dtype=np.uint8)
+        self._notes: dict[int, dict[str, Any]] = {}
 
     @classmethod
     def create(
@@ -82,6 +90,8 @@ class Journal:
                     raise file_error(target, "is in the way and holds no work in progress; move it away", "")
             finally:
                 os.close(earlier)
+        if tile_count >= 1 << _INDEX_BITS:
+            raise ValueError(f"{tile_count} tiles in one journal")
         text = _identity_text(identity, channels, tile_count)
         beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
         try:
@@ -112,9 +122,17 @@ class Journal:
 
     @classmethod
     def resume(
-        cls, path: str | Path, identity: Mapping[str, Any], channels: Sequence[str], tile_count: int
+        cls,
+        path: str | Path,
+        identity: Mapping[str, Any],
+        channels: Sequence[str],
+        tile_count: int,
+        also: Sequence[Mapping[str, Any]] = (),
     ) -> Journal:
         """Opens an earlier journal of the same work; a missing one is created.
+
+        Args:
+            also: other identities of journals that may be continued.
 
         Raises:
             FileError: it belongs to other work (the message names what differs), is no journal, cannot be
@@ -126,7 +144,8 @@ class Journal:
         except FileNotFoundError:
             return cls.create(path, identity, channels, tile_count)
         try:
-            start = _check_identity(target, descriptor, _identity_text(identity, channels, tile_count))
+            wanted = [_identity_text(each, channels, tile_count) for each in (identity, *also)]
+            start = _check_identity(target, descriptor, wanted)
             journal = cls(target, descriptor, start, tuple(channels), tile_count)
             journal._scan()
         except BaseException as error:
@@ -141,8 +160,34 @@ class Journal:
         """For each tile whether it is there; not to be written to."""
         return self._done
 
-    def append(self, tile_index: int, array: Floats) -> None:
+    @property
+    def makers(self) -> npt.NDArray[np.uint8]:
+        """For each tile the number of who made it; not to be written to."""
+        return self._makers
+
+    @property
+    def notes(self) -> Mapping[int, dict[str, Any]]:
+        """What is noted of makers, by their numbers."""
+        return self._notes
+
+    def note(self, maker: int, about: Mapping[str, Any]) -> None:
+        """Notes who a maker of tiles is (JSON values, cut where a record has no room for them).
+
+        Raises:
+            FileError: it cannot be written.
+        """
+        if not 0 < maker <= _MOST_MAKERS:
+            raise ValueError(f"maker {maker}")
+        shown = {key: str(value)[: self._payload // 64] for key, value in about.items()}
+        text = json.dumps({**shown, "number": maker}).encode()
+        self._write(_NOTE, text.ljust(self._payload, b"\0"))
+        self._notes[maker] = shown
+
+    def append(self, tile_index: int, array: Floats, maker: int = 0) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns), at most `SIDE` rows and columns.
+
+        Args:
+            maker: who made it, see `note`.
 
         Raises:
             FileError: it cannot be written (a full disk); what was there before is still whole.
@@ -155,16 +200,9 @@ class Journal:
         else:
             stored = np.zeros((planes, SIDE, SIDE), dtype="<f4")
             stored[:, :rows, :columns] = array
-        payload = stored.tobytes()
-        check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", tile_index)))
-        offset = self._start + self._records * self._size
-        try:
-            system.write_at(self._descriptor, [_RECORD.pack(tile_index, check), payload], offset)
-        except OSError as error:
-            raise file_error(self.path, "cannot be written", error) from error
-        self._place[tile_index] = self._records
+        self._place[tile_index] = self._write(tile_index | maker << _INDEX_BITS, stored.tobytes())
         self._done[tile_index] = True
-        self._records += 1
+        self._makers[tile_index] = maker
 
     def tile(self, tile_index: int) -> Floats:
         """A stored tile: float32 of shape (channels, `SIDE`, `SIDE`).
@@ -180,7 +218,7 @@ class Journal:
             found = self._record(place)
         except OSError as error:
             raise file_error(self.path, "cannot be read", error) from error
-        if found is None or found[0] != tile_index:
+        if found is None or found[0] % (1 << _INDEX_BITS) != tile_index:
             raise file_error(self.path, f"is damaged: tile {tile_index} has changed since it was written", "")
         return found[1].reshape(len(self.channels), SIDE, SIDE)
 
@@ -198,8 +236,19 @@ class Journal:
             self.path.unlink()
         self.close()
 
+    def _write(self, index: int, payload: bytes) -> int:
+        """Appends a record, and gives its number."""
+        check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", index)))
+        offset = self._start + self._records * self._size
+        try:
+            system.write_at(self._descriptor, [_RECORD.pack(index, check), payload], offset)
+        except OSError as error:
+            raise file_error(self.path, "cannot be written", error) from error
+        self._records += 1
+        return self._records - 1
+
     def _record(self, number: int) -> tuple[int, Floats] | None:
-        """Tile index and payload of a record; None if it is damaged or not all there."""
+        """Index and payload of a record; None if it is damaged or not all there."""
         data = system.read_at(self._descriptor, self._size, self._start + number * self._size)
         if len(data) < self._size:
             return None
@@ -215,9 +264,21 @@ class Journal:
         self._records = max(0, length // self._size)
         for number in range(self._records):
             found = self._record(number)
-            if found is not None and found[0] < len(self._place):
-                self._place[found[0]] = number
-                self._done[found[0]] = True
+            if found is None:
+                continue
+            if found[0] == _NOTE:
+                self._read_note(found[1].tobytes())
+                continue
+            maker, index = divmod(found[0], 1 << _INDEX_BITS)
+            if index < len(self._place):
+                self._place[index] = number
+                self._done[index] = True
+                self._makers[index] = maker
+
+    def _read_note(self, payload: bytes) -> None:
+        with suppress(ValueError, KeyError, TypeError):
+            about = json.loads(payload.rstrip(b"\0"))
+            self._notes[int(about.pop("number"))] = about
 
 
 def _open_locked(path: Path) -> int:
@@ -248,7 +309,7 @@ def _identity_text(identity: Mapping[str, Any], channels: Sequence[str], tile_co
     return json.dumps(whole, sort_keys=True, ensure_ascii=False).encode()
 
 
-def _check_identity(path: Path, descriptor: int, wanted: bytes) -> int:
+def _check_identity(path: Path, descriptor: int, wanted: Sequence[bytes]) -> int:
     """Where the records of a journal begin; FileError if it is another one's."""
     head = system.read_at(descriptor, _HEAD.size, 0)
     not_one = file_error(path, "holds no work in progress that could be resumed", "")
@@ -260,8 +321,9 @@ def _check_identity(path: Path, descriptor: int, wanted: bytes) -> int:
     text = system.read_at(descriptor, length, _HEAD.size)
     if zlib.crc32(text) != check or len(text) != length:
         raise not_one
-    if text != wanted:
-        raise FileError(f"cannot be resumed: {_differences(text, wanted)}", Where(str(path)))
+    if text not in wanted:
+        differences = min((_differences(text, each) for each in wanted), key=len)
+        raise FileError(f"cannot be resumed: {differences}", Where(str(path)))
     return _HEAD.size + int(length)
 
 

@@ -14,6 +14,7 @@ from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.curves import Tone
 from clfractal.pictures.develop import Development, developed, rgb8
+from clfractal.pictures.makers import Maker, Makers
 from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -95,6 +96,8 @@ class Film:
         for name, plane in self._planes.items():
             plane.fill(CHANNELS[name].fill)
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
+        self.makers = Makers(self.grid.count)
+        """Which devices made the tiles, if several did."""
 
     @property
     def header(self) -> dict[str, Any]:
@@ -187,8 +190,10 @@ class Film:
         self._data[:, top : top + tile.height, left : left + tile.width] = array
         self._done[tile_index] = True
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
+    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
         """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""
+        if maker is not None:
+            self.makers.put(indices, maker)
         region, data = self.region, self._data
         boxes = self.grid.boxes(indices).tolist()
         for (x, y, width, height), array in zip(boxes, film, strict=True):
@@ -208,6 +213,7 @@ class Film:
         for name in self.channels:
             self._planes[name][:] = other[name]
         self._done[:] = other.done
+        self.makers = other.makers
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows)."""

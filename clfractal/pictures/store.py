@@ -12,6 +12,7 @@ import numpy.typing as npt
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
 from clfractal.pictures.film import Film, in_memory
+from clfractal.pictures.makers import Maker, Makers
 from clfractal.pictures.tiled import Bands, Floats, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -26,6 +27,7 @@ class JournalFilm:
         identity: JSON values that say what is rendered; a journal is resumed only if all are equal. The
             picture's size, region and channels are added.
         resume: whether to continue an earlier journal (if there is none, a new one is begun).
+        also: other identities whose journals may be continued.
 
     Raises:
         SceneError: an unknown channel name.
@@ -42,6 +44,7 @@ class JournalFilm:
         header: Mapping[str, Any] | None = None,
         *,
         resume: bool = False,
+        also: Sequence[Mapping[str, Any]] = (),
     ) -> None:
         self.channels: tuple[str, ...] = check_channels(channels)
         self.display = display
@@ -51,9 +54,14 @@ class JournalFilm:
         self.grid = TileGrid(self.region)
         self.header: dict[str, Any] = dict(header or {})
         x, y, width, height = self.region.x, self.region.y, self.region.width, self.region.height
-        whole = {**identity, "size": list(display), "region": [x, y, width, height]}
-        begin = Journal.resume if resume else Journal.create
-        self.journal = begin(path, whole, self.channels, self.grid.count)
+        shape = {"size": list(display), "region": [x, y, width, height]}
+        whole, tiles = {**identity, **shape}, self.grid.count
+        if resume:
+            others = [{**each, **shape} for each in also]
+            self.journal = Journal.resume(path, whole, self.channels, tiles, others)
+        else:
+            self.journal = Journal.create(path, whole, self.channels, tiles)
+        self.makers = self._noted_makers()
 
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""
@@ -64,17 +72,29 @@ class JournalFilm:
         """For each tile, whether it is finished."""
         return self.journal.done
 
-    def put(self, tile_index: int, array: Floats) -> None:
+    def put(self, tile_index: int, array: Floats, maker: Maker | None = None) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns).
+
+        Args:
+            maker: the device that made it, where several render the picture.
 
         Raises:
             FileError: the journal cannot be written (a full disk).
         """
         check_tile(array, self.grid.tile(tile_index), self.channels)
-        self.journal.append(tile_index, array)
+        number = 0
+        if maker is not None:
+            number = self.makers.number(maker)
+            if number not in self.journal.notes:
+                self.journal.note(number, maker.as_data())
+        self.journal.append(tile_index, array, number)
+        self.makers.of_tiles[tile_index] = number
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
+    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
         """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
+
+        Args:
+            maker: as for `put`.
 
         Raises:
             FileError: the journal cannot be written (a full disk).
@@ -82,7 +102,7 @@ class JournalFilm:
         for index, array in zip(indices.tolist(), film, strict=True):
             tile = self.grid.tile(index)
             top, left = tile.y % TILE, tile.x % TILE
-            self.put(index, array[:, top : top + tile.height, left : left + tile.width])
+            self.put(index, array[:, top : top + tile.height, left : left + tile.width], maker)
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows).
@@ -103,6 +123,16 @@ class JournalFilm:
                     pixels = self.journal.tile(index)[:, : tile.height, : tile.width]
                     band[:, :, left : left + tile.width] = pixels
             yield first.y, dict(zip(self.channels, band, strict=True))
+
+    def _noted_makers(self) -> Makers:
+        """Those of an earlier run."""
+        found, notes = Makers(self.grid.count), self.journal.notes
+        last = max([0, *notes, int(self.journal.makers.max(initial=0))])
+        for number in range(1, last + 1):
+            about = notes.get(number, {"index": f"device {number}"})
+            found.known.append(Maker(*(str(about.get(key, "")) for key in ("index", "name", "key"))))
+        found.of_tiles[:] = self.journal.makers
+        return found
 
     def to_film(self) -> Film:
         """All of it in memory; missing tiles have their channels' fill values."""

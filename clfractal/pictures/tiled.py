@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.pictures.makers import Maker, Makers
 from clfractal.pictures.tiles import Region, Tile, TileGrid
 
 Floats = npt.NDArray[np.float32]
@@ -52,8 +53,16 @@ class TiledStore(Picture, Protocol):
     def done(self) -> npt.NDArray[np.bool_]:
         """For each tile, whether it is finished; not to be written to."""
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats) -> None:
-        """Stores whole tiles: float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""
+    @property
+    def makers(self) -> Makers:
+        """Which devices made the tiles, if several did."""
+
+    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
+        """Stores whole tiles: float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
+
+        Args:
+            maker: the device that made them, where several render the picture.
+        """
 
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""

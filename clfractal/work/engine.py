@@ -1,16 +1,17 @@
-"""The engine: one device and an executor that keeps its programs and data from picture to picture."""
+"""The engine: a device, or several, and an executor that keeps its programs and data from picture to picture."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
-from functools import partial
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Generator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from clfractal import arguments
 from clfractal.device.cancel import CancelToken
+from clfractal.device.choice import choose_all
 from clfractal.device.forked import is_lost
 from clfractal.device.launch import BUDGET_SECONDS
-from clfractal.device.select import Device, choose
+from clfractal.device.select import Device, choose, has_float64
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError, Where
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.work.any_engine import AnyEngine, Elsewhere, SceneLike, check_token
@@ -24,10 +25,13 @@ if TYPE_CHECKING:
     from clfractal.pictures.probe import Probe
     from clfractal.work.look import Look
     from clfractal.work.refine import Refinement
+    from clfractal.work.several import SeveralExecutor
+
+T = TypeVar("T")
 
 
 class Engine(AnyEngine):
-    """Renders scenes on one device, and keeps unchanged data from one to the next: programs, buffers, grids, maps.
+    """Renders scenes on a device or several, and keeps unchanged data from one to the next: programs, buffers, grids, maps.
 
         with clfractal.Engine() as engine:
             for angle in range(60):
@@ -36,7 +40,9 @@ class Engine(AnyEngine):
     Only one thread may use it at a time; a second one gets an error.
 
     Args:
-        device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; None: CLFRACTAL_DEVICE, else the best. Or a `Device`.
+        device: `cpu`, `gpu`, `PLATFORM:DEVICE`, or part of a name; `cpu/2+2` for parts of a device, with so many compute
+            units each; `all`; or a list of names. None: CLFRACTAL_DEVICE, else the best. Or a `Device`, or several. Each
+            of several devices renders tiles as it has room.
         budget_seconds: limit of the work that is queued on the device: a cancelled render ends after about this time.
         tell: called with a message if something has to be compiled or measured first, or does not fit.
 
@@ -45,23 +51,27 @@ class Engine(AnyEngine):
         DeviceError: no device, or an unknown one.
     """
 
-    executor: LocalExecutor
-
     def __init__(
         self,
-        device: str | Device | None = None,
+        device: str | Device | Sequence[str | Device] | None = None,
         *,
         budget_seconds: float = BUDGET_SECONDS,
         tell: Callable[[str], None] | None = None,
     ) -> None:
         budget_seconds = arguments.number("budget_seconds", budget_seconds, 1e-4, 60)
         arguments.function("tell", tell)
-        self.device = device if isinstance(device, Device) else choose(device)
         self.tell = tell
-        self.executor = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
-        # A separate executor for looks: their size differs, so they would replace a picture's buffers.
-        self._looking = LocalExecutor(self.device, budget_seconds=budget_seconds, tell=tell)
-        self._looking.kept = self.executor.kept
+        devices = _devices(device)
+        self.executor: LocalExecutor | SeveralExecutor
+        if len(devices) == 1:
+            self.executor = LocalExecutor(devices[0], budget_seconds=budget_seconds, tell=tell)
+        else:
+            from clfractal.work.several import SeveralExecutor
+
+            self.executor = SeveralExecutor.on(devices, budget_seconds=budget_seconds, tell=tell)
+        # Separate executors for looks: their size differs, so they would replace a picture's buffers.
+        self._looking: dict[int, LocalExecutor] = {}
+        self._budget_seconds = budget_seconds
         super().__init__()
 
     def close(self) -> None:
@@ -72,15 +82,34 @@ class Engine(AnyEngine):
             return
         with self._alone():
             self.executor.close()
-            self._looking.close()
+            for looking in self._looking.values():
+                looking.close()
             self._closed = True
+
+    @property
+    def device(self) -> Device:
+        """The device that decisions are made for: of several that work the first with float64, else the first."""
+        return self._first.device
 
     @property
     def look(self) -> Look:
         """Quick looks at a scene, on the engine's device."""
         from clfractal.work.look import Look
 
-        return Look(self.device, self._looking)
+        first = self._first
+        looking = self._looking.get(id(first))
+        if looking is None:
+            looking = LocalExecutor(first.device, budget_seconds=self._budget_seconds, tell=self.tell)
+            looking.kept = first.kept
+            self._looking[id(first)] = looking
+        return Look(first.device, looking)
+
+    @property
+    def _first(self) -> LocalExecutor:
+        if isinstance(self.executor, LocalExecutor):
+            return self.executor
+        working = self.executor.working or self.executor.executors
+        return next((each for each in working if has_float64(each.device.info)), working[0])
 
     def settled(self, scene: SceneLike) -> Scene:
         """The scene with numbers in the place of `stereo.fit`, `camera.focus`, `focus_on` and `output.exposure: auto`.
@@ -92,7 +121,8 @@ class Engine(AnyEngine):
             DeviceError, KernelBuildError: as of a render.
         """
         with self._alone():
-            return settled(as_scene(scene), self.look)
+            loaded = as_scene(scene)
+            return self._by_any_device(lambda: settled(loaded, self.look))
 
     def prepare(
         self,
@@ -110,27 +140,48 @@ class Engine(AnyEngine):
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
             DeviceError, KernelBuildError: the quick look that this takes failed.
         """
-        built_before = self.device.loaded.building.milliseconds
         loaded = as_scene(scene)
         if quality is not None:
             from clfractal.work.quality import with_quality
 
             loaded = with_quality(loaded, quality)
-        decide = partial(
-            prepare,
-            device=self.device,
-            precision=precision,
-            samples=samples,
-            region=region,
-            channels=channels,
-            on_start=self.tell,
-        )
+        asked = {"precision": precision, "samples": samples, "region": region, "channels": channels}
+        return self._by_any_device(lambda: self._decided(loaded, asked))
+
+    def _decided(self, scene: Scene, asked: Mapping[str, Any]) -> Job:
+        """The job of a scene for the engine's device, and for the others of several."""
+        device = self.device
+        built_before = device.loaded.building.milliseconds
+
+        def decide(wanted: Scene) -> Job:
+            return prepare(wanted, device, on_start=self.tell, **asked)
+
         # Made first, so that mistakes are reported before anything is rendered.
-        job = decide(loaded)
-        if not is_settled(loaded):
-            job = decide(settled(loaded, self.look))
-        self.looks_built_ms = self.device.loaded.building.milliseconds - built_before
-        return job
+        job = decide(scene)
+        if not is_settled(scene):
+            job = decide(settled(scene, self.look))
+        self.looks_built_ms = device.loaded.building.milliseconds - built_before
+        return job if isinstance(self.executor, LocalExecutor) else self.executor.shared(job, device)
+
+    def _by_any_device(self, work: Callable[[], T]) -> T:
+        """What `work` gives on the engine's device; of several the next one tries if it fails.
+
+        Raises:
+            DeviceError: no device is left.
+        """
+        while True:
+            device = self.device
+            try:
+                return work()
+            except (DeviceError, KernelBuildError) as error:
+                several = self.executor
+                if (
+                    isinstance(several, LocalExecutor)
+                    or error.status != STATUS_DEVICE_FAILED
+                    or not several.working
+                ):
+                    raise
+                several.leave_out(device, error)
 
     def probe(self, scene: SceneLike, x: int, y: int, *, precision: str | None = None) -> Probe:
         """What lies at a pixel of a scene's picture; arguments, result and errors as for `clfractal.probe`."""
@@ -178,8 +229,8 @@ class Engine(AnyEngine):
         return Refinement(films())
 
 
-def engine_on(device: str | None, executor: Elsewhere | None) -> AnyEngine:
-    """The engine of a device of this process, or of an executor that has its own devices.
+def engine_on(device: str | Sequence[str] | None, executor: Elsewhere | None) -> AnyEngine:
+    """The engine of devices of this process, or of an executor that has its own devices.
 
     Raises:
         SceneError: both are given, or the executor is none.
@@ -190,5 +241,29 @@ def engine_on(device: str | None, executor: Elsewhere | None) -> AnyEngine:
     if not callable(getattr(executor, "engine", None)) or isinstance(executor, type):
         arguments.refuse("executor", "must be a clfractal.Cluster", arguments.plain(executor))
     if device is not None:
-        arguments.refuse("device", "belongs to the cluster, as Cluster(address, device=...)", device)
+        arguments.refuse(
+            "device", "belongs to the cluster, as Cluster(address, device=...)", arguments.plain(device)
+        )
     return executor.engine()
+
+
+def _devices(named: str | Device | Sequence[str | Device] | None) -> tuple[Device, ...]:
+    """The devices that an argument names.
+
+    Raises:
+        DeviceError: there is none, it is unknown or named twice, or the list is empty.
+    """
+    if isinstance(named, Device):
+        return (named,)
+    if named is None or isinstance(named, str):
+        return choose_all(() if named is None else (named,))
+    if not isinstance(named, Sequence):
+        return (choose(named),)  # which refuses it
+    if not named:
+        raise DeviceError("must name a device", Where(path="device"), status=STATUS_BAD_INPUT)
+    if all(isinstance(each, Device) for each in named):
+        return tuple(each for each in named if isinstance(each, Device))
+    for each in named:
+        if not isinstance(each, str):
+            choose(each)  # type: ignore[arg-type]  # which refuses it
+    return choose_all([each for each in named if isinstance(each, str)])

@@ -77,7 +77,7 @@ class FilmScenes:
 
 def frames(
     scene: Scene | str | Path | Mapping[str, Any],
-    device: str | None = None,
+    device: str | Sequence[str] | None = None,
     progress: ProgressCallback | None = None,
     *,
     numbers: Iterable[int] | None = None,

@@ -8,7 +8,7 @@ pixels again.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import clfractal
@@ -17,7 +17,10 @@ from clfractal.files.channels import CHANNELS
 from clfractal.files.document import write_document
 from clfractal.optics.view import scene_view, seen_by
 from clfractal.pictures.compose import APART, Composed, Side
+from clfractal.pictures.film import Film
+from clfractal.pictures.makers import lines_of
 from clfractal.pictures.paste import Pasted
+from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiled import Picture
 from clfractal.pictures.tiles import Region, TileGrid
 from clfractal.renderers.plan import PlannedView
@@ -27,6 +30,8 @@ from clfractal.scene.stereo import Stereo
 
 # Settings for showing a pair, which do not change either eye's picture.
 _SHOWN = ("mode", "swap", "method", "glasses", "colors")
+# What an unfinished picture says of its devices if they are of several kinds.
+_MIXED = {"device": "several kinds", "driver": "several kinds", "lanes": 0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +81,14 @@ Composition: TypeAlias = Identity | Paste | StereoPair
 
 
 @dataclass(frozen=True, slots=True)
+class Kind:
+    """Devices of another kind (another `DeviceInfo.key`) that do a part of a job: one of them, and each view's lanes."""
+
+    device: DeviceInfo
+    lanes: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Job:
     """A picture to be made.
 
@@ -86,6 +99,7 @@ class Job:
         channels: those of the views.
         device: the device for which the decisions were made.
         remark: a line for the user, or empty.
+        others: devices of other kinds that help. What they make may differ in the last bits from what `device` makes.
     """
 
     scene: Scene
@@ -94,6 +108,18 @@ class Job:
     channels: tuple[str, ...]
     device: DeviceInfo
     remark: str
+    others: tuple[Kind, ...] = ()
+
+    def on(self, device: DeviceInfo) -> Job | None:
+        """The job as a device does it, with the lanes of its kind; None if it has no part in it."""
+        if device.key == self.device.key:
+            return self
+        for kind in self.others:
+            if kind.device.key == device.key:
+                pairs = zip(self.views, kind.lanes, strict=True)
+                views = tuple(replace(view, plan=replace(view.plan, lanes=lanes)) for view, lanes in pairs)
+                return replace(self, views=views, device=device, others=())
+        return None
 
     @property
     def region(self) -> Region:
@@ -151,11 +177,12 @@ class Job:
         """The header of the whole picture's files (see `Film`); `seconds` is added when it is known."""
         scene = self.scene
         camera = scene_view(scene)
+        devices = [self.device, *(kind.device for kind in self.others)]
         return {
             "scene": write_document(self.resolved()),
             "version": clfractal.__version__,
-            "device": self.device.name,
-            "platform": f"{self.device.platform}, {self.device.version}",
+            "device": "; ".join(dict.fromkeys(device.name for device in devices)),
+            "platform": "; ".join(dict.fromkeys(f"{each.platform}, {each.version}" for each in devices)),
             "precision": self.precision,
             "exposure": scene.output.stops,
             "tone": scene.output.tone,
@@ -177,8 +204,27 @@ class Job:
         """The values that must be equal for a tile of one view to have the same bits; stored with unfinished work.
 
         Bookmarks, movement, and settings for writing files and for showing a pair may change; the journal compares the
-        channels.
+        channels. With devices of several kinds bits are not promised, so any of them may continue the work.
         """
+        return {**self._identity(number), **(_MIXED if self.others else {})}
+
+    def also_continues(self, number: int) -> list[dict[str, Any]]:
+        """Identities of other unfinished work that this job may continue.
+
+        Work of several kinds of devices is continued by any of them. Who names several kinds takes their differences,
+        and may continue what one of them began.
+        """
+        found = self._identity(number)
+        if not self.others:
+            return [{**found, **_MIXED}]
+        kinds = [Kind(self.device, tuple(view.plan.lanes for view in self.views)), *self.others]
+        return [
+            {**found, "device": kind.device.name, "driver": kind.device.key, "lanes": kind.lanes[number]}
+            for kind in kinds
+        ]
+
+    def _identity(self, number: int) -> dict[str, Any]:
+        """See `identity`; of the device that the decisions were made for."""
         view, side = self.views[number], self.sides[number]
         scene = self.resolved()
         del scene["output"], scene["bookmarks"], scene["animation"]
@@ -222,7 +268,7 @@ class Job:
         seconds = sum(store.header.get("seconds", 0.0) for store in stores)
         # A composed picture has no camera, and its time is that of both pictures.
         common = {key: value for key, value in (header or {}).items() if not key.startswith("worldTo")}
-        added = None if alone else {**common, "seconds": seconds}
+        added = None if alone else {**common, **_makers_of(stores), "seconds": seconds}
         return Composed(made.stereo, made.image, eyes.get("left"), eyes.get("right"), made.region, added)
 
     def eyes(self, stores: Sequence[Picture]) -> dict[Side, Picture]:
@@ -249,8 +295,15 @@ class Job:
             made.size,
             made.region,
             {name: fill.get(name, CHANNELS[name].fill) for name in self.channels},
-            header,
+            {**(header or {}), **_makers_of([stores[number] for number in made.views])},
         )
+
+
+def _makers_of(stores: Sequence[Picture]) -> dict[str, str]:
+    """A header's entry for the devices that made the views of a picture, if several did."""
+    tiled = [store for store in stores if isinstance(store, (Film, JournalFilm))]
+    lines = lines_of(store.makers.counts(store.done) for store in tiled)
+    return {"devices": lines} if lines else {}
 
 
 def _decided(renderer: dict[str, Any], view: PlannedView) -> dict[str, Any]:

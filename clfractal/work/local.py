@@ -26,6 +26,8 @@ from clfractal.work.stages import Span
 Tiles = npt.NDArray[np.int32]
 ViewOutlet = Callable[[int, cl.Buffer, cl.Buffer, int], None]
 """An `Outlet` for several views: the view's number, then as there."""
+Supply = Callable[[int], Tiles]
+"""Gives the tiles of a launch, at most so many; none if there are no more."""
 
 _NO_TILES = np.zeros(0, np.int32)
 _NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
@@ -45,6 +47,7 @@ class LocalExecutor:
         tell: called with a message if a program has to be compiled first, or if something does not fit.
 
     `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no films and no statistics.
+    `supply`, if it is set, gives each launch its tiles; an item then only tells which ones it may give.
     """
 
     def __init__(
@@ -59,6 +62,7 @@ class LocalExecutor:
         self.tell = tell
         self.kept = Kept()
         self.outlet: ViewOutlet | None = None
+        self.supply: Supply | None = None
         self._outputs = OutputBuffers(device)
         self._drawings: dict[int, Drawing] = {}
 
@@ -68,10 +72,10 @@ class LocalExecutor:
         """See `Executor`. Tiles of a view come in the order in which they are wanted."""
         self.kept.begin_picture()
         for item in items:
-            if len(item.tiles) == 0:
-                continue
-            for turn in self._turns(job.views[item.view], item, token):
-                yield from self._launched(turn, token)
+            if len(item.tiles):
+                view = job.views[item.view]
+                done = self._by_samples if view.changing else self._at_once
+                yield from done(view, item, self.supply or _in_order(item.tiles), token)
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
 
@@ -105,31 +109,46 @@ class LocalExecutor:
         self._outputs = OutputBuffers(self.device)
         self.kept = Kept()
 
-    def _turns(self, view: PlannedView, item: WorkItem, token: CancelToken | None) -> Generator[_Turn]:
-        """An item's work, in turns that have one scene each: all of it, or one sample of some tiles."""
-        partial, count = item.samples != (0, view.plan.samples), TileGrid(view.plan.region).count
-        if not view.changing:
-            yield _Turn(view, item, item.tiles if partial else None, count)
-            return
-        some = len(item.tiles)
-        if not partial:  # what samples leave for the next one is kept only while they are made
-            drawing = self._drawing(item.view, view.at_sample(0), 1, token)
-            some = count = min(max(_KEPT_BETWEEN_SAMPLES // drawing.kept_bytes(1), 1), some)
-        first, end = item.samples
-        for begin in range(0, len(item.tiles), some):
-            tiles = item.tiles[begin : begin + some]
-            places = tiles if partial else np.arange(len(tiles), dtype=np.int32)
-            for sample in range(first, end):
-                part = WorkItem(item.view, tiles, (sample, sample + 1))
-                yield _Turn(view.at_sample(sample), part, places, count, last=sample + 1 == end)
+    def _at_once(
+        self, view: PlannedView, item: WorkItem, take: Supply, token: CancelToken | None
+    ) -> Generator[Result]:
+        """Renders tiles of a view that is the same for all samples."""
+        in_passes = item.samples != (0, view.plan.samples)
+        yield from self._drawn(view, item, take, token, _Places.of_all(view) if in_passes else None)
 
-    def _launched(self, turn: _Turn, token: CancelToken | None) -> Generator[Result]:
-        item = turn.item
-        drawing = self._drawing(item.view, turn.view, len(item.tiles), token)
-        if turn.kept is not None:
-            drawing.keep(turn.room)
+    def _by_samples(
+        self, view: PlannedView, item: WorkItem, take: Supply, token: CancelToken | None
+    ) -> Generator[Result]:
+        """Renders tiles of a view that has a scene of its own for each sample: one sample of some tiles after the other."""
+        in_passes = item.samples != (0, view.plan.samples)
+        some = len(item.tiles)
+        if not in_passes:  # what a sample leaves for the next one is kept only while these tiles are made
+            each = self._drawing(item.view, view.at_sample(item.samples[0]), 1, token).kept_bytes(1)
+            some = max(_KEPT_BETWEEN_SAMPLES // each, 1)
+        while len(tiles := take(some)):
+            places = _Places.of_all(view) if in_passes else _Places.of(tiles)
+            for sample in range(*item.samples):
+                part = WorkItem(item.view, tiles, (sample, sample + 1))
+                last = part.samples[1] == item.samples[1]
+                shown = view.at_sample(sample)
+                yield from self._drawn(shown, part, _in_order(tiles), token, places, last=last)
+
+    def _drawn(
+        self,
+        view: PlannedView,
+        item: WorkItem,
+        take: Supply,
+        token: CancelToken | None,
+        places: _Places | None,
+        *,
+        last: bool = True,
+    ) -> Generator[Result]:
+        drawing = self._drawing(item.view, view, len(item.tiles), token)
+        if places is not None:
+            drawing.keep(places.room)
         outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
-        yield from _launched(drawing, turn, self.budget_seconds, token, outlet=outlet)
+        cutter = _Cutter(drawing, item, take, places)
+        yield from _launched(cutter, self.budget_seconds, token, outlet=outlet, last=last)
 
     def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
         # Put back only when it is complete: one whose update failed is half of each view.
@@ -140,30 +159,56 @@ class LocalExecutor:
 
 
 @dataclass(frozen=True, slots=True)
-class _Turn:
-    """A part of an item for which the drawing need not change.
+class _Places:
+    """Where tiles keep what one pass leaves for the next.
 
     Attributes:
-        view: what is drawn.
-        item: the part.
-        kept: for each tile its place among those that are kept between passes; None: none are.
-        room: how many tiles are kept.
-        last: whether its tiles are finished by it.
+        of_tile: the place of each tile by its number.
+        room: how many places there are.
     """
 
-    view: PlannedView
-    item: WorkItem
-    kept: Tiles | None
+    of_tile: Tiles
     room: int
-    last: bool = True
+
+    @staticmethod
+    def of_all(view: PlannedView) -> _Places:
+        """A place for each tile of a view."""
+        count = TileGrid(view.plan.region).count
+        return _Places(np.arange(count, dtype=np.int32), count)
+
+    @staticmethod
+    def of(tiles: Tiles) -> _Places:
+        """Places for some tiles."""
+        of_tile = np.zeros(int(tiles.max()) + 1, np.int32)
+        of_tile[tiles] = np.arange(len(tiles))
+        return _Places(of_tile, len(tiles))
+
+
+def _in_order(tiles: Tiles) -> Supply:
+    """All tiles, as they are wanted."""
+    place = 0
+
+    def take(most: int) -> Tiles:
+        nonlocal place
+        left = len(tiles) - place
+        # The last launch is not much shorter than the others: no core idles long at the end.
+        count = (left + 1) // 2 if most < left < 1.5 * most else min(most, left)
+        place += count
+        return tiles[place - count : place]
+
+    return take
 
 
 def _launched(
-    drawing: Drawing, turn: _Turn, budget_seconds: float, token: CancelToken | None, *, outlet: Outlet | None
+    cutter: _Cutter,
+    budget_seconds: float,
+    token: CancelToken | None,
+    *,
+    outlet: Outlet | None,
+    last: bool,
 ) -> Generator[Result]:
-    """Launches an item's tiles and gives them as they are finished."""
-    item = turn.item
-    cutter = _Cutter(drawing, item, turn.kept)
+    """Launches an item's tiles and gives them as they are finished; only their counts, if more of them is to come."""
+    drawing, item = cutter.drawing, cutter.item
     pace = drawing.pace
     pace.seconds = budget_seconds / IN_FLIGHT
     pace.most = float(drawing.capacity * cutter.per_tile)
@@ -178,7 +223,7 @@ def _launched(
             if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
                 # Only a part of a tile is done: there is nothing to read yet.
                 yield Result(item.view, _NO_TILES, _NO_FILM, tally)
-            elif outlet is not None and turn.last:
+            elif outlet is not None and last:
                 # Only now: a launch that was cancelled has left unfinished tiles.
                 drawing.hand_over(span, outlet)
                 yield Result(item.view, span.tiles, _NO_FILM, tally)
@@ -186,7 +231,7 @@ def _launched(
                 film, sums = drawing.collect(span)
                 for name, count in zip(STATISTICS, sums, strict=True):
                     setattr(tally, name, int(count))
-                done = (span.tiles, film) if turn.last else (_NO_TILES, _NO_FILM)
+                done = (span.tiles, film) if last else (_NO_TILES, _NO_FILM)
                 yield Result(item.view, *done, tally)
             tally = Tally()
 
@@ -198,13 +243,13 @@ class _Cutter:
     or if one work-group is still too heavy some of its samples, down to one sample of one packet.
     """
 
-    def __init__(self, drawing: Drawing, item: WorkItem, kept: Tiles | None) -> None:
-        self.drawing, self.item, self.kept = drawing, item, kept
+    def __init__(self, drawing: Drawing, item: WorkItem, take: Supply, places: _Places | None) -> None:
+        self.drawing, self.item, self.take, self.places = drawing, item, take, places
         self.first, self.end = item.samples
         self.per_tile = drawing.packets * (self.end - self.first)
-        self.place = 0  # of the next tile
         self.slot = 0
-        # The packets and the next sample of a tile that is rendered in parts; no packets between two tiles.
+        # A tile that is rendered in parts: its number, packets and next sample; no packets between two tiles.
+        self.tile = _NO_TILES
         self.packets = (0, 0)
         self.sample = self.first
 
@@ -221,31 +266,26 @@ class _Cutter:
 
     def _next(self, size: float) -> Span | None:
         drawing = self.drawing
-        left = len(self.item.tiles) - self.place
         if self.packets == (0, 0):
-            if left == 0:
+            whole = int(min(size / self.per_tile, drawing.capacity))
+            in_parts = whole < 1 or drawing.wave.packets < drawing.packets
+            chosen = self.take(1 if in_parts else whole)
+            if not len(chosen):
                 return None
-            count = int(min(size / self.per_tile, drawing.capacity, left))
-            if count >= 1 and drawing.wave.packets >= drawing.packets:
-                # The last launch is not much shorter than the others: no core idles long at the end.
-                if count < left < 1.5 * count:
-                    count = (left + 1) // 2
-                chosen = slice(self.place, self.place + count)
-                self.place += count
+            if not in_parts:
                 return self._span(chosen, (0, drawing.packets), self.item.samples, last=True)
+            self.tile = chosen
             self.packets = self._some_packets(0, size)
             self.sample = self.first
         packets, sample = self.packets, self.sample
         width = packets[1] - packets[0]
         samples = (sample, min(sample + max(int(size / width), 1), self.end))
-        chosen = slice(self.place, self.place + 1)
         last = samples[1] == self.end and packets[1] == drawing.packets
-        span = self._span(chosen, packets, samples, last=last)
+        span = self._span(self.tile, packets, samples, last=last)
         if samples[1] < self.end:
             self.sample = samples[1]
         elif last:
             self.packets = (0, 0)
-            self.place += 1
         else:
             self.packets = self._some_packets(packets[1], size)
             self.sample = self.first
@@ -257,14 +297,14 @@ class _Cutter:
         count = max(int(size / samples) // group * group, group) if size >= group else max(int(size), 1)
         return first, min(first + min(count, self.drawing.wave.packets), self.drawing.packets)
 
-    def _span(self, chosen: slice, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
-        tiles, mode = self.item.tiles[chosen], 0
-        if self.kept is not None or samples[1] < self.end:
+    def _span(self, tiles: Tiles, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
+        mode = 0
+        if self.places is not None or samples[1] < self.end:
             mode |= PASS_KEEP
             self.drawing.keep(1)
         if samples[0] > self.first:
             mode |= PASS_ADD
-        kept = self.kept[chosen] if self.kept is not None else np.zeros(len(tiles), np.int32)
+        kept = self.places.of_tile[tiles] if self.places is not None else np.zeros(len(tiles), np.int32)
         span = Span(tiles, packets, samples, mode, kept, self.slot)
         if last:
             self.slot = (self.slot + 1) % SLOTS

@@ -7,6 +7,7 @@ from collections.abc import Generator, Iterator
 from dataclasses import asdict, replace
 from importlib import import_module
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import Progress, Tally, run
+
+if TYPE_CHECKING:
+    from clfractal.work.several import SeveralExecutor
 
 DIVIDERS = (8, 4, 2)
 """Every how many pixels, in each direction, the first passes render.
@@ -49,7 +53,11 @@ class Refinement(Iterator[Film]):
 
 
 def refined(
-    job: Job, executor: LocalExecutor, token: CancelToken | None = None, *, looks_built_ms: float = 0.0
+    job: Job,
+    executor: LocalExecutor | SeveralExecutor,
+    token: CancelToken | None = None,
+    *,
+    looks_built_ms: float = 0.0,
 ) -> Generator[Film]:
     """The passes of a job, each as a film of the whole picture. The last one has the same bits as `run`.
 
@@ -110,7 +118,7 @@ def pass_ranges(samples: int) -> list[tuple[int, int]]:
     return list(pairwise(ends))
 
 
-def has_room(job: Job, executor: LocalExecutor, token: CancelToken | None = None) -> bool:
+def has_room(job: Job, executor: LocalExecutor | SeveralExecutor, token: CancelToken | None = None) -> bool:
     """Whether the device has room for the data kept between passes; if not, a message is printed.
 
     Raises:

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import View
+from clfractal.pictures.film import Film
+from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiled import Picture
 from clfractal.pictures.tiles import Region
 from clfractal.renderers.plan import PlannedView
@@ -84,12 +86,25 @@ def remarks_of(
         FileError: a picture on the disk cannot be read.
     """
     found = [job.remark] if job.remark else []
+    found += [*state.remarks, *_of_kinds(stores)]
     for number in sorted({view.number for view in job.views}):
         name = f"layout.views.{number}: " if job.scene.layout is not None else ""
         found += [name + line for line in _of_view(_gathered(job, state, stores, number))]
     if comfort is not None and comfort.warning():
         found.append(comfort.warning())
     return tuple(dict.fromkeys(found))
+
+
+def _of_kinds(stores: Sequence[Picture]) -> list[str]:
+    """That devices of several kinds have made parts of a picture."""
+    tiled = [store for store in stores if isinstance(store, (Film, JournalFilm))]
+    makers = {maker.key: maker for store in tiled for maker in store.makers.counts(store.done)}
+    return [mixed_kinds(len(makers))] if len(makers) > 1 else []
+
+
+def mixed_kinds(count: int) -> str:
+    """The remark on a picture by devices of several kinds."""
+    return f"made by devices of {count} kinds, which differ where last digits decide; the header tells whose tiles"
 
 
 def _gathered(job: Job, state: Progress, stores: Sequence[Picture], number: int) -> _Seen:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
+from clfractal.pictures.makers import Maker
 from clfractal.pictures.tiled import TiledStore
 from clfractal.work.job import Job
 
@@ -75,12 +76,16 @@ class Result:
         tiles: indices of the tiles.
         film: their channels, shape (tiles, channels, TILE, TILE).
         tally: see `Tally`.
+        maker: the device that made them, where several do a job.
+        remark: what the user should know about the work, or empty.
     """
 
     view: int
     tiles: Tiles
     film: Floats
     tally: Tally
+    maker: Maker | None = None
+    remark: str = ""
 
 
 class Executor(Protocol):
@@ -103,7 +108,8 @@ class Executor(Protocol):
 class Progress(Tally):
     """The progress of a job, its counts and times; `remaining` is None until it can be estimated.
 
-    `views` has the counts and times of each of the job's views.
+    `views` has the counts and times of each of the job's views, `makers` those of each device where several do the job,
+    with its tiles, and `remarks` what the user should know about the work.
     """
 
     tiles: int
@@ -111,6 +117,8 @@ class Progress(Tally):
     started: float = field(default_factory=time.perf_counter)
     tiles_before: int = 0
     views: list[Tally] = field(default_factory=list)
+    makers: dict[Maker, tuple[int, Tally]] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def seconds(self) -> float:
@@ -182,14 +190,26 @@ def run(
     # Closed at once, whatever happens here: the device is idle before an error or an interrupt is seen.
     with closing(executor.execute(job, items, token)) as results:
         for result in results:
+            store, maker = stores[result.view], result.maker
+            if maker is not None:
+                tiles, tally = state.makers.setdefault(maker, (0, Tally()))
+                tally.add(result.tally)
+                state.makers[maker] = (tiles + len(result.tiles), tally)
+            elif store.makers.known:  # an earlier run had several devices
+                maker = Maker(job.device.index, job.device.name, job.device.key)
             if len(result.tiles):
-                stores[result.view].put_tiles(result.tiles, result.film)
+                store.put_tiles(result.tiles, result.film, maker)
+            if result.remark:
+                state.remarks.append(result.remark)
             state.tiles_done += len(result.tiles)
             state.add(result.tally)
             state.views[result.view].add(result.tally)
             seconds[result.view] += state.seconds - last
-            stores[result.view].tell("seconds", seconds[result.view])
+            store.tell("seconds", seconds[result.view])
             last = state.seconds
             if progress is not None:
                 progress(state)
+    for store in stores:
+        for key, value in store.makers.header(store.done).items():
+            store.tell(key, value)
     return state

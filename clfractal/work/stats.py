@@ -29,7 +29,8 @@ def statistics(
     comfort: Comfort | None = None,
     remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Times and counts as plain data; for a stereo scene also its view, under `stereo`.
+    """Times and counts as plain data; for a stereo scene also its view, under `stereo`; with several devices also the share
+    of each, under `devices`.
 
     `kernel_ms` is the sum over batches from the device's own events; `wall_ms` runs from the start of the command, or
     of the call, to its last file, `write_ms` is the part of it for the files. `rays` are camera rays; `steps_per_ray`
@@ -67,6 +68,17 @@ def statistics(
         "peak_memory_mb": round(peak_memory_mb(), 1),
         "remarks": list(remarks),
     }
+    if state.makers:
+        values["devices"] = [
+            {
+                "index": maker.index,
+                "device": maker.name,
+                "tiles": tiles,
+                "rays": tally.rays,
+                "kernel_ms": round(tally.kernel_ms, 3),
+            }
+            for maker, (tiles, tally) in sorted(state.makers.items(), key=lambda each: each[0].index)
+        ]
     if job.scene.stereo is not None:
         values["stereo"] = _of_stereo(job, comfort)
     return values
@@ -96,12 +108,17 @@ def write_statistics(path: Path, values: dict[str, Any]) -> None:
 
 
 def sentence(values: dict[str, Any]) -> str:
-    """The statistics as one line."""
-    return (
+    """The statistics as one line, and one for each of several devices."""
+    shares = [
+        f"{each['index']} {each['device']}: {each['tiles']} tiles, kernels {each['kernel_ms']:.0f} ms"
+        for each in values.get("devices", ())
+    ]
+    whole = (
         "{device}: {precision}, {lanes} lanes; build {build_ms:.0f} ms, kernels {kernel_ms:.0f} ms, files "
         "{write_ms:.0f} ms; {steps_per_ray:.1f} steps per ray, {bad_distances} bad distances; peak memory "
         "{peak_memory_mb:.0f} MB"
     ).format(**values)
+    return "\n".join([whole, *shares])
 
 
 def peak_memory_mb() -> float:

@@ -18,6 +18,7 @@ from clfractal.scene.model import Scene
 from clfractal.voxels import fill
 from clfractal.work.drawing import Drawing
 from clfractal.work.engine import Engine
+from clfractal.work.local import LocalExecutor
 
 SIZE = {"width": 64, "height": 48}
 BULB = f"""
@@ -122,6 +123,7 @@ def test_a_grid_that_nobody_asks_for_is_dropped(device: Device, monkeypatch: pyt
         engine.render(changed(VOLUME))
         for _ in range(3):
             engine.render(changed(BULB))
+        assert isinstance(engine.executor, LocalExecutor)
         assert engine.executor.kept._things == {}
         engine.render(changed(VOLUME))
     assert len(filled) == 2
