@@ -1,0 +1,124 @@
+"""Makes the films of docs/films.md: docs/pictures/*.film.webp, small looping films, from the scenes that move.
+
+    python docs/make_films.py              every film (minutes)
+    python docs/make_films.py film_dive    one film
+
+Every STEP-th frame is rendered small with the scene's own samples, and written with the highest quality that leaves the
+file small enough.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from clfractal import resources
+from clfractal.api import load_scene
+from clfractal.files.srgb import encode8
+from clfractal.pictures.develop import Development, developed
+from clfractal.pictures.film import Film
+from clfractal.scene.model import Scene
+from clfractal.work.frames import frames
+
+DOCS = Path(__file__).resolve().parent
+PICTURES = DOCS / "pictures"
+SIZE = (480, 270)  # pixels
+EYE_SIZE = (320, 180)  # of each of two pictures beside each other
+STEP = 2  # frames of the scene for one of the film
+LARGEST_FILE = 1_500_000  # bytes
+QUALITIES = range(20, 91)  # of WebP
+
+
+def film_paths() -> list[Path]:
+    """The scenes that move, by name."""
+    return sorted(
+        path for path in resources.folder("scenes").glob("*.yaml") if load_scene(path).animation is not None
+    )
+
+
+def film_of(name: str) -> Path:
+    """Where the small film of a scene lies."""
+    return PICTURES / f"{name}.film.webp"
+
+
+def small_scene(path: Path) -> Scene:
+    """The scene at the size of its small film."""
+    width, height = EYE_SIZE if load_scene(path).stereo is not None else SIZE
+    return load_scene(path, overrides=[f"image.width={width}", f"image.height={height}"])
+
+
+def pictures_of(scene: Scene) -> Iterator[Image.Image]:
+    """The film's frames as a screen shows them."""
+    assert scene.animation is not None
+    for _, film in frames(scene, numbers=range(0, scene.animation.count, STEP), channels=["R", "G", "B", "A"]):
+        yield shown(film)
+
+
+def shown(film: Film) -> Image.Image:
+    """A frame with its exposure and tone."""
+    bands = [band for _, band in developed(film, Development.of(film.header)).bands()]
+    linear = np.stack([np.concatenate([band[name] for band in bands]) for name in "RGB"], axis=-1)
+    return Image.fromarray(encode8(np.clip(linear, 0, 1)))
+
+
+def small_enough(pictures: Sequence[Image.Image], fps: float) -> tuple[bytes, int]:
+    """A WebP film of at most LARGEST_FILE bytes, and its quality: the highest of QUALITIES that is so small.
+
+    Raises:
+        ValueError: the lowest quality makes a larger file.
+    """
+    best: tuple[bytes, int] | None = None
+    low, high = QUALITIES.start, QUALITIES.stop
+    while low < high:  # sizes grow with quality: halve what is left
+        quality = (low + high) // 2
+        content = webp(pictures, fps, quality)
+        if len(content) <= LARGEST_FILE:
+            best, low = (content, quality), quality + 1
+        else:
+            high = quality
+    if best is None:
+        raise ValueError(f"is larger than {LARGEST_FILE // 1000} kB even at quality {QUALITIES.start}")
+    return best
+
+
+def webp(pictures: Sequence[Image.Image], fps: float, quality: int) -> bytes:
+    """A WebP film that begins again without end. Times of frames are whole milliseconds, whose sum is right."""
+    ends = [round(1000 * number / fps) for number in range(len(pictures) + 1)]
+    file = io.BytesIO()
+    pictures[0].save(
+        file,
+        "WEBP",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=[int(length) for length in np.diff(ends)],
+        loop=0,
+        quality=quality,
+        method=4,
+    )
+    return file.getvalue()
+
+
+def make_film(path: Path) -> None:
+    """Renders a scene's small film and writes it."""
+    scene = small_scene(path)
+    assert scene.animation is not None
+    pictures = list(pictures_of(scene))
+    content, quality = small_enough(pictures, scene.animation.fps / STEP)
+    film_of(path.stem).write_bytes(content)
+    print(f"{path.stem}: {len(pictures)} frames, {len(content) // 1000} kB, quality {quality}", flush=True)
+
+
+def main(names: Sequence[str]) -> None:
+    """Makes the named films, or all."""
+    for path in film_paths():
+        if path.stem in names or not names:
+            make_film(path)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
