@@ -15,13 +15,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from make_gallery import best_below, shown_light
 from PIL import Image
 
 from clfractal import resources
 from clfractal.api import load_scene
 from clfractal.files.srgb import encode8
-from clfractal.pictures.develop import Development, developed
-from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.work.frames import frames
 
@@ -58,34 +57,7 @@ def pictures_of(scene: Scene) -> Iterator[Image.Image]:
     for _, film in frames(
         scene, numbers=range(0, scene.animation.count, STEP), channels=["R", "G", "B", "A"]
     ):
-        yield shown(film)
-
-
-def shown(film: Film) -> Image.Image:
-    """A frame with its exposure and tone."""
-    bands = [band for _, band in developed(film, Development.of(film.header)).bands()]
-    linear = np.stack([np.concatenate([band[name] for band in bands]) for name in "RGB"], axis=-1)
-    return Image.fromarray(encode8(np.clip(linear, 0, 1)))
-
-
-def small_enough(pictures: Sequence[Image.Image], fps: float) -> tuple[bytes, int]:
-    """A WebP film of at most LARGEST_FILE bytes, and its quality: the highest of QUALITIES that is so small.
-
-    Raises:
-        ValueError: the lowest quality makes a larger file.
-    """
-    best: tuple[bytes, int] | None = None
-    low, high = QUALITIES.start, QUALITIES.stop
-    while low < high:  # sizes grow with quality: halve what is left
-        quality = (low + high) // 2
-        content = webp(pictures, fps, quality)
-        if len(content) <= LARGEST_FILE:
-            best, low = (content, quality), quality + 1
-        else:
-            high = quality
-    if best is None:
-        raise ValueError(f"is larger than {LARGEST_FILE // 1000} kB even at quality {QUALITIES.start}")
-    return best
+        yield Image.fromarray(encode8(shown_light(film)))
 
 
 def webp(pictures: Sequence[Image.Image], fps: float, quality: int) -> bytes:
@@ -110,7 +82,8 @@ def make_film(path: Path) -> None:
     scene = small_scene(path)
     assert scene.animation is not None
     pictures = list(pictures_of(scene))
-    content, quality = small_enough(pictures, scene.animation.fps / STEP)
+    fps = scene.animation.fps / STEP
+    content, quality = best_below(LARGEST_FILE, QUALITIES, lambda quality: webp(pictures, fps, quality))
     film_of(path.stem).write_bytes(content)
     print(f"{path.stem}: {len(pictures)} frames, {len(content) // 1000} kB, quality {quality}", flush=True)
 
