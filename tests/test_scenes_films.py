@@ -196,7 +196,7 @@ def test_its_small_film_is_shown(path: Path) -> None:
 def test_its_page_shows_lines_of_the_scene(path: Path) -> None:
     page = (maker("make_films").DOCS / "films.md").read_text("utf-8")
     (part,) = [part for part in page.split("\n## ") if f"](../scenes/{path.name})" in part]
-    (shown,) = re.findall(r"```yaml\n(.*?)```", part, re.DOTALL)
+    (shown,) = re.findall(r"```text\n(.*?)```", part, re.DOTALL)
     lines = {line.strip() for line in path.read_text("utf-8").splitlines()}
     assert {line.strip() for line in shown.splitlines()} <= lines
 
