@@ -4,7 +4,7 @@
     python docs/make_films.py film_dive    one film
 
 Every STEP-th frame is rendered small with the scene's own samples, and written with the highest quality that leaves the
-file small enough.
+file small enough. A film with so much detail that no quality does is reduced further.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
-from make_gallery import best_below, shown_light
+from make_gallery import Floats, best_below, reduced, shown_light
 from PIL import Image
 
 from clfractal import resources
@@ -28,9 +29,10 @@ DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
 SIZE = (480, 270)  # pixels
 EYE_SIZE = (320, 180)  # of each of two pictures beside each other
+REDUCED = (1, 5 / 6, 2 / 3)  # parts of these sizes
 STEP = 2  # frames of the scene for one of the film
 LARGEST_FILE = 1_200_000  # bytes: eight films stay below 10 MB
-QUALITIES = range(20, 91)  # of WebP
+QUALITIES = range(40, 91)  # of WebP
 
 
 def film_paths() -> list[Path]:
@@ -51,13 +53,36 @@ def small_scene(path: Path) -> Scene:
     return load_scene(path, overrides=[f"image.width={width}", f"image.height={height}"])
 
 
-def pictures_of(scene: Scene) -> Iterator[Image.Image]:
-    """The film's frames as a screen shows them."""
+def frames_of(scene: Scene) -> Iterator[Floats]:
+    """The film's frames as a screen shows them, linear light, shape (rows, columns, 3)."""
     assert scene.animation is not None
     for _, film in frames(
         scene, numbers=range(0, scene.animation.count, STEP), channels=["R", "G", "B", "A"]
     ):
-        yield Image.fromarray(encode8(shown_light(film)))
+        yield shown_light(film)
+
+
+def small_enough(shown: Sequence[Floats], fps: float) -> tuple[bytes, int]:
+    """A film as large as can be of at most LARGEST_FILE bytes, and its quality.
+
+    Raises:
+        ValueError: the least size with the lowest quality makes a larger file.
+    """
+    *larger, least = REDUCED
+    for part in larger:
+        with suppress(ValueError):
+            return best_of_size(shown, part, fps)
+    return best_of_size(shown, least, fps)
+
+
+def best_of_size(shown: Sequence[Floats], part: float, fps: float) -> tuple[bytes, int]:
+    """The same for a part of the size.
+
+    Raises:
+        ValueError: the lowest quality makes a larger file.
+    """
+    pictures = [Image.fromarray(encode8(reduced(each, round(each.shape[1] * part)))) for each in shown]
+    return best_below(LARGEST_FILE, QUALITIES, lambda quality: webp(pictures, fps, quality))
 
 
 def webp(pictures: Sequence[Image.Image], fps: float, quality: int) -> bytes:
@@ -81,11 +106,10 @@ def make_film(path: Path) -> None:
     """Renders a scene's small film and writes it."""
     scene = small_scene(path)
     assert scene.animation is not None
-    pictures = list(pictures_of(scene))
-    fps = scene.animation.fps / STEP
-    content, quality = best_below(LARGEST_FILE, QUALITIES, lambda quality: webp(pictures, fps, quality))
+    shown = list(frames_of(scene))
+    content, quality = small_enough(shown, scene.animation.fps / STEP)
     film_of(path.stem).write_bytes(content)
-    print(f"{path.stem}: {len(pictures)} frames, {len(content) // 1000} kB, quality {quality}", flush=True)
+    print(f"{path.stem}: {len(shown)} frames, {len(content) // 1000} kB, quality {quality}", flush=True)
 
 
 def main(names: Sequence[str]) -> None:
