@@ -81,8 +81,14 @@ def best_of_size(shown: Sequence[Floats], part: float, fps: float) -> tuple[byte
     Raises:
         ValueError: the lowest quality makes a larger file.
     """
-    pictures = [Image.fromarray(encode8(reduced(each, round(each.shape[1] * part)))) for each in shown]
+    width = width_of(shown[0].shape[1], part)
+    pictures = [Image.fromarray(encode8(reduced(each, width))) for each in shown]
     return best_below(LARGEST_FILE, QUALITIES, lambda quality: webp(pictures, fps, quality))
+
+
+def width_of(width: int, part: float) -> int:
+    """A part of a width, that two eyes can share."""
+    return 2 * round(width * part / 2)
 
 
 def webp(pictures: Sequence[Image.Image], fps: float, quality: int) -> bytes:

@@ -180,10 +180,12 @@ def test_its_small_film_is_shown(path: Path) -> None:
     assert file.stat().st_size <= films.LARGEST_FILE <= 1_500_000
     with Image.open(file) as shown:
         width, height = films.SIZE if scene.stereo is None else (2 * films.EYE_SIZE[0], films.EYE_SIZE[1])
-        assert shown.size in [(round(width * part), round(height * part)) for part in films.REDUCED]
+        widths = [films.width_of(width, part) for part in films.REDUCED]
+        assert shown.size in [(each, round(height * each / width)) for each in widths]
         assert shown.info["loop"] == 0
         count = shown.n_frames  # type: ignore[attr-defined]
-        assert count == len(range(0, film.count, films.STEP))
+        # (Frames that do not differ are one, which is shown longer.)
+        assert 0.8 * film.count / films.STEP <= count <= len(range(0, film.count, films.STEP))
         lasts = 0
         for number in range(count):
             shown.seek(number)
