@@ -14,7 +14,7 @@ from __future__ import annotations
 import io
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from clfractal.files.srgb import encode8
 from clfractal.formulas import catalog
 from clfractal.pictures.compose import APART
 from clfractal.pictures.develop import Development, developed
+from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent
@@ -103,10 +104,7 @@ def make_picture(path: Path) -> None:
     """Renders a scene and writes its reduced picture."""
     scene = load_scene(path)
     film = render(beside(scene), channels=["R", "G", "B", "A"])
-    bands = [band for _, band in developed(film, Development.of(film.header)).bands()]
-    linear = np.stack([np.concatenate([band[name] for band in bands]) for name in "RGB"], axis=-1)
-    # What is brighter than the screen can show is cut before it is averaged, as in the full picture.
-    linear = np.clip(linear, 0, 1)
+    linear = shown_light(film)
     coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
     shown = picture(reduced(linear, WIDTH), reduced(coverage, WIDTH))
     content, quality = small_enough(shown)
@@ -117,23 +115,42 @@ def make_picture(path: Path) -> None:
     print(f"{target.name}: {size} kB, quality {quality}, {film.header['seconds']:.1f} s", flush=True)
 
 
+def shown_light(film: Film) -> Floats:
+    """What a screen shows of a film, with its exposure and tone: linear light, shape (rows, columns, 3).
+
+    What is brighter than the screen can show is cut here, before it is averaged, as in the full picture.
+    """
+    bands = [band for _, band in developed(film, Development.of(film.header)).bands()]
+    linear = np.stack([np.concatenate([band[name] for band in bands]) for name in "RGB"], axis=-1)
+    return np.clip(linear, 0, 1)
+
+
 def small_enough(shown: Image.Image) -> tuple[bytes, int]:
     """A WebP file of at most LARGEST_FILE bytes, and its quality: the highest of QUALITIES that is so small.
 
     Raises:
         ValueError: the lowest quality makes a larger file.
     """
+    return best_below(LARGEST_FILE, QUALITIES, lambda quality: webp(shown, quality))
+
+
+def best_below(most: int, qualities: range, write: Callable[[int], bytes]) -> tuple[bytes, int]:
+    """What `write` makes of the highest quality that takes at most so many bytes, and that quality.
+
+    Raises:
+        ValueError: the lowest quality takes more.
+    """
     best: tuple[bytes, int] | None = None
-    low, high = QUALITIES.start, QUALITIES.stop
+    low, high = qualities.start, qualities.stop
     while low < high:  # sizes grow with quality: halve what is left
         quality = (low + high) // 2
-        content = webp(shown, quality)
-        if len(content) <= LARGEST_FILE:
+        content = write(quality)
+        if len(content) <= most:
             best, low = (content, quality), quality + 1
         else:
             high = quality
     if best is None:
-        raise ValueError(f"is larger than {LARGEST_FILE // 1000} kB even at quality {QUALITIES.start}")
+        raise ValueError(f"is larger than {most // 1000} kB even at quality {qualities.start}")
     return best
 
 

@@ -231,8 +231,13 @@ def preview_scene(scene: Scene, width: int, height: int) -> Scene:
 
 
 def small_scene(scene: Scene, width: int, height: int) -> Scene:
-    """The scene as a small picture shows it: for one eye, with few samples, and a coarse grid."""
-    updates: dict[str, Any] = {"image": Image(width=width, height=height), "stereo": None}
+    """The scene as a small picture shows it: a still for one eye, with few samples, and a coarse grid."""
+    # (Tracks may move what is no more there, such as the distance of the eyes.)
+    updates: dict[str, Any] = {
+        "image": Image(width=width, height=height),
+        "stereo": None,
+        "animation": None,
+    }
     updates["renderer"] = _coarse(scene.renderer)
     if scene.layout is not None:
         views = [

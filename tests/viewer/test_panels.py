@@ -435,6 +435,8 @@ def test_everything_can_be_set_back(scene: str) -> None:
     """Every difference but what others need is set back by its button, and then is no difference any more."""
     ui, _ = make_ui(scene)
     left = differences.differences(ui.studio.scene)
+    animation = ui.studio.scene.animation
+    moved = tuple(animation.tracks) if animation is not None else ()
     refused = []
     for each in left:
         if each.path not in {other.path for other in differences.differences(ui.studio.scene)}:
@@ -443,8 +445,10 @@ def test_everything_can_be_set_back(scene: str) -> None:
             assert each.path not in {other.path for other in differences.differences(ui.studio.scene)}
         else:
             refused.append(each.path)
-    # A position and a direction that depend on each other may have to be set back in another order.
-    assert len(refused) <= 3, refused
+    # What tracks move has to stay. A position and a direction that depend on each other may have to be set back in another
+    # order.
+    free = [path for path in refused if not any(name.startswith(f"{path}.") for name in moved)]
+    assert len(free) <= 3, free
 
 
 def test_a_plain_scene_differs_in_nothing() -> None:
