@@ -305,6 +305,9 @@ class Cluster:
         with suppress(Exception):
             if self._processes is not None:
                 await asyncio.wait_for(self._processes.close(timeout=4), 6)
+        for task in asyncio.all_tasks():
+            if task is not asyncio.current_task():
+                task.cancel()
 
     def _call(self, function: Callable[..., Any], *values: Any) -> None:
         with suppress(RuntimeError):  # the loop has ended

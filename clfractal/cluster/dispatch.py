@@ -37,6 +37,8 @@ _URGENT = 500_000
 # Until it is believed that no fit worker follows one that is not.
 _OTHERS_SECONDS = 3.0
 _PAUSE_SECONDS = 0.05
+# Arrays of earlier works that stay with the workers: a film's frames mostly have the same.
+_KEPT = 4
 
 Submit = Callable[[Link], tuple[Any, Sequence[str] | None]]
 Collect = Callable[[Link, Any], Awaitable[Any]]
@@ -94,7 +96,7 @@ class Dispatcher:
         self.error: ClfractalError | None = None
         self.pace = Pace()
         self._works: list[Work] = []
-        self._busy = 0  # bundles that are given out
+        self._given: set[asyncio.Task[None]] = set()  # bundles that are given out
         self._waiting = 0  # tasks for which there is no worker
         self._alone_since = time.monotonic()
         self._news = asyncio.Event()  # set, and replaced, whenever who works has changed
@@ -258,14 +260,16 @@ class Dispatcher:
             return
         workers = len(link.serving)
         for place, work in enumerate(self._works):
-            while work.items and self._busy < _FOR_EACH * workers + 1:
+            while work.items and len(self._given) < _FOR_EACH * workers + 1:
                 left = sum(each.left for each in self._works[place:])
                 samples = work.items[0].samples[1] - work.items[0].samples[0]
                 size = self.pace.bundle(samples, left, workers, 4 * TILE * TILE * len(work.job.channels))
                 task = asyncio.create_task(self._do(work, work.cut(size)))
-                self._busy += 1
+                self._given.add(task)
                 work.under_way.add(task)
+                # (A task that is cancelled before it has begun runs no `finally` of its own.)
                 task.add_done_callback(work.under_way.discard)
+                task.add_done_callback(self._free)
 
     async def _do(self, work: Work, item: WorkItem) -> None:
         """Has one bundle done, however often it takes, and puts its answer into the queue."""
@@ -273,7 +277,8 @@ class Dispatcher:
 
         float64 = any(view.plan.precision == "float64" for view in work.job.views)
         offers = {tasks.RESOURCE: 1, **({tasks.FLOAT64: 1} if float64 else {})}
-        waiting = True  # whether it counts as given out
+        own = asyncio.current_task()
+        assert own is not None
 
         def submit(link: Link) -> tuple[Any, Sequence[str] | None]:
             among = link.serving if link.left_out else None
@@ -293,10 +298,9 @@ class Dispatcher:
             return future, among
 
         async def collect(link: Link, future: Any) -> Any:
-            nonlocal waiting
             if not work.wanted.is_set():
                 # Its result stays with the worker, which goes on with other bundles.
-                waiting = self._free(waiting)
+                self._free(own)
                 await work.wanted.wait()
             await self._read.acquire()
             answer = None
@@ -317,14 +321,12 @@ class Dispatcher:
             seconds = max(answer.seconds - 1e-3 * answer.tally.build_ms, 1e-6)
             self.pace.learn(len(item.tiles), item.samples[1] - item.samples[0], seconds)
             work.answers.put(answer)
-        finally:
-            self._free(waiting)
 
-    def _free(self, waiting: bool) -> bool:
-        if waiting:
-            self._busy -= 1
-            asyncio.get_running_loop().call_soon(self._give_out)
-        return False
+    def _free(self, task: asyncio.Task[None]) -> None:
+        """Counts a bundle as done: there is room for another one."""
+        if task in self._given:
+            self._given.remove(task)
+            self._give_out()
 
     async def _done(self, submit: Submit, collect: Collect) -> Any:
         """Has a task done, however often it takes; gives its answer.
@@ -389,6 +391,8 @@ class Dispatcher:
                 future = self._keep(link, digest, array)
                 self._kept[digest] = (link, future)
             found[digest] = future
+        for digest in [digest for digest in self._kept if digest not in found][:-_KEPT]:
+            del self._kept[digest]
         return found
 
     def _keep(self, link: Link, digest: str, array: Array) -> Any:

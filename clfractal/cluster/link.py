@@ -82,6 +82,7 @@ class Link:
         """Set, and replaced by another one, whenever who takes part has changed."""
         self.on_news: Callable[[], None] = lambda: None
         self.direct = False
+        self._scheduler: str | None = None
         self.under_way: dict[str, Any] = {}
         """Futures that somebody waits for, by key."""
         self._stuck: set[str] = set()
@@ -95,8 +96,9 @@ class Link:
         try:
             for count in itertools.count():
                 info = await asyncio.wait_for(self.client.scheduler.identity(), ANSWER_SECONDS)
-                if self.client.status != "running":
-                    break
+                if self.client.status != "running" or self._scheduler not in (None, info["id"]):
+                    break  # (Dask's client may have found another scheduler at this address by itself)
+                self._scheduler = info["id"]
                 await self._look(info["workers"])
                 await self._find_stuck()
                 # A large cluster tells much: it is asked less often.

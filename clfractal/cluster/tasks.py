@@ -6,6 +6,7 @@ Only one task at a time uses a device of a process. A task ends early when nobod
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import time
 from collections import OrderedDict
@@ -274,7 +275,7 @@ def _fitted(job: Job, device: Device) -> Job:
 
 def _take_cores(number: int, count: int) -> None:
     """Leaves the other cores to the other workers of this machine. Only before a driver is loaded: it asks then."""
-    if hasattr(os, "sched_setaffinity"):
+    if sys.platform == "linux":
         cores = sorted(os.sched_getaffinity(os.getpid()))
     else:
         cores = list(range(os.cpu_count() or 1))
@@ -283,6 +284,6 @@ def _take_cores(number: int, count: int) -> None:
     # PoCL's threads; the first name is that of PoCL before 5, the second of later ones.
     for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT"):
         os.environ.setdefault(name, str(len(own)))
-    if hasattr(os, "sched_setaffinity"):
+    if sys.platform == "linux":
         # Of this thread, from which the driver's threads have it.
         os.sched_setaffinity(0, own)

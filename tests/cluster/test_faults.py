@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import random
-import resource
 import signal
 import subprocess
 import time
@@ -18,6 +17,8 @@ from clfractal.files.exr import read_exr
 from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows, planes
 from tests.cluster.kills import kill_at_random
 from tests.shell import command, environment, process
+
+resource = pytest.importorskip("resource", reason="signals and limits of processes are those of POSIX")
 
 
 def test_workers_killed_during_a_picture(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:

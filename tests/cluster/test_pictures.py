@@ -133,3 +133,21 @@ def test_tls(folder: Path) -> None:
         assert unsafe.is_one_line(3, "does not answer within 10 s")
     assert process([*order[:8], "own.exr"], folder).status == 0
     assert planes(folder / "out.exr") == planes(folder / "own.exr")
+
+
+def test_a_grid_travels_along(folder: Path, farm: Farm) -> None:
+    """Two frames that show one grid from a file, which no worker has."""
+    x = np.linspace(-1, 1, 48, dtype=np.float32)
+    z, y, x = np.meshgrid(x, x, x, indexing="ij")
+    np.save(folder / "ball.npy", 1 - np.sqrt(x * x + y * y + z * z))
+    (folder / "ball.yaml").write_text(
+        "version: 1\nformula: {name: hast}\nimage: {width: 64, height: 48}\n"
+        "camera: {position: [30, -110, 45], target: [24, 24, 24]}\nrenderer: {type: volume, file: ball.npy}\n"
+        "animation: {frames: 2, tracks: {camera.fov: {keys: [{frame: 0, value: 40}, {frame: 1, value: 30}]}}}\n"
+    )
+    with clfractal.Cluster(farm.address) as cluster:
+        found = [film for _, film in clfractal.frames(folder / "ball.yaml", executor=cluster)]
+    own = [film for _, film in clfractal.frames(folder / "ball.yaml")]
+    for each, wanted in zip(found, own, strict=True):
+        assert wanted["A"].max() == 1
+        assert all(np.array_equal(each[name], wanted[name], equal_nan=True) for name in wanted.channels)
