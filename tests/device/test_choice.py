@@ -59,7 +59,10 @@ def test_all_has_one_driver_of_the_processor(device: Device) -> None:
 @pytest.mark.parametrize(
     ("specs", "message"),
     [
-        (["{0}", "{0}"], "--device: {0} is named twice; parts of a device are named together, such as {0}/1+1"),
+        (
+            ["{0}", "{0}"],
+            "--device: {0} is named twice; parts of a device are named together, such as {0}/1+1",
+        ),
         (["{0}", "{kind}"], "--device: {0} and {kind} are the same device, {0}"),
         (["{0}/1", "{0}"], "--device: {0}/1 and {0} share the device {0}; name its parts together"),
         (["{0}", "all"], "--device: all stands alone: it names every device"),
@@ -69,9 +72,7 @@ def test_all_has_one_driver_of_the_processor(device: Device) -> None:
         (["all/1"], "--device: names several devices"),
     ],
 )
-def test_wrong_names(
-    specs: list[str], message: str, device: Device, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrong_names(specs: list[str], message: str, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     halves_of(device)
     # `cpu` names the best one, which need not be the one under test.
     monkeypatch.setattr(choice, "choose", lambda spec: device if spec == device.info.kind else choose(spec))
