@@ -6,10 +6,13 @@ import threading
 from collections.abc import Generator, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from clfractal.device import program
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, by_key, devices, is_simulator
 from clfractal.errors import DeviceError, Stopped
@@ -241,3 +244,25 @@ def test_wrong_lists_of_devices(device: Device) -> None:
         with pytest.raises(DeviceError) as caught:
             Engine(wrong)  # type: ignore[arg-type]
         assert caught.value.status == 2
+
+
+def test_a_program_is_compiled_once_for_devices_of_one_kind(
+    device: Device, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path))
+    monkeypatch.setenv("CLFRACTAL_LANES", "8")
+    compiled: list[str] = []
+    compile_in_child = program._compile_in_child
+
+    def counted(chosen: Device, text: str, *rest: Any) -> bytes:
+        compiled.append(text)
+        return compile_in_child(chosen, text, *rest)
+
+    monkeypatch.setattr(program, "_compile_in_child", counted)
+    scene = SCENE.replace("300, height: 200", "3000, height: 2000").replace("iterations: 8", "iterations: 9")
+    with Engine(halves_of(device)) as engine:
+        for executor in engine.executor.executors:  # type: ignore[union-attr]
+            executor.device.loaded.clear()
+        film = engine.render(scene, samples=1)
+    assert len(film.stats["devices"]) == 2
+    assert len(compiled) == len(set(compiled)) > 0
