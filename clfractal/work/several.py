@@ -1,4 +1,4 @@
-"""The executor of several devices: a thread for each, which take tiles from one another's reach as they have room."""
+"""The executor of several devices: a thread for each, which takes tiles as its device has room."""
 
 from __future__ import annotations
 
