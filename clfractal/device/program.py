@@ -6,10 +6,12 @@ import hashlib
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 import pyopencl as cl
 
@@ -18,11 +20,15 @@ from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
+from clfractal.errors import Stopped
 
 BUILD_TIMEOUT_S = 600.0
 
 _REMARK_SECONDS = 1.5  # longer than a failing build takes, so that no remark precedes an error
 _FORMAT = 4  # of what is kept under a key
+_TURN_SECONDS = 0.02
+_turns: WeakValueDictionary[str, Any] = WeakValueDictionary()  # locks, as long as somebody needs them
+_turns_lock = threading.Lock()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +101,8 @@ def build(
     program = device.loaded.get(key)
     if program is not None:
         return Program(device, program, _milliseconds(start), cached=True)
-    with device.loaded.building:
+    # Of devices of one kind one compiles, and the others find it in the cache.
+    with device.loaded.building, _alone(key, stopped):
         try:
             program, cached = _built(device, key, text, flags, warm, isolated, on_compile, stopped)
         except BuildFailureError as failure:
@@ -104,6 +111,24 @@ def build(
             raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
     device.loaded.keep(key, program)
     return Program(device, program, _milliseconds(start), cached=cached)
+
+
+@contextmanager
+def _alone(key: str, stopped: Callable[[], bool] | None) -> Iterator[None]:
+    """One thread at a time for a key.
+
+    Raises:
+        Stopped: `stopped` answered True while another thread had its turn.
+    """
+    with _turns_lock:
+        turn = _turns.setdefault(key, threading.Lock())
+    while not turn.acquire(timeout=_TURN_SECONDS):
+        if stopped is not None and stopped():
+            raise Stopped
+    try:
+        yield
+    finally:
+        turn.release()
 
 
 def _built(

@@ -178,9 +178,9 @@ class Journal:
         """
         if not 0 < maker <= _MOST_MAKERS:
             raise ValueError(f"maker {maker}")
-        shown = {key: str(value)[: self._payload // 64] for key, value in about.items()}
-        text = json.dumps({**shown, "number": maker}).encode()
-        self._write(_NOTE, text.ljust(self._payload, b"\0"))
+        shown = {key: str(value)[: self._payload // 16] for key, value in about.items()}
+        text = json.dumps({**shown, "number": maker}, ensure_ascii=False).encode()
+        self._write(_NOTE, text[: self._payload].ljust(self._payload, b"\0"))
         self._notes[maker] = shown
 
     def append(self, tile_index: int, array: Floats, maker: int = 0) -> None:

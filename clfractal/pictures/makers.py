@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -17,11 +18,16 @@ _LONGEST_LIST = 1 << 20
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """A device that makes tiles: its index as in `--device 0:0`, its name, and its `DeviceInfo.key`."""
+    """A device that makes tiles: its index as in `--device 0:0`, its name, and a short name of its `DeviceInfo.key`."""
 
     index: str
     name: str
     key: str
+
+    @classmethod
+    def of(cls, index: str, name: str, key: str) -> Maker:
+        """With the whole key, of which a digest is kept."""
+        return cls(index, name, hashlib.sha256(key.encode()).hexdigest()[:16])
 
     def as_data(self) -> dict[str, str]:
         """Plain data."""

@@ -259,11 +259,9 @@ def _devices(named: str | Device | Sequence[str | Device] | None) -> tuple[Devic
         return choose_all(() if named is None else (named,))
     if not isinstance(named, Sequence):
         return (choose(named),)  # which refuses it
-    if not named:
-        raise DeviceError("must name a device", Where(path="device"), status=STATUS_BAD_INPUT)
-    if all(isinstance(each, Device) for each in named):
-        return tuple(each for each in named if isinstance(each, Device))
-    for each in named:
-        if not isinstance(each, str):
-            choose(each)  # type: ignore[arg-type]  # which refuses it
-    return choose_all([each for each in named if isinstance(each, str)])
+    chosen = tuple(each for each in named if isinstance(each, Device))
+    names = [each for each in named if isinstance(each, str)]
+    if not named or len(named) not in (len(chosen), len(names)):
+        message = "must be names of devices, such as 0:0, and at least one"
+        raise DeviceError(message, Where(path="device"), status=STATUS_BAD_INPUT)
+    return chosen or choose_all(names)

@@ -196,7 +196,7 @@ def run(
                 tally.add(result.tally)
                 state.makers[maker] = (tiles + len(result.tiles), tally)
             elif store.makers.known:  # an earlier run had several devices
-                maker = Maker(job.device.index, job.device.name, job.device.key)
+                maker = Maker.of(job.device.index, job.device.name, job.device.key)
             if len(result.tiles):
                 store.put_tiles(result.tiles, result.film, maker)
             if result.remark:

@@ -1,4 +1,4 @@
-"""The executor of several devices: a thread for each, which take tiles from one another's reach as they have room."""
+"""The executor of several devices: a thread for each, which takes tiles as its device has room."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class SeveralExecutor:
         all_items = list(items)
         shared = Shared(self._offers(job, all_items, numbers), self._known_speeds(numbers))
         inbox: queue.Queue[_Told] = queue.Queue(_WAITING * len(numbers))
-        own_token = CancelToken()
+        own_token, tiles = CancelToken(), shared.count
         threads = [
             threading.Thread(
                 target=_Hand(self.executors[number], jobs[number], shared, place, inbox, own_token),
@@ -131,7 +131,7 @@ class SeveralExecutor:
         try:
             for thread in threads:
                 thread.start()
-            yield from self._results(job, numbers, shared, inbox, token)
+            yield from self._results(job, numbers, shared, inbox, tiles, token)
         finally:
             own_token.cancel()
             shared.stop()
@@ -195,11 +195,12 @@ class SeveralExecutor:
         numbers: Sequence[int],
         shared: Shared,
         inbox: queue.Queue[_Told],
+        missing: int,
         token: CancelToken | None,
     ) -> Generator[Result]:
+        """What the devices tell, until all of so many missing tiles are there."""
         running = set(range(len(numbers)))
         built = [0.0] * len(numbers)
-        missing = shared.count
         while running:
             if not missing and not self._waits_for(shared, running):
                 return
@@ -363,4 +364,4 @@ def _empty(inbox: queue.Queue[_Told], threads: Sequence[threading.Thread]) -> No
 
 def maker_of(device: DeviceInfo) -> Maker:
     """How a picture calls the device."""
-    return Maker(device.index, device.name, device.key)
+    return Maker.of(device.index, device.name, device.key)

@@ -8,13 +8,14 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clfractal.errors import FileError
-from clfractal.files.journal import MAGIC, Journal
+from clfractal.files.journal import MAGIC, SIDE, Journal
 from tests.files.limits import file_size_limit
 
 IDENTITY = {"scene": "version: 1\n" * 20, "version": "0.1.0", "device": "PoCL cpu", "samples": 4}
@@ -286,3 +287,35 @@ def test_kill_at_random_moments_loses_nothing_that_was_finished(tmp_path: Path) 
             break
     assert complete
     assert kills >= 2
+
+
+def test_who_made_a_tile_is_kept(tmp_path: Path) -> None:
+    path, identity, channels = tmp_path / "a.partial", {"scene": "one"}, ("R", "G")
+    tiles = np.random.default_rng(5).random((4, 2, SIDE, SIDE), np.float32)
+    with closing(Journal.create(path, identity, channels, 10)) as journal:
+        journal.append(7, tiles[0])
+        journal.note(2, {"name": "a device of Ångström", "key": "k" * 5000})
+        journal.append(9, tiles[1], 2)
+        journal.append(0, tiles[2], 250)
+    with closing(Journal.resume(path, identity, channels, 10)) as journal:
+        assert journal.done.nonzero()[0].tolist() == [0, 7, 9]
+        assert journal.makers.tolist() == [250, 0, 0, 0, 0, 0, 0, 0, 0, 2]
+        assert journal.notes[2]["name"] == "a device of Ångström"
+        assert set(journal.notes) == {2}
+        assert journal.notes[2]["key"] == "k" * len(journal.notes[2]["key"])
+        for index, tile in ((7, tiles[0]), (9, tiles[1]), (0, tiles[2])):
+            np.testing.assert_array_equal(journal.tile(index), tile)
+        journal.append(9, tiles[3], 1)  # done again by another
+        assert journal.makers[9] == 1
+    with closing(Journal.resume(path, identity, channels, 10)) as journal:
+        assert journal.makers[9] == 1
+        np.testing.assert_array_equal(journal.tile(9), tiles[3])
+
+
+def test_other_identities_that_may_be_continued(tmp_path: Path) -> None:
+    path, channels = tmp_path / "a.partial", ("R",)
+    first, second, third = ({"device": name, "scene": "s" * 90} for name in ("one", "two", "three"))
+    Journal.create(path, first, channels, 3).close()
+    Journal.resume(path, second, channels, 3, [third, first]).close()
+    with pytest.raises(FileError, match='the device was "one" and is "two"'):
+        Journal.resume(path, second, channels, 3, [{**third, "scene": "another"}])

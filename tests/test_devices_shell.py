@@ -1,0 +1,183 @@
+"""Several devices from the shell: names, files, kills and interrupts; the halves of the processor are two devices."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import choose
+from clfractal.errors import DeviceError
+from clfractal.files.exr import read_exr
+from clfractal.work.local import LocalExecutor
+from clfractal.work.run import Result
+from tests.halves import halves_of
+from tests.shell import Ended, InProcess, command, environment, process
+from tests.test_interrupt import (  # the same promise
+    ENDLESS,
+    LIMIT_SECONDS,
+    PROMISE_SECONDS,
+    _interrupts_are_not_ignored,
+    interrupt,
+)
+from tests.test_resume import HEAVY, TILES
+
+__all__ = ["_interrupts_are_not_ignored"]
+
+
+@pytest.fixture(scope="module")
+def halves() -> str:
+    return halves_of(choose())
+
+
+def planes(path: Path) -> dict[str, bytes]:
+    return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
+
+
+def render(folder: Path, *options: str) -> Ended:
+    return process(["render", "heavy.yaml", "-o", "out.exr", *options], folder)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A picture by one device."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "heavy.yaml").write_text(HEAVY)
+    assert render(folder, "--quiet").status == 0
+    return folder / "out.exr"
+
+
+def test_killed_and_resumed_by_one_and_by_several(whole: Path, halves: str, tmp_path: Path) -> None:
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    chance, kept = random.Random(1), 0
+    for number in range(6):
+        named = ["--device", halves] if number % 2 == 0 else []
+        running = subprocess.Popen(
+            command("render", "heavy.yaml", "-o", "out.exr", "--quiet", "--resume", *named),
+            cwd=tmp_path,
+            env=environment(),
+        )
+        try:
+            running.wait(chance.uniform(0.6, 1.4))
+            break
+        except subprocess.TimeoutExpired:
+            running.send_signal(signal.SIGKILL)
+            running.wait()
+        if (tmp_path / "out.exr.partial").exists():
+            size = (tmp_path / "out.exr.partial").stat().st_size
+            assert size >= kept  # nothing that was done is lost
+            kept = size
+    ended = render(tmp_path, "--resume", "--quiet", "--device", halves)
+    assert ended == Ended(0, "", "")
+    assert planes(tmp_path / "out.exr") == planes(whole)
+    assert not (tmp_path / "out.exr.partial").exists()
+
+
+def test_the_header_and_the_statistics_name_the_devices(whole: Path, halves: str, tmp_path: Path) -> None:
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    ended = render(tmp_path, "--device", halves, "--stats", "stats.json", "--verbose")
+    assert ended.status == 0
+    assert planes(tmp_path / "out.exr") == planes(whole)
+    shares = json.loads((tmp_path / "stats.json").read_text())["devices"]
+    header = read_exr(tmp_path / "out.exr")[1]
+    assert sum(each["tiles"] for each in shares) == TILES
+    for each in shares:
+        line = f"{each['index']} {each['device']}: {each['tiles']} tiles"
+        assert line in header["clfractalDevices"]
+        assert line in ended.err
+    assert sum(int(run.split("*")[0]) for run in header["clfractalTileDevices"].split()) == TILES
+
+
+def test_no_device_is_left(
+    whole: Path,
+    halves: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Status 3 and one line more than those of the devices; what was done is kept, and one device continues it."""
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    monkeypatch.chdir(tmp_path)
+    execute = LocalExecutor.execute
+
+    def failing(own: LocalExecutor, *arguments: Any) -> Iterator[Result]:
+        done = 0
+        for result in execute(own, *arguments):
+            yield result
+            done += len(result.tiles)
+            if done >= 5:
+                raise DeviceError(f"{own.device.info.name}: the device failed while rendering: OUT_OF_ORDER")
+
+    monkeypatch.setattr(LocalExecutor, "execute", failing)
+    ended = InProcess(capsys)("render", "heavy.yaml", "-o", "out.exr", "--device", halves)
+    assert ended.status == 3
+    lines = ended.err.splitlines()
+    assert [line for line in lines if "is left out, others do its work: " in line] == lines[-2:-1]
+    assert lines[-1].startswith("no device is left: ")
+    assert (tmp_path / "out.exr.partial").exists()
+    assert not (tmp_path / "out.exr").exists()
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    index = halves.split("/")[0]
+    ended = InProcess(capsys)("render", "heavy.yaml", "-o", "out.exr", "--resume", "--device", index)
+    assert ended.status == 0
+    assert planes(tmp_path / "out.exr") == planes(whole)
+    # Of the tiles of the earlier run it is still known who made them.
+    told = read_exr(tmp_path / "out.exr")[1]["clfractalDevices"]
+    assert [line.split()[1] for line in told.split("\n")][-1] == index
+    assert f"{halves}#" in told
+
+
+def test_ctrl_c_with_several_devices(halves: str, tmp_path: Path) -> None:
+    (tmp_path / "endless.yaml").write_text(ENDLESS)
+    journal, seconds = tmp_path / "out.exr.partial", []
+    for _ in range(3):
+
+        def rendering() -> bool:
+            if not journal.exists():
+                return False
+            time.sleep(1.0)
+            return True
+
+        status, told, took = interrupt(tmp_path, rendering, {}, "--device", halves)
+        assert status == 130
+        assert told.endswith("out.exr: interrupted before a tile was done\n")
+        assert took < LIMIT_SECONDS
+        seconds.append(took)
+    assert min(seconds) < PROMISE_SECONDS
+
+
+def test_a_film_by_several_devices(halves: str, tmp_path: Path) -> None:
+    scene = HEAVY.replace("samples: 16", "samples: 1").replace("224, height: 160", "96, height: 64")
+    scene += "animation: {frames: 3, tracks: {camera.fov: {keys: [{frame: 0, value: 30}, {frame: 2, value: 40}]}}}\n"
+    (tmp_path / "film.yaml").write_text(scene)
+    for name, device in (("one", halves.split("/")[0]), ("two", halves)):
+        ended = process(["animate", "film.yaml", "-o", f"{name}_#.exr", "--device", device], tmp_path)
+        assert ended.status == 0, ended
+    for number in range(3):
+        assert planes(tmp_path / f"one_{number}.exr") == planes(tmp_path / f"two_{number}.exr")
+        assert "clfractalDevices" in read_exr(tmp_path / f"two_{number}.exr")[1]
+
+
+@pytest.mark.parametrize("work", ["render", "animate"])
+def test_wrong_devices(work: str, halves: str, tmp_path: Path) -> None:
+    scene = HEAVY + "animation: {frames: 3, tracks: {}}\n"
+    (tmp_path / "heavy.yaml").write_text(scene)
+    index = halves.split("/")[0]
+    for options, message in (
+        (["--device", index, "--device", index], f"--device: {index} is named twice"),
+        (["--device", "all", "--device", index], "--device: all stands alone: it names every device"),
+        (["--device", index, "--device", "no such"], "unknown device 'no such'; available: "),
+        (["--device", f"{index}/1000"], "compute units, but 1000 are wanted"),
+    ):
+        ended = process([work, "heavy.yaml", "-o", "out_#.exr", *options], tmp_path)
+        assert ended.is_one_line(2, message)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["heavy.yaml"]
