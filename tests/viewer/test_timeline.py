@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, get_args
 
 import pytest
@@ -61,7 +62,7 @@ def rises(animation: Animation) -> bool:
     """Whether the keys of all tracks are in order, and valid as a whole."""
     Animation.model_validate(animation.model_dump())
     return all(
-        all(b - a > t.NEAR for a, b in zip(found, found[1:], strict=False))
+        all(b - a > t.NEAR for a, b in pairwise(found))
         for found in (times(animation, name) for name in animation.tracks)
     )
 
