@@ -10,6 +10,7 @@ from clfractal.errors import ClfractalError
 from clfractal.scene.animation import Animation
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import AnyCamera
 from clfractal.viewer import film_place
 from clfractal.viewer.editing import edited, replaced
 from clfractal.viewer.film_place import FilmPlace, Keyed
@@ -28,6 +29,7 @@ class InFilm:
         saved: the document as its file has it.
         place: the frame that is shown; None: the scene as it stands.
         auto_keys: whether a change of what a track moves sets a key at once.
+        recording: whether a flight is recorded: then changes are no steps of undo, and set no keys.
     """
 
     history: History
@@ -35,7 +37,7 @@ class InFilm:
     def __init__(self, scene: Scene) -> None:
         self.scene = self.saved = scene
         self.place: FilmPlace | None = None
-        self.auto_keys = False
+        self.auto_keys = self.recording = False
         self._moving_until = 0.0
         self._document: tuple[Scene, FilmPlace, Scene] | None = None
 
@@ -135,6 +137,12 @@ class InFilm:
         self.refresh()
         return True
 
+    def show_camera(self, camera: AnyCamera) -> None:
+        """Another camera at the frame that is shown, as no step of undo: a flight that is recorded goes on."""
+        self.scene = self.scene.model_copy(update={"camera": camera})
+        self._moving_until = time.perf_counter() + MOVING_SECONDS
+        self.refresh()
+
     def as_rendered(self, scene: Scene) -> Scene:
         """What is rendered of a scene that is edited here."""
         return film_place.rendered(scene, self.place.frame) if self.place is not None else scene
@@ -193,7 +201,7 @@ class InFilm:
         place = self.place
         if place is None or scene.animation is None:
             return scene, None
-        if not self.auto_keys:
+        if not self.auto_keys or self.recording:
             return scene, place
         try:
             found = film_place.keyed(scene, place, tracked_only=True)

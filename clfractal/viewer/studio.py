@@ -316,7 +316,8 @@ class Studio(InFilm):
 
     def _replace(self, scene: Scene, gesture: str | None) -> None:
         scene, place = self._auto_keyed(scene)
-        self.history.add(self.scene, scene, gesture, place.frame if place is not None else None)
+        if not self.recording:
+            self.history.add(self.scene, scene, gesture, place.frame if place is not None else None)
         self.scene, self.place = scene, place
         self._moving_until = time.perf_counter() + MOVING_SECONDS if gesture is not None else 0.0
         self.refresh()

@@ -164,7 +164,8 @@ def test_keys_are_moved_and_others_give_way() -> None:
     assert kept == {("camera.fov", 1), ("camera.fov", 2)}
     # Past another one, and not before the film's beginning.
     new, kept = t.shifted(film(0, 10, 20), frozenset({("camera.fov", 0)}), 15)
-    assert (times(new), values(new), kept) == ([10, 15, 20], [20, 10, 30], {("camera.fov", 1)})
+    assert (times(new), values(new)) == ([10, 15, 20], [20, 10, 30])
+    assert kept == {("camera.fov", 1)}
     new, _ = t.shifted(film(0, 10, 20), frozenset({("camera.fov", 1), ("camera.fov", 2)}), -40)
     assert (times(new), values(new)) == ([0, 10], [20, 30])
 
