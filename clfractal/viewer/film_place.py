@@ -168,7 +168,7 @@ def _parts(path: Path, old: Any, new: Any, names: Mapping[Path, str]) -> Iterato
 def _with_partners(
     found: dict[Path, tuple[Any, Any]], names: Mapping[Path, str], scene: Scene
 ) -> dict[Path, tuple[Any, Any]]:
-    """With the target of a camera whose place has changed, or the other way round: where it moves, too, or both begin to."""
+    """With the target of a camera whose place has changed, or the other way round: where it moves, or both begin to."""
     all_of_them = dict(found)
     for path in found:
         if path[-1] not in ("position", "target"):

@@ -14,7 +14,7 @@ from clfractal.scene.parts import AnyCamera
 from clfractal.viewer import film_place
 from clfractal.viewer.editing import edited, replaced
 from clfractal.viewer.film_place import FilmPlace, Keyed
-from clfractal.viewer.history import History
+from clfractal.viewer.history import History, Kind
 
 MOVING_SECONDS = 0.4
 """So long after a move more of it is expected."""
@@ -47,6 +47,14 @@ class InFilm:
 
     def tell(self, text: str, *, wrong: bool = False) -> None:
         """A line for the user; see `Studio`."""
+        raise NotImplementedError
+
+    def undo(self, kind: Kind = "scene") -> bool:
+        """Takes back a step; see `Studio`."""
+        raise NotImplementedError
+
+    def end_gesture(self) -> None:
+        """A drag has ended; see `Studio`."""
         raise NotImplementedError
 
     @property
@@ -169,6 +177,15 @@ class InFilm:
             return False
         self.history.add(before, after, gesture)
         return True
+
+    def end_drag(self) -> None:
+        """Ends a drag of keys: all frames are checked, and it is taken back if one of them is not possible."""
+        try:
+            check_scene(self.document)
+        except ClfractalError as error:
+            self.tell(str(error), wrong=True)
+            self.undo("scene")
+        self.end_gesture()
 
     def set_keys(self) -> Keyed | None:
         """Sets keys for all that was changed at the frame that is shown, as one step; None if that was not possible."""

@@ -40,6 +40,30 @@ class Player:
         """Whether a flight is recorded."""
         return self.studio.recording
 
+    def open_film(self) -> None:
+        """Shows the film's first frame, of a new film if there is none; or again the scene as it stands."""
+        self.stop()
+        if self.recording:
+            self._end_recording()
+        elif self.studio.frame_number is not None:
+            self.studio.go_to_frame(None)
+        elif self.film is None:
+            self.studio.set_animation(timeline.new_film())
+        else:
+            self.studio.go_to_frame(0.0)
+
+    def switch_repeat(self) -> None:
+        """Repeats the film while it plays, or plays it once."""
+        self.repeat = not self.repeat
+        self.studio.tell("the film is repeated" if self.repeat else "the film is played once")
+
+    def switch_auto_keys(self) -> None:
+        """Sets keys at once where the value of a track changes, or not."""
+        self.studio.auto_keys = not self.studio.auto_keys
+        self.studio.tell(
+            "changes of what moves set keys at once" if self.studio.auto_keys else "keys are set by hand"
+        )
+
     # Playing
 
     def play(self, now: float) -> None:

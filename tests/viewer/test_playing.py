@@ -119,7 +119,7 @@ def test_a_flight_becomes_few_keys_and_one_step_of_undo() -> None:
     studio = player.studio
     assert not player.recording
     found = keys(studio, "camera.position")
-    assert 2 <= len([each for each in found if 10 <= each <= 30]) <= 5
+    assert 2 <= len([each for each in found if 10 <= each <= 30]) <= 7
     assert set(found) - {10.0} >= {0.0, 40.0}
     # The film flies as it was flown.
     movement = movement_of(studio.document)
