@@ -23,6 +23,8 @@ NEAR = 1e-3
 FRAMES, FPS = 120, 30.0
 """Length and rate of a film that begins in the window."""
 _DIGITS = 9  # of seconds
+# Where the handles of a Bezier curve are that goes as the way before it: those of a straight one lie on it.
+_HANDLES = {**EASES, "linear": (0.3333, 0.3333, 0.6667, 0.6667)}
 
 
 def new_film(frames: int = FRAMES, fps: float = FPS) -> Animation:
@@ -227,7 +229,7 @@ def with_way(animation: Animation, selection: Selection, word: Interpolation | N
         before = key.interpolation or track.interpolation
         change: dict[str, Any] = {"interpolation": word, "handles": None}
         if (word or track.interpolation) == "bezier":
-            change["handles"] = key.handles or EASES.get(before, EASES["ease"])
+            change["handles"] = key.handles or _HANDLES.get(before, EASES["ease"])
         animation = _with_key_changed(animation, (name, index), change)
     return animation
 
@@ -257,7 +259,7 @@ def with_track(animation: Animation, name: str, changes: Mapping[str, Any]) -> A
     track = animation.tracks[name]
     word = changes.get("interpolation", track.interpolation)
     if word == "bezier" != track.interpolation:
-        ease = EASES.get(track.interpolation, EASES["ease"])
+        ease = _HANDLES.get(track.interpolation, EASES["ease"])
         keys = tuple(
             key.model_copy(update={"handles": ease})
             if key.interpolation is None and key.handles is None

@@ -137,9 +137,18 @@ def of(memory: MutableMapping[str, Any]) -> TimelineView:
 
 def step_of_marks(span: float, room: int) -> float:
     """The distance of a ruler's marks, frames: 1, 2 or 5 times a power of ten, so that at most `room` fit into a span."""
-    least = max(span / max(room, 1), 1.0)
+    return _round_step(max(span / max(room, 1), 1.0))
+
+
+def _round_step(least: float) -> float:
     power = 10.0 ** floor(log10(least))
     return next(power * each for each in (1, 2, 5, 10) if power * each >= least * (1 - 1e-9))
+
+
+def round_values(low: float, high: float, room: int) -> list[float]:
+    """Round values between two, at most so many and one more, for lines across."""
+    step = _round_step((high - low) / room)
+    return [step * number for number in range(ceil(low / step), floor(high / step) + 1)]
 
 
 def marks(first: float, last: float, step: float) -> list[float]:

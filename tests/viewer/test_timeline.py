@@ -228,10 +228,12 @@ def test_every_way_can_be_chosen_for_a_track(animation: Animation, first: Any, t
 
 
 def test_a_bezier_curve_begins_as_the_way_that_was_there() -> None:
-    linear = t.with_way(film(0, 10), frozenset({("camera.fov", 0)}), "linear")
-    assert t.key_of(
-        t.with_way(linear, frozenset({("camera.fov", 0)}), "bezier"), ("camera.fov", 0)
-    ).handles == (0, 0, 1, 1)
+    first = frozenset({("camera.fov", 0)})
+    straight = t.with_way(t.with_way(film(0, 10), first, "linear"), first, "bezier")
+    x1, y1, x2, y2 = t.key_of(straight, ("camera.fov", 0)).handles or (0, 1, 0, 1)
+    assert x1 == y1 < x2 == y2
+    eased = t.with_way(t.with_way(film(0, 10), first, "ease_in"), first, "bezier")
+    assert t.key_of(eased, ("camera.fov", 0)).handles == (0.42, 0, 1, 1)
 
 
 def test_numbers_and_handles_are_kept_in_their_ranges() -> None:

@@ -8,6 +8,7 @@ from clfractal.scene.animation import Animation
 from clfractal.viewer import timeline, timeline_view
 from clfractal.viewer.panels import theme, timeline_curves, timeline_inspector, timeline_rows
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.timeline_area import HEIGHT, LEFT, Area, left_of
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.playing import Player
@@ -17,6 +18,8 @@ _RULER = 21.0
 _INSPECTOR = 232.0
 # Panels narrower than this, points, have no inspector.
 _ROOM = 640.0
+# Below this, points, the less usual buttons are left to their keys.
+_ALL_BUTTONS = 480.0
 
 
 def draw(ui: Ui) -> None:
@@ -54,6 +57,7 @@ def draw(ui: Ui) -> None:
         timeline_curves.draw(ui, view, animation, area)
     else:
         timeline_rows.draw(ui, view, animation, area)
+    _playhead(ui, view, area, corner.y)
     imgui.end_child()
     _playhead(ui, view, area, corner.y)
     if inspected:
@@ -74,15 +78,18 @@ def _button(ui: Ui, action: str, icon: str, about: str, *, on: bool = False, ena
 def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, width: float) -> None:
     """The line at the top."""
     studio = ui.studio
-    _button(ui, "film_first", theme.FIRST, "To the first frame")
-    _button(ui, "key_back", theme.KEY_BACK, "To the key before")
+    wide = width >= _ALL_BUTTONS
+    if wide:
+        _button(ui, "film_first", theme.FIRST, "To the first frame")
+        _button(ui, "key_back", theme.KEY_BACK, "To the key before")
     _button(ui, "frame_back", theme.LEFT, "One frame back")
     running = player.playing
     _button(ui, "play", theme.PAUSE if running else theme.PLAY, "Stop" if running else "Play", on=running)
     _button(ui, "frame_forward", theme.RIGHT, "One frame on")
-    _button(ui, "key_forward", theme.KEY_NEXT, "To the key after")
-    _button(ui, "film_last", theme.LAST, "To the last frame")
-    _button(ui, "play_repeat", theme.REPEAT, "Repeat while playing", on=player.repeat)
+    if wide:
+        _button(ui, "key_forward", theme.KEY_NEXT, "To the key after")
+        _button(ui, "film_last", theme.LAST, "To the last frame")
+        _button(ui, "play_repeat", theme.REPEAT, "Repeat while playing", on=player.repeat)
     w.in_row(6)
     frame = studio.frame_number or 0.0
     change = w.number_box(
@@ -102,14 +109,16 @@ def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, w
     text = f"of {animation.count}   {timeline.clock(frame, animation.fps)}"
     if player.playing and ui.speed.frames and width > _ROOM:
         text += f"   {min(ui.speed.frames, animation.fps):.0f} of {animation.fps:g}/s"
-    imgui.text_colored(theme.vec(theme.DIM), text)
-    _right_buttons(ui, player, view, width)
+    buttons = max(width - 8 - 8 * (imgui.get_frame_height() + 2) - 12, 0.0)
+    shown = clipped(text, buttons - imgui.get_cursor_pos_x() - 6)
+    imgui.text_colored(theme.vec(theme.DIM), shown if shown == text else "")
+    _right_buttons(ui, player, view, buttons)
 
 
-def _right_buttons(ui: Ui, player: Player, view: TimelineView, width: float) -> None:
+def _right_buttons(ui: Ui, player: Player, view: TimelineView, left: float) -> None:
     studio = ui.studio
-    count, step = len(studio.changed()), imgui.get_frame_height() + 2
-    imgui.same_line(max(width - 8 - 8 * step - 12, 0))
+    count = len(studio.changed())
+    imgui.same_line(left)
     _button(ui, "record_flight", theme.RECORD, "Record a flight", on=player.recording)
     _button(
         ui, "auto_keys", theme.MAGIC, "Set keys at once where a track's value changes", on=studio.auto_keys
@@ -151,6 +160,8 @@ def _ruler(ui: Ui, player: Player, view: TimelineView, animation: Animation, are
             at = area.x(view, frame)
             draw.add_line(imgui.ImVec2(at, high.y - 6), imgui.ImVec2(at, high.y), theme.packed(theme.FAINT))
             number = f"{frame:g}"
+            if at + 16 > area.right:
+                continue
             draw.add_text(imgui.ImVec2(at + 3, low.y + 2), theme.packed(theme.TEXT), number)
             across = at + 6 + imgui.calc_text_size(number).x
             draw.add_text(

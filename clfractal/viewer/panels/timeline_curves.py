@@ -18,7 +18,7 @@ from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.timeline_view import TimelineView
 
 _REACH = 8.0
-_LINES = 4
+_LINES = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,8 @@ def draw(ui: Ui, view: TimelineView, animation: Animation, area: Area) -> None:
     curve = timeline_view.curve_of(ui.studio, name, view.first, view.last)
     keys = animation.tracks[name].keys or ()
     # While a key is dragged, the place of a value stays where it is.
-    bounds = view.held.get("bounds") or timeline_view.bounds_of(curve, [key.values for key in keys])
+    shown = [key.values for key in keys] + _handle_values(view, animation, name)
+    bounds = view.held.get("bounds") or timeline_view.bounds_of(curve, shown)
     top = imgui.get_window_pos().y
     frame = _Frame(top + 4, top + imgui.get_window_height() - 6, *bounds)
     _grid(area, frame)
@@ -74,8 +75,7 @@ def _grid(area: Area, frame: _Frame) -> None:
     low, high = imgui.ImVec2(area.left, frame.top - 3), imgui.ImVec2(area.right, frame.bottom + 3)
     draw.add_rect_filled(low, high, theme.packed(theme.HEADER, 0.6), 4.0)
     with theme.font(size=11.0):
-        for number in range(_LINES + 1):
-            value = frame.low + (frame.high - frame.low) * (number + 0.5) / (_LINES + 1)
+        for value in timeline_view.round_values(frame.low, frame.high, _LINES):
             y = frame.y(value)
             draw.add_line(imgui.ImVec2(area.left, y), imgui.ImVec2(area.right, y), theme.packed(theme.LINE))
             text = f"{value:.4g}".replace("-", "\u2212")
@@ -143,6 +143,16 @@ def _handles(
         )
         for number, share, way in ((1, x1, y1), (2, x2, y2))
     ]
+
+
+def _handle_values(view: TimelineView, animation: Animation, name: str) -> list[Values]:
+    """The values at which the handles of the chosen key are."""
+    unit = _Frame(0.0, 1.0, 1.0, 0.0)  # in which a value is its own place
+    found: list[Values] = []
+    for each, index in view.selection:
+        if each == name and index + 1 < len(animation.tracks[name].keys or ()):
+            found += [(grip.y,) for grip in _handles(view, animation, name, index, Area(0, 1, 0), unit)]
+    return found
 
 
 def _widest(key: Key, after: Key) -> int:

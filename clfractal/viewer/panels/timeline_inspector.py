@@ -91,7 +91,11 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
             return new
 
         _number(ui, view, f"{path}.time", given, width, scale, moved)
-    wide = w.columns(min(len(key.values), 3))
+    wide = _row(ui, "Value", path, Key, "value")
+    if wide is None:
+        return
+    if len(key.values) > 1:
+        wide = w.columns(min(len(key.values), 3))
     for component, number in enumerate(key.values):
         if component % 3:
             w.in_row(4)
@@ -103,6 +107,7 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
     _ways(ui, view)
     way = key.interpolation or animation.tracks[name].interpolation
     if way == "bezier" and key.handles is not None and index + 1 < len(animation.tracks[name].keys or ()):
+        _row(ui, "Handles", path, Key, "handles")
         wide = w.columns(4, 3)
         for place, number in enumerate(key.handles):
             if place:
@@ -208,7 +213,7 @@ def _track(ui: Ui, view: TimelineView, animation: Animation, name: str) -> None:
                     Scale(),
                     lambda old, number, key=key: timeline.with_track(old, name, {key: number}),
                 )
-    w.columns(1)
+    imgui.dummy(imgui.ImVec2(0, 1))
     if w.button("Remove track", icon=theme.TRASH, about="The value stays what the scene as it stands has"):
         view.selection = timeline.NONE
         view.change(ui.studio, lambda old: timeline.without_track(old, name))
@@ -273,7 +278,7 @@ def film_popup(ui: Ui, view: TimelineView) -> None:
         noise = w.segments("film.noise", {"new": "New", "fixed": "Fixed"}, animation.noise, width)
         if noise is not None:
             view.change(ui.studio, lambda old: old.model_copy(update={"noise": noise}))
-    w.columns(1)
+    imgui.dummy(imgui.ImVec2(0, 1))
     if w.button("Remove the film", icon=theme.TRASH, about="The scene as it stands is kept"):
         ui.studio.set_animation(None)
         imgui.close_current_popup()
