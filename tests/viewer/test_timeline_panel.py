@@ -24,7 +24,6 @@ from clfractal.viewer.panels import (
     timeline_rows,
 )
 from clfractal.viewer.panels import timeline as panel
-from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.playing import Player
 from tests.viewer.films import MOVING
 from tests.viewer.panel_clicks import Seen
@@ -65,7 +64,7 @@ class Film:
 
     @property
     def ruler(self) -> float:
-        return self.ui.size[1] - theme.MARGIN - timeline_area.HEIGHT + 7 + imgui.get_frame_height() + 14
+        return self.ui.size[1] - theme.MARGIN - timeline_area.HEIGHT + 21 + float(imgui.get_frame_height())
 
     def y(self, name: str) -> float:
         """The middle of a track's row."""
@@ -91,20 +90,16 @@ def test_it_is_there_while_a_film_is_shown() -> None:
     assert timeline_area.room_of(film.ui) == 0
 
 
-def test_other_panels_make_room() -> None:
+def test_other_panels_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
     film = Film()
     film.ui.show.add("history")
     top = film.ui.size[1] - theme.MARGIN - timeline_area.HEIGHT
     _, above, _, height = right_dock.place(film.ui, "history")
     assert above + height < top
-    boxes = []
-
-    def figures(ui: Ui) -> None:
-        overlay.draw(ui)
-        boxes.append(overlay.room_of(ui))
-
-    Stage(film.ui, figures, window=False)
-    assert boxes[-1] == timeline_area.HEIGHT + theme.MARGIN
+    calls: list[tuple[float, float]] = []
+    monkeypatch.setattr(overlay, "_state", lambda ui, left, bottom: calls.append((left, bottom)))
+    Stage(film.ui, overlay.draw, window=False)
+    assert calls[-1][1] < top
 
 
 def test_every_button_does_its_action(monkeypatch: pytest.MonkeyPatch) -> None:

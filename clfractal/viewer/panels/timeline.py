@@ -20,6 +20,7 @@ _INSPECTOR = 232.0
 _ROOM = 640.0
 # Below this, points, the less usual buttons are left to their keys.
 _ALL_BUTTONS = 480.0
+_FRAME_BOX = 400.0
 
 
 def draw(ui: Ui) -> None:
@@ -90,20 +91,9 @@ def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, w
         _button(ui, "key_forward", theme.KEY_NEXT, "To the key after")
         _button(ui, "film_last", theme.LAST, "To the last frame")
         _button(ui, "play_repeat", theme.REPEAT, "Repeat while playing", on=player.repeat)
-    w.in_row(6)
     frame = studio.frame_number or 0.0
-    change = w.number_box(
-        w.boxes(ui),
-        "timeline.frame",
-        frame,
-        54,
-        w.Scale(0, animation.count - 1, (0, animation.count - 1), whole=True),
-    )
-    w.tip("The frame that is shown")
-    if change.value is not None:
-        player.show(change.value, moving=change.dragging)
-    if change.ended:
-        studio.end_gesture()
+    if width >= _FRAME_BOX:
+        _frame_box(ui, player, animation, frame)
     w.in_row(5)
     imgui.align_text_to_frame_padding()
     text = f"of {animation.count}   {timeline.clock(frame, animation.fps)}"
@@ -113,6 +103,18 @@ def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, w
     shown = clipped(text, buttons - imgui.get_cursor_pos_x() - 6)
     imgui.text_colored(theme.vec(theme.DIM), shown if shown == text else "")
     _right_buttons(ui, player, view, buttons)
+
+
+def _frame_box(ui: Ui, player: Player, animation: Animation, frame: float) -> None:
+    w.in_row(6)
+    last = animation.count - 1
+    scale = w.Scale(0, last, (0, max(last, 1)), whole=frame == round(frame))
+    change = w.number_box(w.boxes(ui), "timeline.frame", frame, 54, scale)
+    w.tip("The frame that is shown")
+    if change.value is not None:
+        player.show(change.value, moving=change.dragging)
+    if change.ended:
+        ui.studio.end_gesture()
 
 
 def _right_buttons(ui: Ui, player: Player, view: TimelineView, left: float) -> None:
