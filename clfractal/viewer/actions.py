@@ -116,7 +116,7 @@ _TABLE: Mapping[str, tuple[tuple[str, str, str], ...]] = {
         ("fly", "J", "look around with the mouse while flying"),
     ),
     "Film": (
-        ("*timeline", "F10", "the film and its timeline; again: the scene as it stands"),
+        ("*timeline", "F10", "the film, or the scene as it stands"),
         ("play", "P", "play, stop"),
         ("play_repeat", "L", "repeat while playing, or play once"),
         ("frame_back", "Alt+,", "one frame back, on"),
@@ -126,7 +126,7 @@ _TABLE: Mapping[str, tuple[tuple[str, str, str], ...]] = {
         ("film_first", "Shift+Home", "to the first frame, the last"),
         ("film_last", "Shift+End", "to the first frame, the last"),
         ("set_keys", "Shift+K", "set keys for all that changed at this frame"),
-        ("auto_keys", "Ctrl+K", "set keys at once where a track's value changes, or not"),
+        ("auto_keys", "Ctrl+K", "set keys at once for what moves, or not"),
         ("delete_keys", "Delete", "delete the chosen keys"),
         ("record_flight", "Shift+J", "record a flight as keys of the camera; again: end"),
     ),
