@@ -10,6 +10,7 @@ from clfractal.errors import ClfractalError
 from clfractal.scene.animation import Animation
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.movement import movement_of
 from clfractal.scene.parts import AnyCamera
 from clfractal.viewer import film_place
 from clfractal.viewer.editing import edited, replaced
@@ -212,6 +213,14 @@ class InFilm:
         if self.place is None or self.scene is self.place.posed:
             return {}
         return film_place.changes(self.place.posed, self.scene)
+
+    def unkeyed(self) -> list[str]:
+        """The tracks whose values were changed at the frame that is shown, and have no key: another frame undoes it."""
+        changed = self.changed()
+        if not changed:
+            return []
+        targets = movement_of(self.scene).targets.items() if self.scene.animation is not None else ()
+        return [name for name, target in targets if any(target.path[: len(path)] == path for path in changed)]
 
     def _auto_keyed(self, scene: Scene) -> tuple[Scene, FilmPlace | None]:
         """An edited scene, with keys for what tracks move if they are to be set at once."""

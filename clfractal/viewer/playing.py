@@ -79,6 +79,7 @@ class Player:
             self.studio.tell("there is no film to play; a film begins in the timeline")
             return
         frame = self.studio.frame_number or 0.0
+        self._tell_unkeyed()
         self._since, self._from = now, 0.0 if frame >= film.count - 1 else frame
         self.playing = self.studio.go_to_frame(self._from, moving=True)
 
@@ -90,8 +91,18 @@ class Player:
 
     def show(self, frame: float, *, moving: bool = False) -> None:
         """Goes to a frame; a film that plays goes on from there."""
+        if frame != self.studio.frame_number and not self.playing:
+            self._tell_unkeyed()
         if self.studio.go_to_frame(frame, moving=moving or self.playing):
             self._from, self._since = self.studio.frame_number or 0.0, self._now
+
+    def _tell_unkeyed(self) -> None:
+        names = self.studio.unkeyed()
+        if names:
+            listed = ", ".join(names[:3]) + (" and others" if len(names) > 3 else "")
+            self.studio.tell(
+                f"without a key, {listed} went back to the film at frame {self.studio.frame_number:g}"
+            )
 
     _now = 0.0
 

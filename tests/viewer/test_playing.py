@@ -97,6 +97,18 @@ def test_setting_keys_begins_a_film() -> None:
     assert keys(player.studio, "camera.fov") == {0: 20}
 
 
+def test_what_stays_behind_is_told() -> None:
+    player = player_of()
+    player.studio.edit({"camera.fov": 33, "material.ambient": 0.4})
+    assert player.studio.unkeyed() == ["camera.fov"]
+    player.by(1)
+    assert "without a key, camera.fov went back" in player.studio.messages[-1].text
+    assert player.studio.scene.material.ambient == 0.4
+    count = len(player.studio.messages)
+    player.by(1)
+    assert len(player.studio.messages) == count
+
+
 # Recording
 
 
