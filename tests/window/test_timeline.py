@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +11,7 @@ from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.timeline_area import HEIGHT, LEFT
 from clfractal.work.frames import at_frame
 from tests.window.display import Display
-from tests.window.driver import Window
+from tests.window.driver import Window, wait_for
 from tests.window.film import film
 
 SIZE = (900, 640)
@@ -48,14 +46,17 @@ def test_a_film_is_scrubbed_and_played(display: Display, folder: Path) -> None:
         window.keys("shift+Home")
         assert np.array_equal(window.still()[picture], first[picture])
         window.keys("p")
-        seen = []
         for _ in range(4):
-            time.sleep(0.4)
-            seen.append(window.pixels()[picture].copy())
-        assert all((one != other).any() for one, other in pairwise(seen))
+            _changes(window, picture)
         window.keys("p")
         window.still()
         assert not window.title.endswith("*"), "looking at frames is no change"
+
+
+def _changes(window: Window, part: tuple[slice, slice]) -> None:
+    """Waits until a part of the window shows something else."""
+    before = window.pixels()[part].copy()
+    wait_for(lambda: (window.pixels()[part] != before).any(), "the next frame")
 
 
 def test_the_picture_of_a_frame_is_the_shells(display: Display, folder: Path) -> None:
