@@ -282,6 +282,31 @@ def test_numbers_of_a_key_are_typed() -> None:
     assert film.keys() == {0: 30, 15: 42}
 
 
+def test_the_films_settings_and_new_tracks_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    film = Film()
+    seen = Seen(monkeypatch)
+    seen.fresh(film.stage)
+    seen.click(film.stage, "timeline.film")
+    assert "Remove the film" in seen.fresh(film.stage)
+    seen.click(film.stage, "Remove the film")
+    assert film.ui.studio.scene.animation is None
+    assert film.ui.studio.undo("scene")
+    film.ui.studio.go_to_frame(12.0)
+    seen.fresh(film.stage)
+    places: dict[str, Any] = {}
+    plain = imgui.selectable
+
+    def selectable(text: str, *rest: Any) -> Any:
+        places[text] = imgui.get_cursor_screen_pos()
+        return plain(text, *rest)
+
+    monkeypatch.setattr(imgui, "selectable", selectable)
+    seen.click(film.stage, "timeline.add")
+    assert not places.keys() & set(ROWS), "what moves already is no choice"
+    film.stage.click(places["camera.target"].x + 20, places["camera.target"].y + 7)
+    assert film.keys("camera.target") == {12: (0, 0, 0)}
+
+
 def test_an_empty_film_tells_what_to_do() -> None:
     film = Film(STILL)
     film.ui.studio.set_animation(t.new_film())
