@@ -25,6 +25,7 @@ class Movement:
         assert scene.animation is not None
         self.animation: Animation = scene.animation
         self.targets = {name: _placed(name, target_of, scene, name) for name in self.animation.tracks}
+        self._original = scene
         self._scene = _with_live(scene, self.targets.values())
         self.movers = Movers(scene, self.animation, self.targets).made()
 
@@ -55,13 +56,33 @@ class Movement:
 
     def _made(self, frame: float, others: dict[tuple[str, ...], Any], animation: Animation | None) -> Scene:
         try:
-            values = self.values(frame)
-            by_path = {mover.target.path: values[mover.name] for mover in self.movers}
-            found = with_values(self._scene, {**by_path, **others}, animation=animation)
+            found = with_values(self._scene, {**self._by_path(frame), **others}, animation=animation)
             _ = found.chain
         except ClfractalError as error:
             raise self._blamed(error, frame) from error
         return found
+
+    def _by_path(self, frame: float) -> dict[tuple[str, ...], Any]:
+        values = self.values(frame)
+        return {mover.target.path: values[mover.name] for mover in self.movers}
+
+    def posed(self, frame: float) -> Scene:
+        """The scene with the values of a frame, to be edited there: all else is as it was, its animation too.
+
+        Raises:
+            SceneError: as for `scene`.
+        """
+        try:
+            found = with_values(self._original, self._by_path(frame))
+            _ = found.chain
+            return found
+        except ClfractalError as error:
+            raise self._blamed(error, frame) from error
+
+    def rendered(self, posed: Scene, frame: float) -> Scene:
+        """What is rendered of a scene that was posed, and perhaps edited; without edits and motion blur that is `scene`."""
+        found = _with_live(posed, self.targets.values())
+        return with_values(found, _seeds(found, int(frame))) if self.animation.noise == "new" else found
 
     def _blamed(self, error: ClfractalError, frame: float) -> ClfractalError:
         """The error at the track that is the reason, with the frame."""

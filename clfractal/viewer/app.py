@@ -28,6 +28,7 @@ from clfractal.viewer.panels import all_panels, theme
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.places import Places, places_of
+from clfractal.viewer.playing import Player
 from clfractal.viewer.recording import Event
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.speed import Meter
@@ -77,6 +78,7 @@ class Viewer:
         self.studio = Studio(scene, device, self.pacing, window.wake)
         self.motion = Motion(self.studio)
         self._set_motion(settings)
+        self.player = Player(self.studio)
         self.controls = Controls(self.studio, settings, self.motion)
         self.outputs = Outputs(self.window, self.events.append)
         self.studio.screens = self.outputs.shown_stereo
@@ -85,7 +87,7 @@ class Viewer:
         self.small = gl.SmallTextures()
         self.surface = self._new_surface()
         self.ui = Ui(self.studio, settings, settings.key_map, self.small, self.act)
-        self.ui.memory["controls"] = self.controls
+        self.ui.memory |= {"controls": self.controls, "player": self.player}
         self.deeds = Deeds(self)
         self.deeds.scene.first_stereo = self._screen
         self.inputs = Inputs(self, begun.recording)
@@ -102,6 +104,8 @@ class Viewer:
             if line:
                 self.studio.tell(line, wrong=True)
         self.files.attach(self)
+        if scene.animation is not None:
+            self.studio.go_to_frame(0.0)
         if not options.panels:
             self.ui.show.clear()
         self.outputs.begin(options)
@@ -150,6 +154,8 @@ class Viewer:
             self._redraw = _REDRAWN
         if self.motion.step(now, seconds, self.pads.gamepad(), self.pads.six()):
             self._redraw = _REDRAWN
+        if self.player.step(now):
+            self._redraw = max(self._redraw, 1)
         self._take_settings()
         self.controls.rest(now)
         self.files.tick(now)
@@ -333,7 +339,7 @@ class Viewer:
             return False
         controls = self.controls
         marked = controls.marking or controls.region_start is not None or "lights" in self.ui.show
-        return (controls.dragging or self.motion.active) and not marked
+        return (controls.dragging or self.motion.active or self.player.playing) and not marked
 
     def _build_panels(self, now: float) -> None:
         """Asks all panels what they show, and takes in what was done to them."""
@@ -417,6 +423,9 @@ class Viewer:
             wait = self._until_drawn(time.perf_counter())
             if wait <= 0:
                 return 0.0
+        frame = self.player.wait(time.perf_counter())
+        if frame is not None:
+            wait = min(wait, frame)
         due = self.inputs.next_due
         if due is not None:
             wait = min(wait, max(due - time.perf_counter(), 0.0))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from clfractal.device.select import choose, devices
 from clfractal.errors import ClfractalError
+from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
 from clfractal.viewer.scene_deeds import SceneDeeds
 
@@ -65,6 +66,7 @@ class Deeds:
         files = viewer.files
         self._deeds: dict[str, Callable[[], None]] = {
             **self.scene.deeds,
+            **self._film(),
             **{name: self._switch(part) for name, part in _PARTS.items()},
             "next_device": self._next_device,
             "full_screen": viewer.outputs.full_screen,
@@ -108,6 +110,24 @@ class Deeds:
         """All actions that can be done."""
         return set(self._deeds) | set(HELD)
 
+    def _film(self) -> dict[str, Callable[[], None]]:
+        viewer, player = self.viewer, self.viewer.player
+        return {
+            "timeline": player.open_film,
+            "play": lambda: player.play(viewer.now),
+            "play_repeat": player.switch_repeat,
+            "frame_back": lambda: player.by(-1),
+            "frame_forward": lambda: player.by(1),
+            "key_back": lambda: player.to_key(-1),
+            "key_forward": lambda: player.to_key(1),
+            "film_first": lambda: player.to_end(-1),
+            "film_last": lambda: player.to_end(1),
+            "set_keys": player.set_keys,
+            "auto_keys": player.switch_auto_keys,
+            "delete_keys": lambda: timeline_view.of(viewer.ui.memory).delete(viewer.studio),
+            "record_flight": lambda: player.record(viewer.now),
+        }
+
     def cancel(self) -> None:
         """Escape: ends what is under way, then closes what is open, then stops rendering."""
         viewer = self.viewer
@@ -115,6 +135,8 @@ class Deeds:
             self.fly()
         elif viewer.controls.cancel():
             return
+        elif viewer.player.playing or viewer.player.recording:
+            viewer.player.play(viewer.now)
         elif self.chart_shown:
             self.chart_shown = False
         elif viewer.ui.show & _CLOSED_BY_ESCAPE:

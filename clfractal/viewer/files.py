@@ -87,7 +87,7 @@ class Files:
         viewer.ui.memory["files"] = self
         if self.source.loaded is not None:
             viewer.studio.saved = self.source.loaded
-        self._kept = viewer.studio.scene
+        self._kept = viewer.studio.document
         self._title()
         if self.options.shot is None and self.options.play is None:
             self.recovered = self._autosave.found()
@@ -118,7 +118,7 @@ class Files:
         self.viewer.studio.open(scene)
         if saved is not None:
             self.viewer.studio.saved = saved
-        self._kept = scene
+        self._kept = self.viewer.studio.document
         # What has changed while it was read is told with the next look.
         self._watched = Watched(source.watched)
         self._stale = source.changed_on_disk if source.path is not None else False
@@ -142,7 +142,7 @@ class Files:
         self.reload_problem = ""
         studio = self.viewer.studio
         self.source = source
-        studio.set_scene(scene)  # a step that can be undone: nothing is lost
+        studio.set_document(scene)  # a step that can be undone: nothing is lost
         studio.saved = source.loaded or scene
         self._watched.follow(source.watched)
         studio.tell(f"loaded {source.path.name if source.path else 'the scene'} again")
@@ -165,7 +165,7 @@ class Files:
 
     def text(self) -> str:
         """The scene as YAML."""
-        return scene_text(self.source, self.viewer.studio.scene)
+        return scene_text(self.source, self.viewer.studio.document)
 
     @property
     def suggestion(self) -> Path:
@@ -193,10 +193,11 @@ class Files:
             FileError: it is protected, cannot be written, or has changed on the disk since it was read.
         """
         studio = self.viewer.studio
-        scene = studio.scene
+        scene = studio.document
         self.source = save_scene(self.source, scene, target, even_if_changed=even_if_changed)
         # In another folder maps and grids may have other names.
-        studio.scene = studio.saved = self._kept = self.source.loaded or scene
+        studio.keep(self.source.loaded or scene)
+        self._kept = studio.document
         self._watched.follow(self.source.watched)
         self._watched.accept()
         self._autosave.clear()
@@ -234,9 +235,10 @@ class Files:
         every = settings.autosave
         if every and now - self._autosaved >= every:
             self._autosaved = now
-            if studio.scene is not self._kept and studio.unsaved and not viewer.controls.dragging:
-                self._kept = studio.scene
-                self._autosave.write(self.source, studio.scene)
+            document = studio.document
+            if document is not self._kept and studio.unsaved and not viewer.controls.dragging:
+                self._kept = document
+                self._autosave.write(self.source, document)
         self._title()
         played = self.options.play is not None and viewer.inputs.played
         if played and self.options.shot is None and studio.session.idle:
@@ -299,7 +301,7 @@ class Files:
     def keep(self) -> None:
         """The window ends without being closed: what is unsaved is offered at the next start."""
         if self._viewer is not None and self.options.shot is None and self.viewer.studio.unsaved:
-            self._autosave.write(self.source, self.viewer.studio.scene)
+            self._autosave.write(self.source, self.viewer.studio.document)
             self._autosave.release()
 
     def close(self) -> None:

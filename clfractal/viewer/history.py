@@ -19,11 +19,16 @@ def kind_of(sections: Mapping[str, Any]) -> Kind:
 
 @dataclass(slots=True)
 class Step:
-    """Sections before and after an edit."""
+    """Sections before and after an edit.
+
+    Attributes:
+        frame: of the film at which it was made; None: of the scene as it stands.
+    """
 
     before: dict[str, Any]
     after: dict[str, Any]
     gesture: str | None
+    frame: float | None = None
 
 
 @dataclass(slots=True)
@@ -38,8 +43,13 @@ class History:
     def __init__(self) -> None:
         self._stacks: dict[Kind, _Stack] = {"camera": _Stack(), "scene": _Stack()}
 
-    def add(self, before: Scene, after: Scene, gesture: str | None = None) -> None:
-        """Remembers an edit. Edits of one gesture in a row (a drag) are one step; a new edit forgets what was undone."""
+    def add(
+        self, before: Scene, after: Scene, gesture: str | None = None, frame: float | None = None
+    ) -> None:
+        """Remembers an edit, made at a `frame` of the film if not of the scene as it stands.
+
+        Edits of one gesture in a row (a drag) at one frame are one step; a new edit forgets what was undone.
+        """
         changed = [name for name in Scene.model_fields if getattr(before, name) != getattr(after, name)]
         if not changed:
             return
@@ -48,11 +58,11 @@ class History:
         stack = self._stacks[kind_of(new)]
         stack.undone.clear()
         last = stack.done[-1] if stack.done else None
-        if gesture is not None and last is not None and last.gesture == gesture:
+        if gesture is not None and last is not None and (last.gesture, last.frame) == (gesture, frame):
             last.before = {**old, **last.before}
             last.after = {**last.after, **new}
             return
-        stack.done.append(Step(old, new, gesture))
+        stack.done.append(Step(old, new, gesture, frame))
         del stack.done[:-MOST_STEPS]
 
     def seal(self) -> None:
@@ -79,6 +89,12 @@ class History:
         step = stack.undone.pop()
         stack.done.append(step)
         return step.after
+
+    def next_step(self, kind: Kind, *, redo: bool = False) -> Step | None:
+        """The step that `undo` would take back next, or that `redo` would repeat."""
+        stack = self._stacks[kind]
+        steps = stack.undone if redo else stack.done
+        return steps[-1] if steps else None
 
     def steps(self, kind: Kind) -> tuple[list[Step], int]:
         """The steps of a stack, the oldest first, those that were undone last; and how many are done."""

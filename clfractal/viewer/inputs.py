@@ -32,6 +32,8 @@ _REPEATED = (
     "exposure_",
     "eyes_",
     "screen_",
+    "frame_back",
+    "frame_forward",
 )
 _RECORDED = ("key", "char", "button", "move", "scroll", "resize", "focus", "leave", "drop")
 

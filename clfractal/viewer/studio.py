@@ -20,7 +20,8 @@ from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
-from clfractal.viewer.editing import edited, replaced, value_at
+from clfractal.viewer.editing import edited, value_at
+from clfractal.viewer.filming import MOVING_SECONDS, InFilm
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.history import History, Kind
 from clfractal.viewer.live import with_live
@@ -48,7 +49,7 @@ class Message:
     time: float
 
 
-class Studio:
+class Studio(InFilm):
     """A scene that is looked at and edited.
 
     Args:
@@ -58,7 +59,10 @@ class Studio:
         woken: called from any thread when the window has something new to show.
 
     Attributes:
-        scene: as it is now; `image` is what files of it say, not the window's size.
+        scene: as it is now; `image` is what files of it say, not the window's size. While a frame of its film is shown
+            (`place`), it has the values of that frame; what is saved is `document`.
+        place: the frame that is shown; None: the scene as it stands.
+        auto_keys: whether a change of what a track moves sets a key at once.
         problems: dotted path -> what was wrong with the value that was last tried there.
         viewport: width and height of what the window shows, pixels.
         messages: lines for the user, the newest last.
@@ -66,8 +70,8 @@ class Studio:
     """
 
     def __init__(self, scene: Scene, device: Device, pacing: Pacing, woken: Callable[[], None]) -> None:
-        self.scene, self.pacing, self.woken = scene, pacing, woken
-        self.saved = scene
+        super().__init__(scene)
+        self.pacing, self.woken = pacing, woken
         self.history = History()
         self.problems: dict[str, str] = {}
         self.messages: list[Message] = []
@@ -79,7 +83,6 @@ class Studio:
         self._thumbnails: dict[Hashable, Thumbnail] = {}
         self._requested: Any = None
         self._live: tuple[str, ...] = ()
-        self._moving_until = 0.0
         self.session = Session(device, pacing, woken)
         self.session.start()
 
@@ -119,12 +122,14 @@ class Studio:
         self._replace(scene, gesture)
 
     def open(self, scene: Scene) -> None:
-        """Shows a scene that was loaded; its history begins anew."""
+        """Shows a scene that was loaded, a film's first frame if it moves; its history begins anew."""
         self.scene = self.saved = scene
+        self.place = None
         self.history = History()
         self.problems.clear()
         self.region = None
-        self.refresh()
+        if scene.animation is None or not self.go_to_frame(0.0):
+            self.refresh()
 
     def open_file(self, path: Path, overrides: tuple[str, ...] = ()) -> bool:
         """Loads a scene; on a mistake the present one stays, and a message tells what is wrong."""
@@ -148,17 +153,12 @@ class Studio:
         self.refresh()
 
     def undo(self, kind: Kind = "scene") -> bool:
-        """Takes back the last step of one stack; whether there was one."""
-        return self._restore(self.history.undo(kind), lambda: self.history.redo(kind))
+        """Takes back the last step of one stack, at the film's frame at which it was made; whether there was one."""
+        return self._restore(kind, redo=False)
 
     def redo(self, kind: Kind = "scene") -> bool:
         """Repeats the step that was taken back last."""
-        return self._restore(self.history.redo(kind), lambda: self.history.undo(kind))
-
-    @property
-    def unsaved(self) -> bool:
-        """Whether the scene differs from its file."""
-        return self.scene is not self.saved and self.scene != self.saved
+        return self._restore(kind, redo=True)
 
     # The picture
 
@@ -192,7 +192,8 @@ class Studio:
         """The scene as the window renders it: with an image of the viewport's size."""
         stereo = self.screens(self.scene.stereo)
         width, height = image_of(stereo, self.viewport)
-        return self.scene.model_copy(update={"image": Image(width=width, height=height), "stereo": stereo})
+        shown = {"image": Image(width=width, height=height), "stereo": stereo}
+        return self.as_rendered(self.scene).model_copy(update=shown)
 
     def resize(self, width: int, height: int) -> None:
         """The window has another size, pixels; nothing happens if it is the same."""
@@ -213,10 +214,7 @@ class Studio:
         ratio = image_of(stereo, self.viewport)[0] / image_of(stereo, before)[0]
         wide = float(f"{self.value('stereo.screen_width') * ratio:.6g}")
         with suppress(ClfractalError):
-            changed = edited(self.scene, {"stereo.screen_width": wide})
-            if self.saved is self.scene:
-                self.saved = changed
-            self.scene = changed
+            self.adjust({"stereo.screen_width": wide})
 
     def refresh(self, *, again: bool = False) -> None:
         """Asks for a picture of what is wanted now, unless it is there or under way already.
@@ -296,7 +294,7 @@ class Studio:
             samples: None: the scene's.
         """
         width, height = size if size is not None else image_of(self.scene.stereo, self.viewport)
-        scene = self.scene.model_copy(update={"image": Image(width=width, height=height)})
+        scene = self.as_rendered(self.scene).model_copy(update={"image": Image(width=width, height=height)})
         if samples is not None:
             scene = edited(scene, {"renderer.samples": samples})
         still = Still(scene, paths)
@@ -317,22 +315,28 @@ class Studio:
             still.finish_writing()
 
     def _replace(self, scene: Scene, gesture: str | None) -> None:
-        self.history.add(self.scene, scene, gesture)
-        self.scene = scene
-        self._moving_until = time.perf_counter() + 0.4 if gesture is not None else 0.0
+        scene, place = self._auto_keyed(scene)
+        if not self.recording:
+            self.history.add(self.scene, scene, gesture, place.frame if place is not None else None)
+        self.scene, self.place = scene, place
+        self._moving_until = time.perf_counter() + MOVING_SECONDS if gesture is not None else 0.0
         self.refresh()
 
-    def _restore(self, sections: dict[str, Any] | None, back: Callable[[], Any]) -> bool:
-        if sections is None:
+    def _restore(self, kind: Kind, *, redo: bool) -> bool:
+        step = self.history.next_step(kind, redo=redo)
+        if step is None:
             return False
+        sections = step.after if redo else step.before
         try:
-            changed = replaced(self.scene, sections)
+            self._put_back(sections, step.frame)
         except ClfractalError as error:
             # The other stack has moved on: a step of stereo does not fit an orthographic camera, for example.
-            back()
             self.tell(f"this step does not fit the present scene: {error}", wrong=True)
             return True
-        self.scene = changed
+        if redo:
+            self.history.redo(kind)
+        else:
+            self.history.undo(kind)
         self._moving_until = 0.0
         self.refresh()
         return True

@@ -46,7 +46,7 @@ def render_key(scene: Scene) -> Scene:
     """The scene without what only concerns showing and saving: pictures of scenes with equal keys have the same rays."""
     # (An exposure that has to be measured is measured with the picture.)
     exposure = scene.output.exposure if isinstance(scene.output.exposure, str) else 0.0
-    update: dict[str, object] = {"output": Output.model_validate({"exposure": exposure})}
+    update: dict[str, object] = {"output": Output.model_validate({"exposure": exposure}), "animation": None}
     if "bookmarks" in Scene.model_fields:
         update["bookmarks"] = {}
     if scene.stereo is not None:

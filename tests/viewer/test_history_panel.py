@@ -165,7 +165,7 @@ def test_every_button_does_its_action(seen: Seen) -> None:
     assert tuple(done) == menu.ACTIONS
     x = [place[0] for place in seen.places.values()]
     assert max(x) < ui.size[0] - 20
-    assert min(x) > ui.size[0] - 340
+    assert min(x) > ui.size[0] - 364
 
 
 def test_a_hidden_bar_draws_nothing(seen: Seen) -> None:

@@ -19,6 +19,7 @@ from clfractal.viewer.deeds import HELD, Deeds
 from clfractal.viewer.motion import TRANSITION_SECONDS, Motion
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.picking import Pick
+from clfractal.viewer.playing import Player
 from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
@@ -93,6 +94,7 @@ def test_every_action_is_done_by_something(desk: Desk) -> None:
         studio=desk.studio,
         controls=desk.controls,
         motion=desk.motion,
+        player=Player(desk.studio),
         settings=Settings(),
         aim=desk.aim,
         now=0.0,

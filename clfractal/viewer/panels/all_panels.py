@@ -13,6 +13,7 @@ from clfractal.viewer.panels import (
     right_dock,
     scene_dock,
     stills,
+    timeline,
     variations,
 )
 from clfractal.viewer.panels.ui import Ui
@@ -22,6 +23,7 @@ def draw(ui: Ui) -> None:
     """Draws the panels of one frame, between `imgui.new_frame` and `imgui.render`."""
     overlay.draw(ui)
     scene_dock.draw(ui)
+    timeline.draw(ui)
     menu.draw(ui)
     right_dock.fit(ui)
     variations.draw(ui)

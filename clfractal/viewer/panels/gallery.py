@@ -267,7 +267,9 @@ def _is_asked(ui: Ui) -> bool:
 def changed(ui: Ui) -> bool:
     """Whether opening another scene would lose more than a point of view."""
     studio = ui.studio
-    return studio.unsaved and studio.scene.model_copy(update={"camera": studio.saved.camera}) != studio.saved
+    return (
+        studio.unsaved and studio.document.model_copy(update={"camera": studio.saved.camera}) != studio.saved
+    )
 
 
 def _choose(ui: Ui, state: Gallery, entry: Entry) -> None:

@@ -83,7 +83,7 @@ def draw(ui: Ui) -> None:
 def _block(title: str, rows: list[Row], size: float) -> None:
     with theme.font("bold", size + 1):
         imgui.text_colored(theme.vec(theme.ACCENT), title)
-    with theme.font(size=size):
+    with theme.font(size=size), theme.measures(item_spacing=(6.0, 3.0)):
         keys_width = 138.0
         for keys, told in rows:
             start = imgui.get_cursor_pos()

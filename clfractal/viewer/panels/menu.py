@@ -38,6 +38,7 @@ _GROUPS = (
     (
         _Button("variations", theme.RANDOM, "Variations of the scene", "variations"),
         _Button("render_still", theme.CAMERA, "Render a still", "stills"),
+        _Button("timeline", theme.FILM, "Film and timeline"),
         _Button("next_stereo", theme.EYE, "Stereo: next mode"),
     ),
     (
@@ -105,6 +106,8 @@ def _button(ui: Ui, button: _Button) -> None:
         on = stereo is not None
         mode = stereo.mode.replace("_", " ") if stereo is not None else "off"
         about = f"{about} (now {mode}); right click: the previous one"
+    elif button.action == "timeline":
+        on = ui.studio.frame_number is not None
     elif button.action == "save" and ui.studio.unsaved:
         about = f"{about}: it has changed"
     elif button.action == "render_still":

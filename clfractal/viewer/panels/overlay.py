@@ -14,6 +14,7 @@ from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import zoom_box
 from clfractal.viewer.panels import stereo as stereo_panel
 from clfractal.viewer.panels import theme
+from clfractal.viewer.panels.timeline_area import room_of
 from clfractal.viewer.panels.ui import Ui
 
 Pair = tuple[str, str]
@@ -126,7 +127,7 @@ def number_text(number: float) -> str:
 def draw(ui: Ui) -> None:
     """Draws the figures at the lower rim, above them what takes long and what is wrong."""
     left = theme.MARGIN + (theme.DOCK_LEFT + theme.MARGIN if "panels" in ui.show else 0.0)
-    bottom = ui.size[1] - theme.MARGIN
+    bottom = ui.size[1] - theme.MARGIN - room_of(ui)
     if "overlay" in ui.show:
         bottom = _figures(ui, left, bottom)
     _state(ui, left, bottom)

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.viewer.panels import menu, theme
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.timeline_area import room_of
 from clfractal.viewer.panels.ui import Ui
 
 _PARTS = {"variations": (370.0, 2.0), "stills": (250.0, 0.7), "history": (230.0, 1.0)}
@@ -51,7 +52,8 @@ def place(ui: Ui, part: str) -> tuple[float, float, float, float]:
 def _span(ui: Ui) -> tuple[float, float]:
     """Where the column begins and ends, below the bar of buttons and above the overlay."""
     top = theme.MARGIN + (menu.HEIGHT + theme.MARGIN if "panels" in ui.show else 0.0)
-    return top, ui.size[1] - theme.MARGIN - (_OVERLAY if "overlay" in ui.show else 0.0)
+    overlay = _OVERLAY if "overlay" in ui.show else 0.0
+    return top, ui.size[1] - theme.MARGIN - overlay - room_of(ui)
 
 
 @contextmanager

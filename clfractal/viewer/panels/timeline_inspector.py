@@ -1,0 +1,332 @@
+"""The timeline's settings: of the chosen key and track, of the film, and the list of what can get a track."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, get_args
+
+from imgui_bundle import imgui
+
+from clfractal.scene.animation import EASES, MAX_FRAMES, Animation, Interpolation, Key, Track
+from clfractal.viewer import timeline
+from clfractal.viewer.film_place import movable, value_of
+from clfractal.viewer.panels import metadata, theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.number_box import Change, Scale
+from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.timeline import KeyAt
+from clfractal.viewer.timeline_view import TimelineView
+
+EDITED = {
+    Animation: frozenset({"fps", "frames", "duration", "loop", "noise", "shutter", "frame", "tracks"}),
+    Track: frozenset(
+        {
+            "keys",
+            "expression",
+            "file",
+            "column",
+            "factor",
+            "offset",
+            "interpolation",
+            "repeat",
+            "around_target",
+        }
+    ),
+    Key: frozenset({"frame", "time", "value", "interpolation", "handles"}),
+}
+"""The settings of films that the timeline edits."""
+
+WAYS: tuple[Interpolation, ...] = get_args(Interpolation)
+_AXES = ("x1", "y1", "x2", "y2")
+_LISTED = 14
+
+
+def draw(ui: Ui, view: TimelineView, animation: Animation) -> None:
+    """Draws what is chosen: a key, several, or a track."""
+    chosen = sorted(view.selection)
+    if len(chosen) == 1:
+        _key(ui, view, animation, chosen[0])
+    elif chosen:
+        w.group(ui, f"{len(chosen)} keys")
+        _ways(ui, view)
+    if view.track in animation.tracks:
+        _track(ui, view, animation, view.track)
+    elif not chosen:
+        w.hint(ui, "A click on a key or on a track's name shows its settings here.")
+
+
+def _number(
+    ui: Ui,
+    view: TimelineView,
+    name: str,
+    value: float,
+    width: float,
+    scale: Scale,
+    change: Callable[..., Animation],
+) -> None:
+    """A number box of the animation; `change(animation, number)` sets it."""
+    _apply(ui, view, w.number_box(w.boxes(ui), name, value, width, scale), change)
+
+
+def _row(ui: Ui, label: str, path: str, section: Any, key: str) -> float | None:
+    meta = metadata.metas(section)[key]
+    return w.row(ui, label, path=path, tip=meta.description)
+
+
+def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
+    name, index = at
+    key = timeline.key_of(animation, at)
+    w.group(ui, f"Key {index + 1} of {len(animation.tracks[name].keys or ())}")
+    path = f"animation.tracks.{name}.keys.{index}"
+    in_seconds = key.frame is None
+    width = _row(ui, "Time" if in_seconds else "Frame", path, Key, "time" if in_seconds else "frame")
+    if width is not None:
+        scale = Scale(0, MAX_FRAMES, step=0.02 if in_seconds else 0.2, unit=" s" if in_seconds else "")
+        given = key.time if in_seconds else key.frame
+        assert given is not None
+
+        def moved(old: Animation, number: float) -> Animation:
+            frame = number * old.fps if in_seconds else round(number, 3)
+            new, view.selection = timeline.moved(old, frozenset({at}), lambda _: frame)
+            return new
+
+        _number(ui, view, f"{path}.time", given, width, scale, moved)
+    wide = _row(ui, "Value", path, Key, "value")
+    if wide is None:
+        return
+    if len(key.values) > 1:
+        wide = w.columns(min(len(key.values), 3))
+    for component, number in enumerate(key.values):
+        if component % 3:
+            w.in_row(4)
+        mark = theme.AXES[component % 3] if len(key.values) > 1 else None
+        found = w.number_box(
+            w.boxes(ui), f"{path}.value.{component}", number, wide, Scale(step=None), mark=mark
+        )
+        _apply(ui, view, found, lambda old, new, at=at, n=component: timeline.with_number(old, at, n, new))  # type: ignore[misc]
+    _ways(ui, view)
+    way = key.interpolation or animation.tracks[name].interpolation
+    if way == "bezier" and key.handles is not None and index + 1 < len(animation.tracks[name].keys or ()):
+        _row(ui, "Handles", path, Key, "handles")
+        wide = w.columns(4, 3)
+        for place, number in enumerate(key.handles):
+            if place:
+                w.in_row(3)
+            found = w.number_box(w.boxes(ui), f"{path}.handles.{place}", number, wide, Scale(step=0.01))
+            w.tip(f"{_AXES[place]}: {metadata.metas(Key)['handles'].description}")
+            _apply(ui, view, found, lambda old, new, at=at, n=place: _handled(old, at, n, new))  # type: ignore[misc]
+
+
+def _handled(old: Animation, at: KeyAt, place: int, number: float) -> Animation:
+    handles = list(timeline.key_of(old, at).handles or EASES["ease"])
+    handles[place] = number
+    x1, y1, x2, y2 = handles
+    return timeline.with_handles(old, at, (x1, y1, x2, y2))
+
+
+def _apply(
+    ui: Ui, view: TimelineView, found: Change, change: Callable[[Animation, float], Animation]
+) -> None:
+    """Does what a number box returned; a drag is one step."""
+    new = found.value
+    if new is not None and found.dragging:
+        if view.before is None:
+            view.begin(ui.studio)
+        view.drag(ui.studio, lambda old: (change(old, new), view.selection))
+    elif new is not None:
+        view.change(ui.studio, lambda old: change(old, new))
+    if found.ended:
+        view.end(ui.studio)
+
+
+def _ways(ui: Ui, view: TimelineView) -> None:
+    """How the chosen keys go on to the next ones."""
+    animation = ui.studio.scene.animation
+    width = _row(ui, "To the next", "animation.tracks.keys.interpolation", Key, "interpolation")
+    if width is None or animation is None:
+        return
+    words = {timeline.key_of(animation, each).interpolation for each in view.selection}
+    names: dict[Any, str] = {"": "As the track", **{way: w.word(way) for way in WAYS}}
+    now: Any = words.pop() or "" if len(words) == 1 else "mixed"
+    found = w.choose("key.way", {**names, "mixed": "Several"} if now == "mixed" else names, now, width)
+    if found is not None and found != "mixed":
+        view.change(ui.studio, lambda old: timeline.with_way(old, view.selection, found or None))
+
+
+def way_menu(ui: Ui, view: TimelineView, name: str) -> None:
+    """The menu of the chosen keys: the way to the next key, deleting."""
+    if not imgui.begin_popup(name):
+        return
+    animation = ui.studio.scene.animation
+    chosen = timeline.still_there(animation, view.selection)
+    words = {timeline.key_of(animation, each).interpolation for each in chosen} if animation else set()
+    for way in (None, *WAYS):
+        text = "As the track" if way is None else w.word(way)
+        clicked, _ = imgui.menu_item(text, "", words == {way})
+        if clicked:
+            view.change(ui.studio, lambda old, way=way: timeline.with_way(old, chosen, way))  # type: ignore[misc]
+    imgui.separator()
+    if imgui.menu_item("Delete", ui.keys.hint("delete_keys") or "", False)[0]:
+        view.delete(ui.studio)
+    imgui.end_popup()
+
+
+def _track(ui: Ui, view: TimelineView, animation: Animation, name: str) -> None:
+    track, path = animation.tracks[name], f"animation.tracks.{name}"
+    w.group(ui, name if len(name) < 27 else f"…{name[-26:]}")
+
+    def put(**changes: Any) -> None:
+        view.change(ui.studio, lambda old: timeline.with_track(old, name, changes))
+
+    if track.keys is not None:
+        width = _row(ui, "Way", path, Track, "interpolation")
+        if width is not None:
+            way = w.choose("track.way", {each: w.word(each) for each in WAYS}, track.interpolation, width)
+            if way is not None:
+                put(interpolation=way)
+        width = _row(ui, "After the last", path, Track, "repeat")
+        if width is not None:
+            words = {"none": "Its value", "loop": "Loop", "ping_pong": "Ping-pong"}
+            after = w.choose("track.repeat", words, track.repeat, width)
+            if after is not None:
+                put(repeat=after)
+        if name.endswith("position"):
+            width = _row(ui, "Round target", path, Track, "around_target")
+            if width is not None:
+                ways = {"null": "Where smooth", "true": "Yes", "false": "No"}
+                now = {None: "null", True: "true", False: "false"}[track.around_target]
+                turns = w.choose("track.around", ways, now, width)
+                if turns is not None:
+                    put(around_target={"null": None, "true": True, "false": False}[turns])
+    for key in ("expression", "file", "column"):
+        _texts(ui, view, name, track, key)
+    if track.file is not None:
+        for key in ("factor", "offset"):
+            width = _row(ui, key.capitalize(), path, Track, key)
+            if width is not None:
+                _number(
+                    ui,
+                    view,
+                    f"{path}.{key}",
+                    getattr(track, key),
+                    width,
+                    Scale(),
+                    lambda old, number, key=key: timeline.with_track(old, name, {key: number}),
+                )
+    imgui.dummy(imgui.ImVec2(0, 1))
+    if w.button("Remove track", icon=theme.TRASH, about="The value stays what the scene as it stands has"):
+        view.selection = timeline.NONE
+        view.change(ui.studio, lambda old: timeline.without_track(old, name))
+
+
+def _texts(ui: Ui, view: TimelineView, name: str, track: Track, key: str) -> None:
+    """The texts of a track, one in a line."""
+    given = getattr(track, key)
+    if given is None:
+        return
+    several = given if isinstance(given, tuple) else (given,)
+    for number, text in enumerate(several):
+        width = _row(ui, key.capitalize(), f"animation.tracks.{name}", Track, key)
+        if width is None:
+            continue
+        new = w.text_box(ui, f"track.{name}.{key}.{number}", text, width)
+        if new:
+            whole = (*several[:number], new, *several[number + 1 :]) if isinstance(given, tuple) else new
+            view.change(ui.studio, lambda old, whole=whole: timeline.with_track(old, name, {key: whole}))  # type: ignore[misc]
+
+
+def film_popup(ui: Ui, view: TimelineView) -> None:
+    """Length, rate and what else concerns the whole film."""
+    animation = ui.studio.scene.animation
+    imgui.set_next_window_size(imgui.ImVec2(300, 0))
+    if not imgui.begin_popup("##timeline.film"):
+        return
+    assert animation is not None
+    w.group(ui, "Film")
+    keep = bool(ui.memory.setdefault("timeline.scale", False))
+    width = _row(ui, "Frames", "animation.frames", Animation, "frames")
+    if width is not None:
+        found = w.number_box(
+            w.boxes(ui), "film.frames", animation.count, width, Scale(1, MAX_FRAMES, whole=True, step=0.3)
+        )
+        _apply(ui, view, found, lambda old, new: timeline.with_frames(old, int(new), scale=keep))
+    width = _row(ui, "Duration", "animation.duration", Animation, "duration")
+    if width is not None:
+        seconds = animation.count / animation.fps
+        found = w.number_box(
+            w.boxes(ui), "film.seconds", seconds, width, Scale(0.001, 1e6, unit=" s", step=0.02)
+        )
+        _apply(ui, view, found, lambda old, new: timeline.with_frames(old, round(new * old.fps), scale=keep))
+    width = _row(ui, "Frames a second", "animation.fps", Animation, "fps")
+    if width is not None:
+        found = w.number_box(w.boxes(ui), "film.fps", animation.fps, width, Scale(0.01, 1000, step=0.2))
+        _apply(
+            ui, view, found, lambda old, new: timeline.with_rate(old, new, "seconds" if keep else "frames")
+        )
+    width = w.row(
+        ui,
+        "Keys move along",
+        tip="of another length: keys keep their part of the film; at another rate: their seconds. Else: their frames",
+    )
+    if width is not None and w.toggle("film.scale", keep):
+        ui.memory["timeline.scale"] = not keep
+    width = _row(ui, "Loop", "animation.loop", Animation, "loop")
+    if width is not None and w.toggle("film.loop", animation.loop):
+        view.change(ui.studio, lambda old: old.model_copy(update={"loop": not old.loop}))
+    width = _row(ui, "Noise", "animation.noise", Animation, "noise")
+    if width is not None:
+        noise = w.segments("film.noise", {"new": "New", "fixed": "Fixed"}, animation.noise, width)
+        if noise is not None:
+            view.change(ui.studio, lambda old: old.model_copy(update={"noise": noise}))
+    width = _row(ui, "Shutter", "animation.shutter", Animation, "shutter")
+    if width is not None:
+        found = w.number_box(w.boxes(ui), "film.shutter", animation.shutter, width, Scale(0, 1, step=0.01))
+        _apply(ui, view, found, lambda old, new: old.model_copy(update={"shutter": new}))
+    width = _row(ui, "Stills show this frame", "animation.frame", Animation, "frame")
+    place = ui.studio.place
+    if width is not None and w.toggle("film.still", animation.frame is not None):
+        still = place.frame if animation.frame is None and place is not None else None
+        view.change(ui.studio, lambda old: old.model_copy(update={"frame": still}))
+    imgui.dummy(imgui.ImVec2(0, 1))
+    if w.button("Remove the film", icon=theme.TRASH, about="The scene as it stands is kept"):
+        ui.studio.set_animation(None)
+        imgui.close_current_popup()
+    imgui.end_popup()
+
+
+def add_popup(ui: Ui, view: TimelineView) -> None:
+    """The values that can move and do not yet, with a line to search in them."""
+    imgui.set_next_window_size(imgui.ImVec2(290, 0))
+    if not imgui.begin_popup("##timeline.add"):
+        return
+    animation, scene = ui.studio.scene.animation, ui.studio.scene
+    assert animation is not None
+    wanted = w.search(ui, "timeline.search", "Find a value").strip().lower().split()
+    known = ui.memory.get("timeline.movable")
+    if known is None or known[0] is not scene:
+        known = ui.memory["timeline.movable"] = (scene, [".".join(path) for path in movable(scene)])
+    free = [
+        name
+        for name in known[1]
+        if not any(
+            name == each or name.startswith(f"{each}.") or each.startswith(f"{name}.")
+            for each in animation.tracks
+        )
+    ]
+    found = [
+        name
+        for name in free
+        if all(word in name.lower().replace("_", " ") or word in name for word in wanted)
+    ]
+    now = ui.studio.frame_number or 0.0
+    imgui.begin_child("##values", imgui.ImVec2(0, 20.0 * min(max(len(found), 1), _LISTED)))
+    for name in found:
+        if imgui.selectable(name, False)[0]:
+            value = value_of(scene, tuple(name.split(".")))
+            view.change(ui.studio, lambda old, n=name, v=value: timeline.with_key(old, n, now, v))  # type: ignore[misc]
+            view.track = name
+            imgui.close_current_popup()
+    if not found:
+        w.hint(ui, "Nothing of this name can move.")
+    imgui.end_child()
+    imgui.end_popup()

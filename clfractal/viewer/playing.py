@@ -1,0 +1,258 @@
+"""Plays a scene's film in the window, by the clock, and records flights into it."""
+
+from __future__ import annotations
+
+from clfractal.errors import ClfractalError
+from clfractal.scene.animation import MAX_FRAMES, Animation
+from clfractal.scene.parts import AnyCamera
+from clfractal.viewer import timeline
+from clfractal.viewer.studio import Studio
+from clfractal.viewer.thinning import Sample, flight
+
+_CAMERA = ("position", "target", "up")
+
+
+class Player:
+    """The film's clock.
+
+    Attributes:
+        playing: whether the film runs; frames for which there is no time are left out.
+        repeat: whether it begins again after its end.
+    """
+
+    def __init__(self, studio: Studio) -> None:
+        self.studio = studio
+        self.playing = False
+        self.repeat = True
+        self._since = 0.0
+        self._from = 0.0
+        self._samples: list[Sample] = []
+        self._first: AnyCamera | None = None
+        self._start = 0.0
+
+    @property
+    def film(self) -> Animation | None:
+        """The scene's animation."""
+        return self.studio.scene.animation
+
+    @property
+    def recording(self) -> bool:
+        """Whether a flight is recorded."""
+        return self.studio.recording
+
+    def open_film(self) -> None:
+        """Shows the film's first frame, of a new film if there is none; or again the scene as it stands."""
+        self.stop()
+        if self.recording:
+            self._end_recording()
+        elif self.studio.frame_number is not None:
+            self.studio.go_to_frame(None)
+        elif self.film is None:
+            self.studio.set_animation(timeline.new_film())
+        else:
+            self.studio.go_to_frame(0.0)
+
+    def switch_repeat(self) -> None:
+        """Repeats the film while it plays, or plays it once."""
+        self.repeat = not self.repeat
+        self.studio.tell("the film is repeated" if self.repeat else "the film is played once")
+
+    def switch_auto_keys(self) -> None:
+        """Sets keys at once where the value of a track changes, or not."""
+        self.studio.auto_keys = not self.studio.auto_keys
+        self.studio.tell(
+            "changes of what moves set keys at once" if self.studio.auto_keys else "keys are set by hand"
+        )
+
+    # Playing
+
+    def play(self, now: float) -> None:
+        """Plays from the frame that is shown, or from the beginning if that is the last one; or stops."""
+        if self.recording:
+            self.record(now)
+            return
+        if self.playing:
+            self.stop()
+            return
+        film = self.film
+        if film is None or film.count < 2:
+            self.studio.tell("there is no film to play; a film begins in the timeline")
+            return
+        frame = self.studio.frame_number or 0.0
+        self._tell_unkeyed()
+        self._since, self._from = now, 0.0 if frame >= film.count - 1 else frame
+        self.playing = self.studio.go_to_frame(self._from, moving=True)
+
+    def stop(self) -> None:
+        """Stops at the frame that is shown; its picture becomes whole."""
+        if self.playing:
+            self.playing = False
+            self.studio.end_gesture()
+
+    def show(self, frame: float, *, moving: bool = False) -> None:
+        """Goes to a frame; a film that plays goes on from there."""
+        if frame != self.studio.frame_number and not self.playing:
+            self._tell_unkeyed()
+        if self.studio.go_to_frame(frame, moving=moving or self.playing):
+            self._from, self._since = self.studio.frame_number or 0.0, self._now
+
+    def _tell_unkeyed(self) -> None:
+        names = self.studio.unkeyed()
+        if names:
+            listed = ", ".join(names[:3]) + (" and others" if len(names) > 3 else "")
+            self.studio.tell(
+                f"without a key, {listed} went back to the film at frame {self.studio.frame_number:g}"
+            )
+
+    _now = 0.0
+
+    def step(self, now: float) -> bool:
+        """Shows the frame whose time has come; whether anything changed. Called in every turn of the window's loop."""
+        self._now = now
+        film = self.film
+        if film is None or self.studio.frame_number is None:
+            if self.playing or self.recording:
+                self.playing = self.studio.recording = False
+                return True
+            return False
+        if self.recording:
+            return self._recorded(now, film)
+        if not self.playing:
+            return False
+        frame = int(self._from + (now - self._since) * film.fps + 1e-6)
+        if frame >= film.count:
+            if not (self.repeat or film.loop):
+                self.studio.go_to_frame(film.count - 1)
+                self.stop()
+                return True
+            frame %= film.count
+        if frame == self.studio.frame_number:
+            return False
+        if not self.studio.go_to_frame(frame, moving=True):
+            self.stop()
+        return True
+
+    def wait(self, now: float) -> float | None:
+        """Seconds until the next frame is due; None if nothing plays."""
+        if self.film is None or not (self.playing or (self.recording and self._samples)):
+            return None
+        passed = (now - self._since) * self.film.fps
+        return max((int(passed) + 1 - passed) / self.film.fps, 0.0)
+
+    # From frame to frame
+
+    def by(self, frames: int) -> None:
+        """Some frames on, or back; from the end to the beginning where the film repeats."""
+        film, now = self.film, self.studio.frame_number
+        if film is None:
+            return
+        self.stop()
+        frame = round(now or 0.0) + frames if now is not None else 0
+        if self.repeat:
+            frame %= film.count
+        self.show(frame)
+
+    def to_key(self, way: int) -> None:
+        """To the next frame with a key, or with -1 to the one before."""
+        film = self.film
+        if film is None:
+            return
+        self.stop()
+        frame = self.studio.frame_number or 0.0
+        found = timeline.key_after(film, frame) if way > 0 else timeline.key_before(film, frame)
+        if found is None:
+            self.studio.tell(f"there is no key {'after' if way > 0 else 'before'} this frame")
+        else:
+            self.show(found)
+
+    def to_end(self, way: int) -> None:
+        """To the last frame, or with -1 to the first."""
+        film = self.film
+        if film is not None:
+            self.stop()
+            self.show(film.count - 1 if way > 0 else 0)
+
+    # Keys
+
+    def set_keys(self) -> None:
+        """Sets keys for what was changed at this frame; tells what became of it."""
+        studio = self.studio
+        if studio.scene.animation is None and not studio.set_animation(timeline.new_film()):
+            return
+        if studio.frame_number is None:
+            studio.go_to_frame(0.0)
+        found = studio.set_keys()
+        if found is None:
+            return
+        for name in found.refused:
+            studio.tell(f"{name} follows an expression or a table, and takes no keys", wrong=True)
+        if found.keyed:
+            listed = ", ".join(found.keyed[:4]) + (" and others" if len(found.keyed) > 4 else "")
+            studio.tell(f"keys at frame {studio.frame_number:g}: {listed}")
+        elif not found.refused:
+            studio.tell("nothing was changed at this frame; + in the timeline adds a track")
+
+    # Recording
+
+    def record(self, now: float) -> None:
+        """Waits for the camera's first move, and records from then on; or ends the recording and makes it keys."""
+        studio = self.studio
+        if self.recording:
+            self._end_recording()
+            return
+        self.stop()
+        if studio.scene.animation is None and not studio.set_animation(timeline.new_film()):
+            return
+        if studio.frame_number is None and not studio.go_to_frame(0.0):
+            return
+        self._samples, self._first = [], studio.scene.camera
+        self._start = studio.frame_number or 0.0
+        studio.recording = True
+        studio.history.seal()
+        studio.tell("recording: begins with the first move")
+
+    def _recorded(self, now: float, film: Animation) -> bool:
+        studio = self.studio
+        camera = studio.scene.camera
+        if not self._samples:
+            if camera is self._first:
+                return False
+            self._since = now
+            self._samples.append(Sample.of(0.0, camera))
+            return True
+        passed = (now - self._since) * film.fps
+        if self._start + passed >= MAX_FRAMES - 1:
+            self._end_recording()
+            return True
+        if passed <= self._samples[-1].frame:
+            return False
+        self._samples.append(Sample.of(passed, camera))
+        frame = int(self._start + passed)
+        if frame == studio.frame_number or frame >= film.count:
+            return False  # beyond the film's end all else stands still
+        if studio.go_to_frame(frame, moving=True):
+            own = {name: getattr(camera, name) for name in _CAMERA}
+            studio.show_camera(studio.scene.camera.model_copy(update=own))
+        return True
+
+    def _end_recording(self) -> None:
+        studio, samples = self.studio, self._samples
+        studio.recording, self._samples = False, []
+        if len(samples) < 2 or samples[-1].frame < 1:
+            studio.end_gesture()
+            studio.tell("nothing was recorded")
+            return
+        # The camera's own steps of undo were the recording; as the film's they are one.
+        studio.go_to_frame(self._start)
+        try:
+            animation = flight(studio.scene, samples, self._start)
+        except ClfractalError as error:
+            studio.tell(str(error), wrong=True)
+            return
+        if studio.set_animation(animation):
+            count = sum(
+                1
+                for key in animation.tracks["camera.position"].keys or ()
+                if self._start <= animation.frame_of(key) <= self._start + samples[-1].frame + 1
+            )
+            studio.tell(f"recorded {samples[-1].frame / animation.fps:.1f} s of flight as {count} keys")

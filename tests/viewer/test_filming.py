@@ -1,0 +1,254 @@
+"""A scene that is edited at a frame of its film: what is shown, what is saved, keys, and undo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import clfractal
+from clfractal.scene.load import load_scene
+from clfractal.viewer import film_place, timeline
+from clfractal.viewer.navigation import dolly
+from clfractal.viewer.saving import save_scene
+from clfractal.viewer.sources import open_source
+from clfractal.viewer.studio import Studio
+from tests.viewer.films import MOVING
+from tests.viewer.panel_harness import make_ui
+
+STILL = MOVING.partition("animation:")[0]
+
+
+def studio_of(text: str = MOVING, frame: float | None = 0) -> Studio:
+    """A studio that renders nothing, at a frame."""
+    studio = make_ui(text)[0].studio
+    if frame is not None:
+        assert studio.go_to_frame(frame)
+    return studio
+
+
+def keys(studio: Studio, name: str) -> dict[float, Any]:
+    animation = studio.scene.animation
+    assert animation is not None
+    return {animation.frame_of(key): key.value for key in animation.tracks[name].keys or ()}
+
+
+# What is shown, and what is saved
+
+
+@pytest.mark.parametrize("frame", [0, 7, 10, 40])
+def test_a_frame_is_the_films(frame: int) -> None:
+    studio = studio_of(frame=frame)
+    shown, wanted = studio.shown_scene, clfractal.at_frame(load_scene(MOVING), frame)
+    assert shown.model_copy(update={"image": wanted.image}) == wanted
+    assert studio.value("camera.fov") == pytest.approx(30 * 2 ** min(frame / 10, 1))
+
+
+def test_looking_at_frames_changes_nothing() -> None:
+    studio = studio_of()
+    for frame in (3, 17.5, 40, 999):
+        assert studio.go_to_frame(frame, moving=True)
+    assert studio.frame_number == 40
+    assert not studio.unsaved
+    assert studio.document == load_scene(MOVING)
+    assert studio.history.depth("camera") == studio.history.depth("scene") == (0, 0)
+    assert studio.go_to_frame(None)
+    assert studio.scene == load_scene(MOVING)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.integers(0, 40), min_size=1, max_size=5))
+def test_what_no_track_moves_is_edited_at_any_frame(frames: list[int]) -> None:
+    studio = studio_of()
+    for number, frame in enumerate(frames):
+        studio.go_to_frame(frame)
+        assert studio.edit({"material.ambient": 0.1 + 0.01 * number})
+    assert studio.document == load_scene(MOVING, overrides=[f"material.ambient={0.1 + 0.01 * number}"])
+
+
+def test_a_scene_without_a_film_has_no_frames() -> None:
+    studio = studio_of(STILL, None)
+    assert not studio.go_to_frame(0)
+    assert studio.set_keys() is None
+
+
+def test_a_frame_that_cannot_be_is_told_and_left_out() -> None:
+    studio = studio_of(frame=5)
+    assert studio.scene.animation is not None
+    wrong = timeline.with_key(studio.scene.animation, "camera.fov", 20, 400.0)
+    before = studio.scene
+    assert not studio.set_animation(wrong)
+    assert studio.scene is before
+    assert studio.messages[-1].wrong
+    assert "camera.fov" in studio.messages[-1].text
+
+
+# Keys
+
+
+def test_keys_are_set_for_what_changed() -> None:
+    studio = studio_of(frame=20)
+    studio.set_camera(dolly(studio.scene.camera, 0.5))
+    studio.edit({"material.ambient": 0.5})
+    assert {".".join(path) for path in studio.changed()} == {"camera.position", "material.ambient"}
+    here = studio.scene.camera.position
+    found = studio.set_keys()
+    assert found is not None
+    assert set(found.keyed) == {"camera.position", "material.ambient"}
+    assert keys(studio, "camera.position")[20] == here
+    assert list(keys(studio, "camera.position")) == [0, 20, 40]
+    # What had no track moves from what it was.
+    assert keys(studio, "material.ambient") == {0: 0.1, 20: 0.5}
+    assert studio.changed() == {}
+    studio.go_to_frame(40)
+    studio.go_to_frame(20)
+    assert studio.scene.camera.position == pytest.approx(here)
+    # The scene as it stands is what it was, but for the value that was set without a track.
+    studio.go_to_frame(None)
+    assert studio.scene.camera == load_scene(MOVING).camera
+
+
+def test_setting_keys_is_one_step_of_undo() -> None:
+    studio = studio_of(frame=20)
+    studio.set_camera(dolly(studio.scene.camera, 0.5))
+    edited = studio.scene.camera
+    studio.set_keys()
+    keyed = studio.scene.animation
+    studio.go_to_frame(3)
+    assert studio.undo("scene")
+    assert (studio.frame_number, studio.document.animation) == (20, load_scene(MOVING).animation)
+    assert studio.redo("scene")
+    assert studio.scene.animation == keyed
+    assert studio.undo("scene")
+    # The move itself is a step of the camera's.
+    studio.go_to_frame(3)
+    assert studio.undo("camera")
+    assert studio.frame_number == 20
+    assert studio.redo("camera")
+    assert studio.scene.camera == edited
+    assert {".".join(path) for path in studio.changed()} == {"camera.position"}
+
+
+def test_an_expression_takes_no_keys() -> None:
+    studio = studio_of(frame=20)
+    studio.edit({"formula.parameters.power": 6.0})
+    found = studio.set_keys()
+    assert found is not None
+    assert (found.keyed, found.refused) == ((), ("formula.parameters.power",))
+    assert "power" not in studio.document.formula.parameters
+
+
+def test_a_camera_begins_to_fly_with_place_and_target() -> None:
+    studio = studio_of(STILL, None)
+    assert studio.set_animation(timeline.new_film(60))
+    assert studio.frame_number == 0
+    studio.go_to_frame(30)
+    studio.set_camera(dolly(studio.scene.camera, 0.5))
+    found = studio.set_keys()
+    assert found is not None
+    assert set(found.keyed) == {"camera.position", "camera.target"}
+    assert list(keys(studio, "camera.position")) == list(keys(studio, "camera.target")) == [0, 30]
+
+
+def test_numbers_with_tracks_of_their_own_get_their_own_keys() -> None:
+    studio = studio_of(
+        MOVING.replace(
+            "camera.position:  #", "camera.position.2: {keys: [{frame: 0, value: 1}]}\n    x: #"
+        ).partition("    x:")[0],
+        20,
+    )
+    studio.edit({"camera.position": [0.5, -3, 2]})
+    found = studio.set_keys()
+    assert found is not None
+    assert {"camera.position.0", "camera.position.2"} <= set(found.keyed)
+    assert keys(studio, "camera.position.2") == {0: 1, 20: 2}
+
+
+def test_keys_are_set_at_once_where_that_is_wanted() -> None:
+    studio = studio_of(frame=5)
+    studio.auto_keys = True
+    studio.edit({"camera.fov": 33}, gesture="fov")
+    studio.edit({"camera.fov": 35}, gesture="fov")
+    studio.end_gesture()
+    assert keys(studio, "camera.fov") == {0: 30, 5: 35, 10: 60}
+    # What no track moves is an edit as ever.
+    studio.edit({"material.ambient": 0.5})
+    assert "material.ambient" not in studio.document.animation.tracks  # type: ignore[union-attr]
+    assert studio.undo("scene")
+    assert studio.undo("scene")
+    assert studio.document == load_scene(MOVING)
+    assert not studio.undo("scene")
+
+
+def test_what_has_no_key_stays_behind() -> None:
+    studio = studio_of(frame=5)
+    studio.edit({"camera.fov": 33})
+    assert not studio.unsaved
+    studio.go_to_frame(6)
+    studio.go_to_frame(5)
+    assert studio.value("camera.fov") == pytest.approx(30 * 2**0.5)
+
+
+# Undo of the film
+
+
+def test_a_film_begins_and_ends() -> None:
+    studio = studio_of(STILL, None)
+    assert studio.set_animation(timeline.new_film())
+    assert studio.undo("scene")
+    assert (studio.frame_number, studio.scene.animation) == (None, None)
+    assert studio.redo("scene")
+    assert studio.frame_number == 0
+    assert studio.set_animation(None)
+    assert studio.frame_number is None
+
+
+def test_a_drag_of_a_key_is_one_step() -> None:
+    studio = studio_of(frame=8)
+    for step in range(1, 6):
+        animation = load_scene(MOVING).animation
+        assert animation is not None
+        new, _ = timeline.shifted(animation, frozenset({("camera.fov", 1)}), step)
+        assert studio.set_animation(new, gesture="keys")
+    studio.end_gesture()
+    assert keys(studio, "camera.fov") == {0: 30, 15: 60}
+    assert studio.value("camera.fov") == pytest.approx(30 * 2 ** (8 / 15))
+    assert studio.undo("scene")
+    assert studio.document == load_scene(MOVING)
+    assert studio.value("camera.fov") == pytest.approx(30 * 2**0.8)
+
+
+# Files
+
+
+def test_a_saved_film_keeps_its_text(tmp_path: Path) -> None:
+    path = tmp_path / "film.yaml"
+    path.write_text(MOVING)
+    source = open_source(path)
+    assert source.loaded is not None
+    studio = make_ui(source.loaded)[0].studio
+    studio.go_to_frame(20)
+    studio.set_camera(dolly(studio.scene.camera, 0.5))
+    studio.set_keys()
+    save_scene(source, studio.document, path)
+    text = path.read_text()
+    assert "# A film" in text
+    assert "# a quarter of the way round" in text
+    assert "camera: {position: [0, -3, 0.5], fov: 45}  # as it stands" in text
+    assert 'formula.parameters.power: {expression: "8 + sin(2*pi*u)"}' in text
+    assert load_scene(path).animation == studio.document.animation
+    assert "- {frame: 0, value: [0, -3, 0.5]}" in text
+
+
+def test_values_that_can_move_are_listed() -> None:
+    scene = load_scene(STILL)
+    found = {".".join(path): film_place.value_of(scene, path) for path in film_place.movable(scene)}
+    assert found["camera.position"] == (0, -3, 0.5)
+    assert found["formula.parameters.power"] == 8
+    assert found["lights.0.intensity"] == 1
+    assert "renderer.samples" not in found
+    assert "image.width" not in found
+    assert None not in found.values()
