@@ -167,6 +167,10 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     m->active &= ~done;
     march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
+#if !HAS_DERIVATIVE
+    // A lane that waits for others must not go on proving, or what it finds would depend on them.
+    m->proving &= m->active;
+#endif
 }
 
 // One step of the active lanes.

@@ -48,6 +48,10 @@ SCENES: dict[str, Scene] = {
     "hast": scene_of(
         {"name": "hast", "iterations": 20}, CAMERA, SIZE, lights=LIGHTS, renderer={"samples": 3}
     ),
+    # Rays end while a hit is being proved: what they would find later must not count if others of their packet go on.
+    "hast, few steps": scene_of(
+        {"name": "hast", "iterations": 20}, CAMERA, SIZE, lights=LIGHTS, renderer={"samples": 3, "max_steps": 14}
+    ),
 }
 
 
