@@ -13,7 +13,6 @@ gives an error where a program would crash. A driver that is built in another wa
 from __future__ import annotations
 
 import ctypes
-import os
 import struct
 import sys
 from collections.abc import Callable, Set
@@ -61,8 +60,9 @@ def name_processor(device: int) -> bytes | None:
 
         def read(address: int, size: int) -> bytes:
             try:
-                return os.pread(memory.fileno(), size, address)
-            except (OSError, OverflowError):
+                memory.seek(address)
+                return memory.read(size)
+            except (OSError, OverflowError, ValueError):
                 return b""
 
         name = nearest_known(processor_features())

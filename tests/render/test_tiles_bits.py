@@ -50,7 +50,11 @@ SCENES: dict[str, Scene] = {
     ),
     # Rays end while a hit is being proved: what they would find later must not count if others of their packet go on.
     "hast, few steps": scene_of(
-        {"name": "hast", "iterations": 20}, CAMERA, SIZE, lights=LIGHTS, renderer={"samples": 3, "max_steps": 14}
+        {"name": "hast", "iterations": 20},
+        CAMERA,
+        SIZE,
+        lights=LIGHTS,
+        renderer={"samples": 3, "max_steps": 14},
     ),
 }
 

@@ -18,6 +18,7 @@ from clfractal.files.fragments import same
 from clfractal.scene.checks import check_parts
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.movement import movement_of
 from clfractal.viewer.saving import SceneSource, open_source, scene_text
 from clfractal.viewer.sparse import without_defaults
 from tests.viewer.test_saving import SCENES, with_camera
@@ -125,6 +126,8 @@ def edited(draw: st.DrawFn, scene: Scene) -> Scene:
         try:
             found = Scene.model_validate(plain)
             check_parts(found)
+            if found.animation is not None:
+                movement_of(found).check(check_parts)
             scene = found
         except (ValidationError, ClfractalError):
             continue
