@@ -43,6 +43,20 @@ _SECTIONS = {
 }
 
 
+TABLE = "table "
+"""What the names of tables begin with, under which a scene keeps them."""
+
+
+def _is_data(name: str) -> bool:
+    """Whether what a scene keeps under a name are data that were read, rather than what can be found again."""
+    return name in _SECTIONS or name.startswith(TABLE)
+
+
+def _section_of(name: str) -> str:
+    """The section that names these data."""
+    return _SECTIONS.get(name, "animation")
+
+
 class Scene(Section):
     """A picture to be made: a formula, a camera, a renderer and everything else that determines the pixels."""
 
@@ -169,9 +183,16 @@ class Scene(Section):
         copied._read = {
             name: found
             for name, found in self._read.items()
-            if name in _SECTIONS and _SECTIONS[name] not in (update or ())
+            if _is_data(name) and _section_of(name) not in (update or ())
         }
         return copied
+
+    def __getstate__(self) -> dict[Any, Any]:
+        """A scene is sent with the data that were read for it, and without what follows from it."""
+        state = super().__getstate__()
+        private = dict(state["__pydantic_private__"] or {})
+        private["_read"] = {name: found for name, found in self._read.items() if _is_data(name)}
+        return {**state, "__pydantic_private__": private}
 
     def _context(self) -> dict[str, Any]:
         return {"folder": self._folder}
@@ -184,6 +205,10 @@ class Scene(Section):
             self.note_files(files)
         found: T = self._read[name]
         return found
+
+    def take_tables(self, other: Self) -> None:
+        """Keeps the tables of another scene with the same tracks, so that their files need not be there."""
+        self._read |= {name: found for name, found in other._read.items() if name.startswith(TABLE)}
 
     @property
     def chain(self) -> "Chain":

@@ -57,6 +57,8 @@ class Movement:
     def _made(self, frame: float, others: dict[tuple[str, ...], Any], animation: Animation | None) -> Scene:
         try:
             found = with_values(self._scene, {**self._by_path(frame), **others}, animation=animation)
+            if animation is not None:
+                found.take_tables(self._original)
             _ = found.chain
         except ClfractalError as error:
             raise self._blamed(error, frame) from error

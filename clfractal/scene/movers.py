@@ -24,7 +24,7 @@ from clfractal.scene.curves import (
     unit,
 )
 from clfractal.scene.flight import Around, Distance, EvenTarget
-from clfractal.scene.model import Scene
+from clfractal.scene.model import TABLE, Scene
 from clfractal.scene.tracks import Target, is_camera_place
 
 At: TypeAlias = Callable[[float], Values]
@@ -295,7 +295,9 @@ class Movers:
         where = Where(path=f"animation.tracks.{name}.file")
         path = safe_path(track.file, self.scene.folder, where)
         try:
-            table = read_columns(path, dict.fromkeys(titles), track.file)
+            table = self.scene.once(
+                f"{TABLE}{name}", lambda: read_columns(path, dict.fromkeys(titles), str(track.file))
+            )
         except FileError as error:
             raise FileError(error.inside(track.file), where) from error
         columns = [[track.offset + track.factor * number for number in table[title]] for title in titles]
