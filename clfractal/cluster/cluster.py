@@ -220,6 +220,8 @@ class Cluster:
                         raise answer
                     found: Answer = answer
                     return found
+                if self._dispatcher.error is not None:
+                    raise self._dispatcher.error
 
     def _count(self, answer: Answer) -> None:
         link = self._dispatcher.link

@@ -18,7 +18,7 @@ from uuid import uuid4
 from clfractal.cluster.link import Link, Lost, Tell
 from clfractal.cluster.message import Array, Message
 from clfractal.cluster.sizes import Pace
-from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError
+from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
 from clfractal.pictures.tiles import TILE
 from clfractal.work.job import Job
 from clfractal.work.run import WorkItem
@@ -152,7 +152,7 @@ class Dispatcher:
         """Returns when the scheduler is gone, or with an error when work waits for a worker for too long."""
         while not watching.done():
             await asyncio.wait([watching], timeout=0.25)
-            if link.serving or not self._waiting:
+            if link.serving or not (self._waiting or any(work.items for work in self._works)):
                 self._alone_since = time.monotonic()
                 continue
             reasons = list(link.refused.values())
@@ -171,7 +171,7 @@ class Dispatcher:
         while time.monotonic() < deadline:
             try:
                 self._use(await asyncio.wait_for(self._open(), max(deadline - time.monotonic(), 0.1)))
-            except (TimeoutError, OSError):
+            except Exception:  # whatever it is: the scheduler may be about to start
                 await asyncio.sleep(0.5)
                 continue
             self._tell(f"{self._place}: the scheduler is back")
@@ -374,7 +374,8 @@ class Dispatcher:
         if not isinstance(answer, tasks.Failure):
             return True
         error = answer.error()
-        if not isinstance(error, DeviceError):
+        broken = isinstance(error, KernelBuildError) and error.status == STATUS_DEVICE_FAILED
+        if not broken and not isinstance(error, DeviceError):
             raise error
         # A device that failed, or is too small, is left out; if it was the last one, that is what the user is told.
         link.leave_out(answer.worker, error.message)
@@ -403,7 +404,12 @@ class Dispatcher:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that it is large
             return link.client.submit(
-                tasks.kept, array, key=f"clfractal-kept-{digest}", priority=600_000, pure=False
+                tasks.kept,
+                array,
+                key=f"clfractal-kept-{digest}",
+                priority=600_000,
+                pure=False,
+                resources={tasks.RESOURCE: 1},  # only of workers that are fit
             )
 
 

@@ -162,13 +162,19 @@ class Link:
             if heard is None or heard.last_seen != about["last_seen"]:
                 self._heard[address] = Heard(about["last_seen"])
             elif now - heard.at > SILENT_SECONDS + len(workers) / 20:
-                await self._dismiss(address)
+                if (
+                    address in self.members or address in self._enlisting
+                ):  # others' workers are not ours to judge
+                    await self._dismiss(address)
                 continue
             known = self.members.keys() | self.refused.keys() | self._enlisting.keys()
             if address not in known and about.get("status", "running") == "running":
                 self._enlisting[address] = asyncio.create_task(self._enlist(address, about["name"]))
         for address in [address for address in self._heard if address not in workers]:
             del self._heard[address]
+            self.left_out.discard(address)  # another one may come to its place
+            if len(self.refused) > 1:
+                self.refused.pop(address, None)
 
     def _gone(self, address: str) -> None:
         task = self._enlisting.pop(address, None)

@@ -42,7 +42,7 @@ def _of_worker(order: Order) -> str | None:
     """The device of each worker."""
     named = order.device or ()
     given = (named,) if isinstance(named, str) else tuple(named)
-    if len(given) > 1 or given == ("all",):
+    if len(given) > 1 or given == ("all",) or any("+" in name for name in given):
         raise SceneError("must be one device, that of each worker, with --cluster", Where("--device"))
     return given[0] if given else None
 

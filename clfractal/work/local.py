@@ -34,6 +34,8 @@ _NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
 
 # Device memory for what samples of scenes of their own keep for the next one, unless a picture is made in passes.
 _KEPT_BETWEEN_SAMPLES = 256 << 20
+# Into so many parts the tiles of such a picture are cut, where several devices share them.
+_SHARES = 32
 # Device memory for passes that the user is told of before it is taken.
 _WORTH_TELLING = 1 << 28
 
@@ -125,6 +127,8 @@ class LocalExecutor:
         if not in_passes:  # what a sample leaves for the next one is kept only while these tiles are made
             each = self._drawing(item.view, view.at_sample(item.samples[0]), 1, token).kept_bytes(1)
             some = max(_KEPT_BETWEEN_SAMPLES // each, 1)
+        if self.supply is not None:  # others want some, too
+            some = min(some, max(len(item.tiles) // _SHARES, 1))
         while len(tiles := take(some)):
             places = _Places.of_all(view) if in_passes else _Places.of(tiles)
             for sample in range(*item.samples):

@@ -1,6 +1,6 @@
 """Executes a job: its work is cut into items, an executor renders them, and the tiles go into stores.
 
-An executor is whatever does work items: this process (`local.py`), and later the window, several devices, or a cluster.
+An executor is whatever does work items: this process (`local.py`), also for the window, several devices, or a cluster.
 """
 
 from __future__ import annotations

@@ -151,3 +151,33 @@ def test_a_grid_travels_along(folder: Path, farm: Farm) -> None:
     for each, wanted in zip(found, own, strict=True):
         assert wanted["A"].max() == 1
         assert all(np.array_equal(each[name], wanted[name], equal_nan=True) for name in wanted.channels)
+
+
+MOVING = """version: 1
+formula: {name: mandelbulb, iterations: 5}
+image: {width: 80, height: 48}
+camera: {position: [0, -3, 0.5], fov: 45}
+renderer: {samples: 4}
+animation:
+  frames: 3
+  shutter: 0.5
+  tracks:
+    camera.position: {keys: [{frame: 0, value: [-0.6, -3, 0.5]}, {frame: 2, value: [0.6, -2, 0.8]}]}
+    lights.0.intensity: {file: table.csv, column: loud}
+"""
+
+
+def test_motion_blur_and_a_table_travel_along(folder: Path, farm: Farm) -> None:
+    """Frames whose samples have scenes of their own; and a still of a scene that moves. No worker has the table."""
+    (folder / "moving.yaml").write_text(MOVING)
+    (folder / "table.csv").write_text("loud\n1\n2\n0.5\n")
+    own = [film for _, film in clfractal.frames(folder / "moving.yaml")]
+    scene = clfractal.load_scene(folder / "moving.yaml")
+    still = clfractal.render(scene)
+    (folder / "table.csv").unlink()
+    with clfractal.Cluster(farm.address) as cluster:
+        found = [film for _, film in clfractal.frames(scene, executor=cluster)]
+        far = clfractal.render(scene, executor=cluster)
+    for each, wanted in zip([*found, far], [*own, still], strict=True):
+        for name in wanted:
+            np.testing.assert_array_equal(each[name], wanted[name], name)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clfractal
 from clfractal.device import program
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, by_key, devices, is_simulator
@@ -269,3 +270,18 @@ def test_a_program_is_compiled_once_for_devices_of_one_kind(
         film = engine.render(scene, samples=1)
     assert len(film.stats["devices"]) == 2
     assert len(compiled) == len(set(compiled)) > 0
+
+
+def test_pictures_whose_samples_differ_are_shared(device: Device) -> None:
+    """With motion blur a device makes all samples of some tiles, and leaves others to the other one."""
+    tracks = {"lights.0.intensity": {"expression": "1 + frame"}}
+    moving = {"frames": 4, "shutter": 0.5, "tracks": tracks}
+    scene = clfractal.at_frame(load_scene(SCENE).model_copy(update={"animation": moving}), 1)
+    with Engine(device) as one:
+        alone = one.render(scene, samples=4)
+    with Engine(halves_of(device)) as both:
+        both.render(scene, samples=4)
+        film = both.render(scene, samples=4)
+    assert len(film.stats["devices"]) == 2
+    for name in alone:
+        np.testing.assert_array_equal(film[name], alone[name], name)
