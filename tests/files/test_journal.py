@@ -241,7 +241,7 @@ def test_full_disk_at_the_start_leaves_the_earlier_journal(tmp_path: Path) -> No
 
 
 WRITER = """
-import sys
+import sys, time
 from tests.files.test_journal import CHANNELS, COUNT, IDENTITY, content
 from clfractal.files.journal import Journal
 journal = Journal.resume(sys.argv[1], IDENTITY, CHANNELS, COUNT)
@@ -249,6 +249,7 @@ missing = [i for i in range(COUNT) if not journal.done[i]]
 print("ready", flush=True)
 for index in missing:
     journal.append(index, content(index))
+    time.sleep(1e-3)  # or it could be done before it is killed, on a busy machine
     if index % 2 == 0:
         print(index, flush=True)
 print("end", flush=True)
