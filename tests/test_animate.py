@@ -203,7 +203,7 @@ def test_arguments_of_python_are_checked() -> None:
         clfractal.frames(SCENE, numbers=[5])
     with pytest.raises(SceneError, match="numbers: must be a list of numbers of frames"):
         clfractal.frames(SCENE, numbers=3)  # type: ignore[arg-type]
-    with pytest.raises(SceneError, match="frame: must be at most 5, got 6"):
+    with pytest.raises(SceneError, match="frame: must be at most 4, got 6"):
         clfractal.at_frame(SCENE, 6)
     with pytest.raises(SceneError, match="animation: is missing"):
         clfractal.frames({"version": 1, "formula": {"name": "hast"}, "camera": {}})

@@ -8,6 +8,7 @@ it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -25,6 +26,8 @@ Floats = npt.NDArray[np.float64]
 
 MOST_SPANS = 64
 """Most straight pieces of a view's way."""
+# Pieces to begin with: an odd number, so that a vibration is not met at its nodes alone.
+_FIRST_SPANS = 3
 # How far from its place, in pixels, what a view shows may be where the view is mixed of two poses.
 _STRAYING = 0.1
 # A view that moves less, in pixels, stands still.
@@ -72,7 +75,10 @@ class Shutter:
 
     def poses(self, start: float, end: float) -> tuple[View, ...]:
         """The view at equal steps of time, frames, so near to each other that it may be mixed between two of them."""
-        found = [self._pose(start), self._pose(end)]
+        # Just before its end: a cut there belongs to the next frame.
+        end = math.nextafter(end, start)
+        first = [start + place / _FIRST_SPANS * (end - start) for place in range(_FIRST_SPANS)]
+        found = [self._pose(time) for time in (*first, end)]
         while True:
             spans = len(found) - 1
             step = (end - start) / spans
@@ -159,7 +165,8 @@ def _is_view(scene: Scene, target: Target) -> bool:
     if path[0] == "layout":
         return path[3:4] == ("camera",)
     flat = isinstance(scene.renderer, CutPlaneRenderer) and path[:2] == ("renderer", "plane")
-    return path[0] in ("camera", "stereo") or flat
+    # (No kernel knows the exposure: it is for the picture that was made.)
+    return path[0] in ("camera", "stereo", "output") or flat
 
 
 def _apart(pose: _Pose, points: Floats) -> float:

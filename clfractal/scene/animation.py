@@ -219,4 +219,6 @@ class Animation(Section):
         if key.frame is not None:
             return key.frame
         assert key.time is not None
-        return key.time * self.fps
+        found = key.time * self.fps
+        # Seconds are rounded: a cut at 0.28 s is at frame 7 of 25 a second.
+        return float(round(found)) if abs(found - round(found)) < 1e-6 else found

@@ -251,7 +251,14 @@ class Movers:
         for part in path:
             camera = camera[int(part)] if isinstance(camera, tuple) else getattr(camera, part)
         target: Values = camera.target
-        return lambda frame: target
+        parts = {
+            index: self._mover(self.names[each]).at
+            for index in range(3)
+            if (each := (*path, "target", str(index))) in self.names
+        }
+        return lambda frame: tuple(
+            parts[index](frame)[0] if index in parts else number for index, number in enumerate(target)
+        )
 
     def _even_target(self, place: str, seen: str) -> Curve | None:
         """The target of a flight, if its keys are at the same times as those of the camera; None otherwise."""

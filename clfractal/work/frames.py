@@ -32,7 +32,8 @@ def at_frame(scene: Scene | str | Path | Mapping[str, Any], frame: float) -> Sce
     """
     found = as_scene(scene)
     movement = movement_of(found)
-    number = arguments.number("frame", frame, 0, movement.animation.count)
+    last = movement.animation.count - (not movement.animation.loop)
+    number = arguments.number("frame", frame, 0, last)
     return movement.scene(number)
 
 

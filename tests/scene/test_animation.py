@@ -410,3 +410,25 @@ def test_any_keys_make_a_film(numbers: list[float], word: str, repeat: str, loop
     slack = 1e-9 * max(abs(low), abs(high))
     assert all(low - slack <= value <= high + slack for value in found)
     assert found[0] == numbers[0]
+
+
+def test_a_cut_in_seconds_is_at_its_frame() -> None:
+    """0.28 * 25 is a little more than 7 for a computer."""
+    cut = {"keys": [{"time": 0, "value": 45}, {"time": 0.28, "value": 20}], "interpolation": "hold"}
+    assert values(moving({"camera.fov": cut}, fps=25), "camera.fov")[6:9] == [45, 20, 20]
+
+
+def test_a_flight_follows_single_numbers_of_its_target() -> None:
+    """Wherever one begins: the film, or a frame that keeps its animation."""
+    tracks = {
+        "camera.position": keys((0, [0, -3, 0.5]), (20, [2, -2, 1])),
+        "camera.target.0": {"expression": "u"},
+    }
+    scene = moving(tracks, shutter=0.5)
+    frame = clfractal.at_frame(scene, 5)
+    assert movement_of(frame).instant(5).camera.position == pytest.approx(frame.camera.position, abs=1e-12)
+    away = [
+        math.dist(at.camera.position, at.camera.target)
+        for at in (movement_of(scene).scene(f) for f in (0, 20))
+    ]
+    assert away == pytest.approx([math.dist((0, -3, 0.5), (0, 0, 0)), math.dist((2, -2, 1), (1, 0, 0))])
