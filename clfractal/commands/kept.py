@@ -75,11 +75,12 @@ class Kept:
 
     def begin(self) -> None:
         """Removes frames of earlier work, unless it is continued: when nothing in the order can be wrong any more."""
-        files = [] if self._folder is None or self._resume else self._files()
-        if files:
+        files = [] if self._folder is None else self._files()
+        if files and not self._resume:
             self._shell.say(f"{self._folder}: earlier work is discarded; --resume would have continued it")
         for file in files:
-            file.unlink()
+            if not self._resume or file.name.startswith("."):  # what a kill has left of a frame in work
+                file.unlink()
 
     def write(self, pictures: Sequence[Path]) -> None:
         """Makes the films of the kept pictures, which are removed when all films are whole.

@@ -112,7 +112,9 @@ def slice_scene(scene: Scene, stack: Stack, number: int) -> Scene:
         raise SceneError(
             f"puts slice {number} outside the range of coordinates", Where("--spacing")
         ) from error
-    return scene.model_copy(update={"renderer": scene.renderer.model_copy(update={"plane": plane})})
+    renderer = scene.renderer.model_copy(update={"plane": plane})
+    # A picture of its own: tracks would put the plane back.
+    return scene.model_copy(update={"renderer": renderer, "animation": None})
 
 
 def _check(stack: Stack) -> None:

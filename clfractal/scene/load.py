@@ -51,6 +51,7 @@ def load_scene(
     *,
     overrides: Sequence[str] = (),
     folder: str | Path | None = None,
+    posed: bool = True,
 ) -> Scene:
     """Reads and checks a scene and its formula.
 
@@ -60,6 +61,7 @@ def load_scene(
         overrides: `camera.fov=30`: a dotted key and a YAML value that replaces the file's.
         folder: where the files that the scene names are looked for; by default the scene file's folder,
             or the current one.
+        posed: whether a scene with `animation.frame` gets the values of that frame; else it is as it was written.
 
     Raises:
         SceneError, FormulaError: something in the text is wrong.
@@ -73,7 +75,7 @@ def load_scene(
         scene.note_files((*text.files, *files))
         with _located(document):
             check_scene(scene)
-            scene = _at_own_frame(scene)
+            scene = _at_own_frame(scene) if posed else scene
     scene.note_files(files)
     return scene
 

@@ -226,7 +226,9 @@ class Movers:
         """The place of a camera: its way from the target, by the clock of its own track, from where the target is then."""
         target_at = self._seen(place)
         times, places, closed = self._keys(place)
-        targets = [target_at(time) for time in times]
+        # A key that closes a loop lies beyond the film: its target is that of the first.
+        count = self.animation.count
+        targets = [target_at(time % count if self.animation.loop else time) for time in times]
         for index, (time, at, target) in enumerate(zip(times, places, targets, strict=True)):
             if not all(map(isfinite, target)):
                 raise self._wrong(

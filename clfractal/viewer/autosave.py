@@ -147,7 +147,7 @@ class Recovered:
             SceneError, FormulaError, FileError: a file that it names is gone or has changed.
         """
         shown = self.path.name if self.path is not None else "scene"
-        return load_scene(SceneText(read_document(self.text, shown), self.folder))
+        return load_scene(SceneText(read_document(self.text, shown), self.folder), posed=False)
 
     def source(self) -> SceneSource:
         """Where the scene came from, to be saved there; if that cannot be read any more, the text itself."""

@@ -76,7 +76,11 @@ class Files:
         self.source = open_source(path)
         self._watched = Watched(self.source.watched)
         loaded = self.source.loaded
-        scene = loaded if loaded is not None and not overrides else load_scene(path, overrides=overrides)
+        scene = (
+            loaded
+            if loaded is not None and not overrides
+            else load_scene(path, overrides=overrides, posed=False)
+        )
         if options.stereo is not None:
             scene = _with_stereo(scene, options.stereo)
         return scene
@@ -108,7 +112,7 @@ class Files:
             self.viewer.ui.show.add("replace")
             return
         source = open_source(path)
-        scene = source.loaded or load_scene(path)
+        scene = source.loaded or load_scene(path, posed=False)
         self.take(source, scene, saved=scene)
         self.viewer.studio.tell(f"opened {path.name}")
 
@@ -134,7 +138,7 @@ class Files:
         self._watched.accept()
         try:
             source = open_source(self.source.path)
-            scene = source.loaded or load_scene(self.source.path)
+            scene = source.loaded or load_scene(self.source.path, posed=False)
         except ClfractalError as error:
             self.reload_problem = str(error)
             self.viewer.studio.tell(str(error), wrong=True)

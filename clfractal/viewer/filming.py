@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,7 +22,7 @@ MOVING_SECONDS = 0.4
 """So long after a move more of it is expected."""
 
 
-class InFilm:
+class InFilm(ABC):
     """The part of a studio that knows films.
 
     Attributes:
@@ -42,21 +43,21 @@ class InFilm:
         self._moving_until = 0.0
         self._document: tuple[Scene, FilmPlace, Scene] | None = None
 
+    @abstractmethod
     def refresh(self, *, again: bool = False) -> None:
         """Asks for a picture; see `Studio`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def tell(self, text: str, *, wrong: bool = False) -> None:
         """A line for the user; see `Studio`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def undo(self, kind: Kind = "scene") -> bool:
         """Takes back a step; see `Studio`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def end_gesture(self) -> None:
         """A drag has ended; see `Studio`."""
-        raise NotImplementedError
 
     @property
     def document(self) -> Scene:

@@ -81,7 +81,7 @@ def open_source(path: str | Path) -> SceneSource:
     found = Path(path)
     with noting() as files:
         text = read_text(found)
-    loaded = load_scene(SceneText(read_document(text, str(path)), found.parent, tuple(files)))
+    loaded = load_scene(SceneText(read_document(text, str(path)), found.parent, tuple(files)), posed=False)
     kind: Kind = "picture" if is_picture(found) else "shipped" if is_own(found) else "scene"
     return SceneSource(kind, found, text, loaded)
 

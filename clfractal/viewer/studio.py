@@ -134,7 +134,7 @@ class Studio(InFilm):
     def open_file(self, path: Path, overrides: tuple[str, ...] = ()) -> bool:
         """Loads a scene; on a mistake the present one stays, and a message tells what is wrong."""
         try:
-            scene = load_scene(path, overrides=overrides)
+            scene = load_scene(path, overrides=overrides, posed=False)
         except ClfractalError as error:
             self.tell(str(error), wrong=True)
             return False

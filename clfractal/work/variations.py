@@ -122,6 +122,9 @@ def candidates(
     if not isinstance(scene, Scene):
         arguments.refuse("scene", "must be a Scene", arguments.plain(scene))
     arguments.word("strength", strength, STRENGTHS)
+    if scene.animation is not None and scene.animation.frame is not None:
+        # Of that frame as it is: tracks would take back what is varied.
+        scene = scene.model_copy(update={"animation": None})
     seed = arguments.whole("seed", seed, -(2**63), 2**63 - 1)
     for kind in arguments.words("kinds", kinds):
         if kind not in KINDS:

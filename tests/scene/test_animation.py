@@ -432,3 +432,28 @@ def test_a_flight_follows_single_numbers_of_its_target() -> None:
         for at in (movement_of(scene).scene(f) for f in (0, 20))
     ]
     assert away == pytest.approx([math.dist((0, -3, 0.5), (0, 0, 0)), math.dist((2, -2, 1), (1, 0, 0))])
+
+
+def test_a_scene_with_a_frame_can_be_read_as_it_was_written() -> None:
+    tracks = {"camera.fov": keys((0, 40), (20, 20), interpolation="linear")}
+    text = dump_scene(moving(tracks, base={"camera": {"position": [0, -3, 0], "fov": 45}}))
+    override = ["animation.frame=10"]
+    assert load_scene(text, overrides=override).camera.fov == pytest.approx(math.sqrt(40 * 20))  # type: ignore[union-attr]
+    assert load_scene(text, overrides=override, posed=False).camera.fov == 45  # type: ignore[union-attr]
+
+
+def test_variations_of_a_frame_stay_as_they_were_varied() -> None:
+    scene = moving({"camera.fov": keys((0, 40), (20, 20))}, frame=10)
+    (found,) = clfractal.variations(scene, count=1, seed=3)
+    assert load_scene(dump_scene(found.scene)) == found.scene
+
+
+def test_a_looped_flight_goes_on_whatever_its_target_does() -> None:
+    """The target has a seam of its own at the film's end, and nowhere else."""
+    tracks = {
+        "camera.position": keys((10, [0, -3, 0.5]), (60, [2, -2, 1])),
+        "camera.target": {"expression": ["frame/100", "0", "0"]},
+    }
+    found = movement_of(moving(tracks, frames=120, loop=True))
+    before, after = (found.values(frame)["camera.position"] for frame in (9.999, 10.001))
+    assert before == pytest.approx(after, abs=1e-3)
