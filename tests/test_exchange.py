@@ -350,14 +350,14 @@ def test_an_interrupt_leaves_nothing(name: str, tmp_path: Path) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         (tmp_path / "ball.yaml").write_text(BALL)
-        side = "600" if name.endswith("nrrd") else "400"
+        side = "600" if name.endswith("nrrd") else "700"
         run = command(
             "voxelize" if name.endswith("nrrd") else "mesh", "ball.yaml", "-o", name, "--resolution", side
         )
         running = subprocess.Popen(run, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True)
         assert running.stderr is not None
         assert "voxels need" in running.stderr.readline()
-        time.sleep(1.0)
+        time.sleep(0.5)
         start = time.monotonic()
         running.send_signal(signal.SIGINT)
         told = running.communicate(timeout=60)[1]
