@@ -15,6 +15,7 @@ INLINE color color_mix(color a, color b, real share) {
     return color_of(a.r + (b.r - a.r) * share, a.g + (b.g - a.g) * share, a.b + (b.b - a.b) * share);
 }
 INLINE color color_add(color a, color b) { return color_of(a.r + b.r, a.g + b.g, a.b + b.b); }
+INLINE color color_mul(color a, color b) { return color_of(a.r * b.r, a.g * b.g, a.b * b.b); }
 INLINE color color_scale(color a, real s) { return color_of(a.r * s, a.g * s, a.b * s); }
 
 // Where a quantity lies in the palette, 0 to 1, at scale * quantity + offset: the palette repeats, or its ends go on.

@@ -38,7 +38,7 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, mask wanted, world
 // The ray that finds the next spot: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
 INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     so_far->on_path = wanted;
-    so_far->through = R(1.0);
+    so_far->through = color_of(R(1.0), R(1.0), R(1.0));
     so_far->seen = color_of(R(0.0), R(0.0), R(0.0));
 #if PLANES > 0
     plane_face face;

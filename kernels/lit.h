@@ -45,12 +45,12 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
     mask on_path = mask_of(so_far->on_path);
     const mask found = mask_of(here->found);
     if (s.bounce > 0) {
-        const color missed = limited(color_scale(sky(direction, picture_y, 1, w), so_far->through), w.settings);
+        const color missed = limited(color_mul(sky(direction, picture_y, 1, w), so_far->through), w.settings);
         so_far->seen = color_pick(on_path & ~found, color_add(so_far->seen, missed), so_far->seen);
     }
     on_path &= found;
     const real own = last ? R(1.0) : R(1.0) - (real)(w.material->reflection);
-    color added = color_scale(gathered, so_far->through * own);
+    color added = color_mul(gathered, color_scale(so_far->through, own));
     if (s.bounce > 0) added = limited(added, w.settings);
     so_far->seen = color_pick(on_path, color_add(so_far->seen, added), so_far->seen);
     so_far->on_path = number_of(on_path);
@@ -60,7 +60,7 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
 INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const spot *here, world w) {
     spot seen_first = *here;
     if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
-    so_far->through *= (real)(w.material->reflection);
+    so_far->through = color_scale(so_far->through, (real)(w.material->reflection));
     so_far->origin = vec_along(here->point, here->cone * (real)(w.settings->shadow_lift), here->normal);
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);
     so_far->footprint = here->cone;

@@ -29,6 +29,10 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_AMBIENT 3u
 #define PURPOSE_ENVIRONMENT 4u
 #define PURPOSE_LIGHT 5u
+#define PURPOSE_ASK 6u
+#define PURPOSE_CHOICE 7u
+#define PURPOSE_SCATTER 8u
+#define PURPOSE_CHOICES 9u
 #define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0

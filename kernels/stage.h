@@ -14,8 +14,10 @@ typedef struct {
     __global const float *palette;
     __global const float *environment;
     plane_set planes;
+    __constant const struct Pbr *materials;
+    __global const float *albedos;
 } world;
-#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}}
+#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos}
 
 // A work-item's packet.
 typedef struct {

@@ -48,9 +48,16 @@ typedef struct {
     vec origin, direction;
     real footprint, spread;
     real on_path;
-    real through;   // part of what comes next that reaches the eye
-    color seen;     // light so far
+    color through;   // part of what comes next that reaches the eye
+    color seen;      // light so far
 } path;
+
+// What a path of light carries from a spot to the next.
+typedef struct {
+    color awaited;   // what a light brings, if nothing is in the way of the ray that asks for it
+    real density;    // per steradian, of its direction; below 0 where lights were not asked for at all
+    real total;      // what all lights weighed at the spot
+} carried;
 
 // Where a cutting plane opens the set, and its face is visible.
 typedef struct {
@@ -71,7 +78,8 @@ typedef struct {
 #define STATE_TOUCH (STATE_START + NUMBERS_OF(start_of_rays))
 #define STATE_TALLY (STATE_TOUCH + NUMBERS_OF(touch))
 #define STATE_PATH (STATE_TALLY + NUMBERS_OF(tally))
-#define STATE_SUMS (STATE_PATH + NUMBERS_OF(path))
+#define STATE_CARRIED (STATE_PATH + NUMBERS_OF(path))
+#define STATE_SUMS (STATE_CARRIED + (HAS_PATHS ? NUMBERS_OF(carried) : 0))
 // Of the first spot, and of the one after the last bounce.
 #define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))
 #define STATE_FACE (STATE_SPOT(1) + NUMBERS_OF(spot))

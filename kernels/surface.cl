@@ -21,6 +21,11 @@
 #include "pixel_points.h"
 #include "secondary.h"
 #include "lit.h"
+#if HAS_PATHS
+#include "bsdf.h"
+#include "lights.h"
+#include "paths.h"
+#endif
 
 // Sends the cones of blocks: a packet of lanes for a packet of blocks, of which the wave has `wave`.
 STAGE(send_cones) {
@@ -124,6 +129,7 @@ STAGE(find_spots) {
     send_for_light(s, &here.at, &found, next_turns, w);
 }
 
+#if !HAS_PATHS
 // Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
 STAGE(light_spots) {
     if (IS_BEYOND) return;
@@ -151,3 +157,4 @@ STAGE(light_spots) {
     }
     end_shots(s, a, so_far.seen, &found, cost, w);
 }
+#endif

@@ -39,13 +39,14 @@ Doubles = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class PackedEnvironment:
-    """The buffer for the kernel (one-dimensional float32), the map's size and that of its tables."""
+    """The buffer for the kernel (one-dimensional float32), sizes of the map and of its tables, and its mean luminance."""
 
     data: Floats
     width: int
     height: int
     columns: int
     rows: int
+    mean: float
 
 
 def packed_map(found: EnvironmentMap) -> PackedEnvironment:
@@ -82,7 +83,10 @@ def pack_environment(pixels: Floats) -> PackedEnvironment:
     by_row = _cumulative(shares.sum(axis=1))
     parts = [borders, by_row, by_column, density, pixels]
     data = np.concatenate([np.asarray(part, np.float32).reshape(-1) for part in parts])
-    return PackedEnvironment(data, width, height, columns, rows)
+    around = np.cos(np.linspace(0.0, math.pi, height + 1))
+    of_rows = (pixels @ _LUMINANCE).mean(axis=1, dtype=np.float64)
+    mean = float(of_rows @ (around[:-1] - around[1:]) / 2)
+    return PackedEnvironment(data, width, height, columns, rows, mean)
 
 
 def material_fields(environment: Environment | None, packed: PackedEnvironment | None) -> Mapping[str, Any]:

@@ -13,8 +13,10 @@ from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
+from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient
@@ -70,7 +72,9 @@ MARCH = Struct(
         ),
         Field("known_reach", "real", 0, "how far a proved hit proves its neighbours', in a point's cones"),
         Field("seed", "uint", 0, "chooses the places of points and rays"),
-        Field("bounces", "int", 0, "most mirror reflections"),
+        Field("bounces", "int", 0, "most mirror reflections, or bounces of a path"),
+        Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
+        Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
         Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
@@ -137,7 +141,7 @@ MATERIAL = Struct(
     ],
 )
 
-STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL)
+STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR)
 
 LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
@@ -217,7 +221,9 @@ def near_height(scene: Scene, samples: int) -> float:
     return step_scale(scene) * max(NEAR / parts, NEAR_LEAST)
 
 
-def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record:
+def march_record(
+    scene: Scene, precision: Precision, samples: int = 1, environment: PackedEnvironment | None = None
+) -> Record:
     """The settings of the march, and of the rays that a shot sends; a pixel averages `samples` shots."""
     renderer = scene.surface
     center, radius = scene.bounds
@@ -225,7 +231,7 @@ def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record
     half = radius / 2
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
     largest = float(np.finfo(np.float32).max) / 16
-    limit = renderer.firefly_limit if renderer.firefly_limit is not None else largest
+    limit = firefly_limit(scene)
     points = renderer.used_points.count
     touch = max(TOUCH / renderer.detail, 1 / math.sqrt(points)) if points > 1 else 1.0
     values = {
@@ -247,6 +253,8 @@ def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record
         "known_reach": KNOWN_REACH / renderer.detail,
         "seed": renderer.seed,
         "bounces": bounces(scene),
+        "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,
+        "environment_weight": environment_weight(scene, environment),
         "light_count": len(scene.lights),
         "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
@@ -254,13 +262,28 @@ def march_record(scene: Scene, precision: Precision, samples: int = 1) -> Record
         "ambient_far": distance if not rays.lit else largest,
         "occlusion_distance": distance,
         "occlusion_share": 1 / rays.cosine if occlusion is not None else 0.0,
-        "firefly_limit": min(limit, largest),
+        "firefly_limit": largest if limit is None else min(limit, largest),
     }
     return MARCH.value(precision, values)
 
 
+def firefly_limit(scene: Scene) -> float | None:
+    """The most light that one part of a sample may add."""
+    lighting = scene.lighting
+    return lighting.clamp if isinstance(lighting, PathLighting) else scene.surface.firefly_limit
+
+
+def environment_weight(scene: Scene, packed: PackedEnvironment | None) -> float:
+    """About the irradiance that an environment brings: pi times its mean luminance."""
+    if scene.environment is None or packed is None:
+        return 0.0
+    return math.pi * scene.environment.intensity * packed.mean
+
+
 def bounces(scene: Scene) -> int:
-    """Most mirror reflections of a path."""
+    """Most mirror reflections of a path, or its bounces."""
+    if isinstance(scene.lighting, PathLighting):
+        return scene.lighting.bounces
     return scene.surface.bounces if scene.material.reflection > 0 else 0
 
 
@@ -280,6 +303,8 @@ class HemisphereRays:
 
 def hemisphere_rays(scene: Scene) -> HemisphereRays:
     """Ambient occlusion and the environment's light share the rays that are spread like the cosine."""
+    if isinstance(scene.lighting, PathLighting):
+        return HemisphereRays(0, 0, lit=False)
     occlusion = scene.surface.ambient_occlusion
     open_rays = occlusion.rays if occlusion is not None else 0
     lit_rays = scene.environment.rays if scene.environment is not None else 0

@@ -20,6 +20,7 @@ from clfractal.renderers.kernel import (
     WaveNeeds,
     flat_text,
 )
+from clfractal.renderers.materials import PBR, material_records, scattering_defines
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
@@ -30,8 +31,10 @@ from clfractal.renderers.planes import (
     plane_palettes,
     plane_records,
 )
+from clfractal.renderers.scattering import albedo_tables
 from clfractal.renderers.waves import asks_formula, has_cones, march_kernels, most_turns, surface_stages
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 
@@ -100,9 +103,13 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "GEOMETRIC": int(uses_positions(scene)),
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
-        "HAS_SOFT_LIGHT": int(any(light.angular_size > 0 for light in scene.lights)),
+        "HAS_SOFT_LIGHT": int(
+            any(light.angular_size > 0 for light in scene.lights)
+            and not isinstance(scene.lighting, PathLighting)
+        ),
         "HAS_FOG": int(scene.fog is not None),
         "ADAPTIVE": int(renderer.noise is not None),
+        **(scattering_defines() if isinstance(scene.lighting, PathLighting) else {}),
     }
 
 
@@ -119,6 +126,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_NUMBERS": state_numbers(scene),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
+        "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
     }
 
 
@@ -177,7 +185,7 @@ class SurfaceKernel(TileKernel):
         if surroundings is not None:
             packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
         return [
-            records.march_record(scene, precision, self.plan.averaged),
+            records.march_record(scene, precision, self.plan.averaged, packed),
             np.stack(
                 [
                     records.orbit_record(scene.chain, scene.formula.iterations, precision),
@@ -194,7 +202,13 @@ class SurfaceKernel(TileKernel):
                 if scene.cut_planes
                 else [np.zeros(4, np.float32)] * 2
             ),
+            *self._materials(),
         ]
+
+    def _materials(self) -> list[KernelArgument]:
+        if not isinstance(self.scene.lighting, PathLighting):
+            return [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32)]
+        return [material_records(self.scene, self.precision), albedo_tables()]
 
     def _palette(self) -> Floats:
         coloring = self.scene.coloring
@@ -206,6 +220,11 @@ class SurfaceKernel(TileKernel):
         return self.resources.kept.once(
             key, lambda: np.ascontiguousarray(palette_table(coloring), np.float32)
         )
+
+
+def light_kernels(scene: Scene) -> tuple[str, ...]:
+    """The kernels that gather the light of spots."""
+    return ("scatter_paths", "gather_paths") if isinstance(scene.lighting, PathLighting) else ("light_spots",)
 
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
@@ -227,7 +246,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             "begin_shots",
             *points,
             "find_spots",
-            "light_spots",
+            *light_kernels(scene),
         ),
     ]
     if asks_formula(scene.coloring):

@@ -6,7 +6,11 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
 
-and each mirror adds what follows `begin_shots` but for the points. See "A shot" in docs/architecture.md.
+and each mirror adds what follows `begin_shots` but for the points. With `lighting.mode: path` in the place of the last two
+
+    scatter_paths  march  gather_paths
+
+ask for light and send the next ray of each path. See "A shot" in docs/architecture.md.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ from clfractal.renderers.kernel import Stage
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 
@@ -53,7 +58,9 @@ def has_cones(scene: Scene, plan: Plan) -> bool:
 
 
 def light_turns(scene: Scene) -> int:
-    """Rays that leave a spot for its light."""
+    """Rays that leave a spot for its light; along paths they are sent by a stage of their own."""
+    if isinstance(scene.lighting, PathLighting):
+        return 0
     rays = hemisphere_rays(scene)
     return rays.cosine + rays.map + len(scene.lights) * light_rays(scene)
 
@@ -103,6 +110,11 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
             yield stage("color_spots", bounce=bounce)
         if scene.cut_planes and bounce == 0:
             yield stage("find_planes")
+        if isinstance(scene.lighting, PathLighting):
+            yield stage("scatter_paths", 1, bounce=bounce)
+            yield from _marched(marching, 1, GOAL_SHADOW)
+            yield stage("gather_paths", 1, bounce=bounce)
+            continue
         if after > 0:
             yield from _marched(marching, after, GOAL_SHADOW)
         yield stage("light_spots", after, bounce=bounce)

@@ -19,8 +19,10 @@ from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.layout import Layout, Place
+from clfractal.scene.light_paths import Lighting
 from clfractal.scene.lighting import Environment, Fog, Lights
-from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
+from clfractal.scene.materials import Materials
+from clfractal.scene.parts import AnyCamera, AnyMaterial, Background, Camera, Image, Output
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Stereo
@@ -66,8 +68,10 @@ class Scene(Section):
     # Defaults are data, checked when used: an instance here would build its model on import.
     image: Image = Field(default_factory=dict, validate_default=True)
     renderer: Renderer = Field(default_factory=dict, validate_default=True)
+    lighting: Lighting = Field(default_factory=dict, validate_default=True)
     lights: Lights = Field(default_factory=lambda: [{}], validate_default=True)
-    material: Material = Field(default_factory=dict, validate_default=True)
+    materials: Materials = Field({}, description="materials by name, for `lighting: {mode: path}`")
+    material: AnyMaterial = Field(default_factory=dict, validate_default=True)
     coloring: Coloring = Field(default_factory=dict, validate_default=True)
     background: Background = Field(default_factory=dict, validate_default=True)
     environment: Environment | None = None

@@ -26,6 +26,7 @@ from clfractal.scene.base import (
 )
 from clfractal.scene.camera_base import CameraBase
 from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
+from clfractal.scene.materials import MaterialName
 
 MAX_SIDE = 65_536
 MAX_PIXELS = 2**30
@@ -126,8 +127,11 @@ Camera = Annotated[
 
 
 class Material(Section):
-    """How the surface reflects light: the thesis's Phong model (Eq. 5)."""
+    """How the surface reflects light: the thesis's Phong model (Eq. 5), or along paths one of the scene's `materials`."""
 
+    name: MaterialName | None = Field(
+        None, description="one of `materials`, for `lighting: {mode: path}`; null: the keys below"
+    )
     color: Reflectance = Field(
         (0.8, 0.7, 0.6), description="linear Rec. 709; replaced by a coloring other than solid"
     )
@@ -136,6 +140,12 @@ class Material(Section):
     specular: Amount = Field(0.3, description="part of the light that is mirrored as a highlight")
     shininess: float = Field(30.0, ge=0.1, le=1e5, description="exponent of the highlight")
     reflection: Fraction = Field(0.0, description="part of the surroundings that is mirrored sharply")
+
+
+AnyMaterial = Annotated[
+    Material,
+    AlsoAs(lambda value: {"name": value} if isinstance(value, str) else value, {"type": "string"}),
+]
 
 
 class Gradient(Section):

@@ -1,0 +1,43 @@
+"""How light reaches the eye: by one bounce from each light, or along paths of many bounces."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, Tag
+
+from clfractal.scene.base import Section, chosen_by
+
+MAX_BOUNCES = 64
+
+
+class DirectLighting(Section):
+    """Light that comes straight from lights and the environment, shaded by Phong's model (thesis, Eq. 5)."""
+
+    tag = "direct"
+    mode: Literal["direct"] = "direct"
+
+
+class PathLighting(Section):
+    """Light along paths that bounce from surface to surface (Kajiya 1986): right, and noise with few samples."""
+
+    tag = "path"
+    mode: Literal["path"] = "path"
+    bounces: int = Field(
+        8, ge=0, le=MAX_BOUNCES, description="most bounces of a path after the first surface"
+    )
+    roulette: int = Field(
+        3,
+        ge=0,
+        le=MAX_BOUNCES,
+        description="bounces after which paths that carry little light end by chance; the mean stays the same",
+    )
+    clamp: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
+        None,
+        description="most light that one bounce of a sample may add; less noise, but too dark; null: no limit",
+    )
+
+
+AnyLighting = DirectLighting | PathLighting
+Lighting = Annotated[
+    Annotated[DirectLighting, Tag("direct")] | Annotated[PathLighting, Tag("path")],
+    chosen_by("mode", "direct"),
+]

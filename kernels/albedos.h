@@ -1,0 +1,52 @@
+// Tables of what layers of a material reflect in all; `clfractal/renderers/scattering.py` fills them and tells their layout.
+#define SMOOTHEST (R(1.0) / (real)((scalar)SMOOTHEST_PARTS))            // alpha, at the least
+#define SMOOTHEST_FUZZ (R(1.0) / (real)((scalar)SMOOTHEST_FUZZ_PARTS))
+#define ALBEDO_ROW (ALBEDO_COSINES + 1)
+#define ALBEDO_FUZZ (ALBEDO_ROUGHNESSES * ALBEDO_ROW)
+#define ALBEDO_DIELECTRIC (2 * ALBEDO_FUZZ)
+
+// Of one direction, whose cosine with the normal is given, and of the mean over all directions.
+typedef struct {
+    real of_direction, mean;
+} albedo;
+
+// From a table of roughnesses.
+INLINE albedo albedo_at(__global const float *table, real cosine, real roughness) {
+    scalar x[LANES], y[LANES], found[LANES], means[LANES];
+    lanes_store(sqrt(clamp(cosine, R(0.0), R(1.0))) * (real)((scalar)(ALBEDO_COSINES - 1)), x);
+    lanes_store(clamp(roughness, R(0.0), R(1.0)) * (real)((scalar)(ALBEDO_ROUGHNESSES - 1)), y);
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int i = min((int)x[lane], ALBEDO_COSINES - 2), k = min((int)y[lane], ALBEDO_ROUGHNESSES - 2);
+        const scalar across = x[lane] - (scalar)i, down = y[lane] - (scalar)k;
+        __global const float *low = table + k * ALBEDO_ROW, *high = low + ALBEDO_ROW;
+        found[lane] = mix(mix((scalar)low[i], (scalar)low[i + 1], across), mix((scalar)high[i], (scalar)high[i + 1], across), down);
+        means[lane] = mix((scalar)low[ALBEDO_COSINES], (scalar)high[ALBEDO_COSINES], down);
+    }
+    const albedo a = {lanes_load(found), lanes_load(means)};
+    return a;
+}
+
+// Of a dielectric's boundary, whose reflectance at normal incidence has this square root.
+INLINE albedo albedo_of_dielectric(__global const float *tables, real cosine, real roughness, real root) {
+    scalar at[LANES];
+    albedo low, high;
+    real rest = clamp(root * (real)((scalar)ALBEDO_REFLECTANCES), R(0.0), (real)((scalar)ALBEDO_REFLECTANCES - S(1.001)));
+    const real step = floor(rest);
+    rest -= step;
+    // The same table for all lanes: those of another one are looked up again.
+    lanes_store(step, at);
+    albedo sum = {R(0.0), R(0.0)};
+    mask open = less(R(-1.0), step);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!any_lane(open)) break;
+        const mask here = open & equal(step, (real)(at[lane]));
+        if (!any_lane(here)) continue;
+        open &= ~here;
+        __global const float *table = tables + ALBEDO_DIELECTRIC + (int)at[lane] * ALBEDO_FUZZ;
+        low = albedo_at(table, cosine, roughness);
+        high = albedo_at(table + ALBEDO_FUZZ, cosine, roughness);
+        sum.of_direction = pick(here, low.of_direction + rest * (high.of_direction - low.of_direction), sum.of_direction);
+        sum.mean = pick(here, low.mean + rest * (high.mean - low.mean), sum.mean);
+    }
+    return sum;
+}

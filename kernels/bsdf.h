@@ -1,0 +1,155 @@
+// How a material scatters light, by OpenPBR 1.1's layers: fuzz over a coat over a base, which is a metal, or a dielectric's boundary
+// over a diffuse body. A layer takes what it reflects from those below it, so that all energy is kept. A diffuse body under its
+// boundary gets 1 - albedo of the direction in which light comes and of the one in which it leaves, and is the same both ways. What is
+// under a coat or fuzz may be a mirror, and gets 1 - albedo of the viewer's direction: paths begin at the eye.
+#include "albedos.h"
+#include "microfacets.h"
+
+// A material at a spot.
+typedef struct {
+    vec side, up, normal;   // the frame of all lobes ...
+    vec out;                // ... and in it the direction to the viewer
+    color body, metal, edge, gloss;   // diffuse colour; a metal's reflectance straight on and its tint at the edge; tint of a dielectric's
+    real metalness, rough_body, rough, alpha, ior, root;   // ior and square root of the reflectance of the dielectric's boundary
+    color coat_tint;
+    real coat, coat_rough, coat_alpha, coat_ior, coat_root, coat_albedo;
+    color fuzz;
+    real fuzz_rough, fuzz_albedo;
+    real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
+    mask seen;                // whether the viewer is over the surface
+} bsdf;
+
+INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
+INLINE real luminance(color c) { return R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b; }
+INLINE color color_less(color c) { return color_of(R(1.0) - c.r, R(1.0) - c.g, R(1.0) - c.b); }
+
+// What a body's boundary lets in and out.
+INLINE real through_boundary(albedo o, albedo i) {
+    return (R(1.0) - o.of_direction) * (R(1.0) - i.of_direction) / fmax(R(1.0) - o.mean, R(1e-6));
+}
+
+INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
+
+// `base`: the colour of the body or the metal; `to_viewer` has length 1.
+INLINE bsdf bsdf_at(__constant const struct Pbr *m, color base, vec normal, vec to_viewer, __global const float *tables) {
+    bsdf b;
+    b.normal = normal;
+    make_frame(normal, &b.side, &b.up);
+    b.out = bsdf_local(&b, to_viewer);
+    b.seen = less(R(0.0), b.out.z);
+    b.out.z = fmax(b.out.z, R(1e-4));
+    b.metal = b.body = color_scale(base, (real)(m->base_weight));
+    b.metalness = (real)(m->base_metalness);
+    b.rough_body = (real)(m->base_diffuse_roughness);
+    b.rough = (real)(m->specular_roughness);
+    b.alpha = alpha_of(b.rough);
+    b.edge = color_splat(m->specular_color);
+    const scalar bend = (m->specular_ior - S(1.0)) / (m->specular_ior + S(1.0));
+    b.root = fmin((real)(bend) * sqrt((real)(m->specular_weight)), R(0.98));
+    b.ior = (R(1.0) + b.root) / (R(1.0) - b.root);
+    b.gloss = b.edge;
+    b.coat = (real)(m->coat_weight);
+    b.coat_tint = color_mix(color_of(R(1.0), R(1.0), R(1.0)), color_splat(m->coat_color), b.coat);
+    b.coat_rough = (real)(m->coat_roughness);
+    b.coat_alpha = alpha_of(b.coat_rough);
+    b.coat_ior = (real)(m->coat_ior);
+    b.coat_root = (b.coat_ior - R(1.0)) / (b.coat_ior + R(1.0));
+    b.fuzz = color_scale(color_splat(m->fuzz_color), (real)(m->fuzz_weight));
+    b.fuzz_rough = fmax((real)(m->fuzz_roughness), SMOOTHEST_FUZZ);
+    if (m->coat_weight > S(0.0) && m->coat_darkening > S(0.0)) {
+        // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
+        const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
+        const real most = b.coat * (real)(m->coat_darkening);
+#define DARKENED(c) c *= R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * c)
+        DARKENED(b.body.r);
+        DARKENED(b.body.g);
+        DARKENED(b.body.b);
+#undef DARKENED
+        b.metal = b.body;
+    }
+    b.coat_albedo = m->coat_weight > S(0.0) ? b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction : R(0.0);
+    b.fuzz_albedo = R(0.0);
+    if (m->fuzz_weight > S(0.0)) {
+        const real most = fmax(fmax(b.fuzz.r, b.fuzz.g), b.fuzz.b);
+        b.fuzz_albedo = most * albedo_at(tables + ALBEDO_FUZZ, b.out.z, b.fuzz_rough).of_direction;
+    }
+    const real of_gloss = m->base_metalness < S(1.0) && m->specular_weight > S(0.0) ? albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction : R(0.0);
+    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + (R(1.0) - b.metalness) * of_gloss;
+    const real scattered = (R(1.0) - b.metalness) * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
+                           + luminance(b.fuzz);
+    const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered), all = b.coat_albedo + below;
+    b.by_coat = b.coat_albedo / all;
+    b.by_gloss = (R(1.0) - b.coat_albedo) * mirrored / all;
+    return b;
+}
+
+// f * cosine of a metal, with light that is reflected more than once between its facets (Kulla and Conty 2017).
+INLINE color metal_value(const bsdf *b, vec i, vec h, real single, __global const float *tables) {
+    const real meeting = vec_dot(b->out, h);
+    const albedo o = albedo_at(tables, b->out.z, b->rough), other = albedo_at(tables, i.z, b->rough);
+    const real again = (R(1.0) - o.of_direction) * (R(1.0) - other.of_direction) / (BSDF_PI * fmax(R(1.0) - o.mean, R(1e-6))) * i.z;
+    color sum;
+#define METAL_PART(c)                                                                                     \
+    {                                                                                                     \
+        const real mean = fresnel_metal_mean(b->metal.c, b->edge.c);                                      \
+        sum.c = single * fresnel_metal(meeting, b->metal.c, b->edge.c)                                    \
+                + again * mean * mean * o.mean / (R(1.0) - mean * (R(1.0) - o.mean));                     \
+    }
+    METAL_PART(r)
+    METAL_PART(g)
+    METAL_PART(b)
+#undef METAL_PART
+    return sum;
+}
+
+// f * cosine; 0 for directions below the surface.
+INLINE color bsdf_value(const bsdf *b, vec toward, __constant const struct Pbr *m, __global const float *tables) {
+    vec i = bsdf_local(b, toward);
+    const mask over = b->seen & less(R(0.0), i.z);
+    i.z = fmax(i.z, R(1e-6));
+    const vec h = half_way(b->out, i);
+    const real single = ggx_value(b->out, i, h, b->alpha);
+    color sum = color_of(R(0.0), R(0.0), R(0.0));
+    if (m->base_metalness < S(1.0)) {
+        const color body = eon_value(b->body, b->out, i, b->rough_body);
+        albedo o = {R(0.0), R(0.0)}, other = o;
+        real gloss = R(0.0);
+        if (m->specular_weight > S(0.0)) {
+            o = albedo_of_dielectric(tables, b->out.z, b->rough, b->root);
+            other = albedo_of_dielectric(tables, i.z, b->rough, b->root);
+            gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
+        }
+        sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other))),
+                          R(1.0) - b->metalness);
+    }
+    if (m->base_metalness > S(0.0)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, tables), b->metalness));
+    if (m->coat_weight > S(0.0)) {
+        const real coat = b->coat * ggx_value(b->out, i, h, b->coat_alpha) * fresnel_dielectric(vec_dot(b->out, h), b->coat_ior);
+        sum = color_mul(sum, color_scale(b->coat_tint, R(1.0) - b->coat_albedo));
+        sum = color_add(sum, color_of(coat, coat, coat));
+    }
+    if (m->fuzz_weight > S(0.0)) {
+        const real fibres = fuzz_value(b->out, i, b->fuzz_rough) * i.z;
+        sum = color_add(color_scale(sum, R(1.0) - b->fuzz_albedo), color_scale(b->fuzz, fibres));
+    }
+    return color_pick(over, sum, color_of(R(0.0), R(0.0), R(0.0)));
+}
+
+// Probability per steradian with which bsdf_sample chooses a direction.
+INLINE real bsdf_density(const bsdf *b, vec toward) {
+    const vec i = bsdf_local(b, toward), h = half_way(b->out, i);
+    const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss) * fmax(i.z, R(0.0)) / BSDF_PI;
+    const real sum = hemisphere + b->by_gloss * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
+    return pick(b->seen & less(R(0.0), i.z), sum, R(0.0));
+}
+
+// A direction chosen by three numbers in (0, 1).
+INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density) {
+    const mask coat = less(choice, b->by_coat), gloss = ~coat & less(choice, b->by_coat + b->by_gloss);
+    const vec mirrored = ggx_sample(b->out, pick(coat, b->coat_alpha, b->alpha), u, v);
+    const vec around = hemisphere_direction(vec_of(R(0.0), R(0.0), R(1.0)), u, v);
+    const vec i = vec_pick(coat | gloss, mirrored, around);
+    const vec toward = vec_along(vec_along(vec_scale(b->normal, i.z), i.x, b->side), i.y, b->up);
+    *density = bsdf_density(b, toward);
+    return toward;
+}

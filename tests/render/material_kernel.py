@@ -1,0 +1,136 @@
+"""Runs the functions of `kernels/bsdf.h` on one material over packets of directions and of random numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device import compiler, program
+from clfractal.device.select import Device, choose
+from clfractal.device.source import flatten
+from clfractal.device.structs import Precision
+from clfractal.renderers.materials import PBR, material_values, scattering_defines
+from clfractal.renderers.scattering import albedo_tables
+from clfractal.scene.materials import PbrMaterial
+
+Floats = npt.NDArray[np.floating[Any]]
+
+_TEXT = """\
+#include "lanes.h"
+#include "numbers/real.h"
+#include "vectors.h"
+#include "structs.h"
+#include "sampling.h"
+#include "color.h"
+#include "bsdf.h"
+
+INLINE real load(__global const scalar *from) {
+    scalar each[LANES];
+    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
+    return lanes_load(each);
+}
+INLINE void store(__global scalar *to, real value) {
+    scalar each[LANES];
+    lanes_store(value, each);
+    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
+}
+#define PUT_COLOR(place, c)               \\
+    store(out + (place) * count, c.r);     \\
+    store(out + (place + 1) * count, c.g); \\
+    store(out + (place + 2) * count, c.b)
+
+// Planes of `count` numbers. In: viewer, light (x, y, z each), choice, u, v. Out: value and density of the light's
+// direction; the sampled direction, its density, its value.
+__kernel void scatter(__global const scalar *in, __global scalar *out, __constant struct Pbr *material,
+                      __global const float *albedos, int count) {
+    const int lane = (int)get_global_id(0) * LANES;
+    in += lane;
+    out += lane;
+    const vec viewer = vec_of(load(in), load(in + count), load(in + 2 * count));
+    const vec light = vec_of(load(in + 3 * count), load(in + 4 * count), load(in + 5 * count));
+    const vec normal = vec_of(R(0.0), R(0.6), R(0.8));
+    const bsdf b = bsdf_at(material, color_splat(material->base_color), normal, viewer, albedos);
+    const color value = bsdf_value(&b, light, material, albedos);
+    PUT_COLOR(0, value);
+    store(out + 3 * count, bsdf_density(&b, light));
+    real density;
+    const vec chosen = bsdf_sample(&b, load(in + 6 * count), load(in + 7 * count), load(in + 8 * count), &density);
+    store(out + 4 * count, chosen.x);
+    store(out + 5 * count, chosen.y);
+    store(out + 6 * count, chosen.z);
+    store(out + 7 * count, density);
+    const color there = bsdf_value(&b, chosen, material, albedos);
+    PUT_COLOR(8, there);
+}
+"""
+
+NORMAL = np.array([0.0, 0.6, 0.8])
+"""The normal of the surface in these tests."""
+
+
+@cache
+def _program(device: Device, precision: Precision, lanes: int) -> Any:
+    defines = {
+        "LANES": lanes,
+        "REAL_IS_DOUBLE": int(precision == "float64"),
+        "PALETTE_SIZE": 256,
+        **scattering_defines(),
+    }
+    generated = {"scatter.cl": _TEXT, "structs.h": PBR.c_text()}
+    flat = flatten("scatter.cl", generated=generated, defines=defines)
+    return compiler.compile_source(device, flat.text, program.math_flags(precision))
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """Value (f times the cosine) and density of directions; sampled directions, their densities and values."""
+
+    value: Floats
+    density: Floats
+    chosen: Floats
+    chosen_density: Floats
+    chosen_value: Floats
+
+
+def turned(local: Floats) -> Floats:
+    """Directions given around z, shape (n, 3), around the surface's normal."""
+    side = np.array([1.0, 0.0, 0.0])
+    return local @ np.stack([side, np.cross(NORMAL, side), NORMAL])
+
+
+def ask(
+    material: PbrMaterial,
+    viewer: Floats,
+    light: Floats,
+    numbers: Floats | None = None,
+    *,
+    precision: Precision = "float32",
+    lanes: int = 1,
+) -> Answers:
+    """Runs the kernel on world directions, shape (n, 3) each, and numbers in (0, 1), shape (n, 3)."""
+    given = max(len(viewer), len(light))
+    count = -(-given // lanes) * lanes
+    planes = np.full((9, count), 0.5, precision)
+    planes[0:3, :given] = viewer.T
+    planes[3:6, :given] = light.T
+    if numbers is not None:
+        planes[6:9, :given] = numbers.T
+    device = choose()
+    result = np.full((11, count), np.nan, precision)
+    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
+    record = PBR.array(precision, [material_values(material)])
+    buffers = [
+        cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
+        for array in (planes, result, record, albedo_tables())
+    ]
+    kernel = cl.Kernel(_program(device, precision, lanes), "scatter")
+    kernel.set_args(*buffers, np.int32(count))
+    cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
+    cl.enqueue_copy(device.queue, result, buffers[1])
+    found = result[:, :given].astype(np.float64)
+    return Answers(found[:3].T, found[3], found[4:7].T, found[7], found[8:11].T)

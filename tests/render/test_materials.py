@@ -1,0 +1,179 @@
+"""Materials (`kernels/bsdf.h`) keep energy, are the same both ways, and are sampled as their density says."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.renderers.scattering import albedo_tables, fresnel
+from clfractal.scene.materials import PbrMaterial
+from tests.render.material_kernel import ask, turned
+
+Floats = npt.NDArray[np.floating[Any]]
+
+WHITE: dict[str, Any] = {"color": [1, 1, 1]}
+NO_GLOSS = {"weight": 0}
+LOBES: dict[str, dict[str, Any]] = {
+    "lambert": {"base": WHITE, "specular": NO_GLOSS},
+    "rough body": {"base": {**WHITE, "diffuse_roughness": 1}, "specular": NO_GLOSS},
+    "gloss": {"base": WHITE, "specular": {"roughness": 0.3}},
+    "rough gloss": {"base": {**WHITE, "diffuse_roughness": 0.4}, "specular": {"roughness": 0.9, "ior": 2.2}},
+    "weak gloss": {"base": WHITE, "specular": {"roughness": 0.5, "weight": 0.3}},
+    "metal": {"base": {**WHITE, "metalness": 1}, "specular": {"roughness": 0.4}},
+    "rough metal": {"base": {**WHITE, "metalness": 1}, "specular": {"roughness": 1}},
+    "half metal": {"base": {**WHITE, "metalness": 0.5}, "specular": {"roughness": 0.6}},
+    "coat": {"base": WHITE, "specular": NO_GLOSS, "coat": {"weight": 1, "roughness": 0.3}},
+    "coated metal": {
+        "base": {**WHITE, "metalness": 1},
+        "specular": {"roughness": 0.5},
+        "coat": {"weight": 0.7, "roughness": 0.2},
+    },
+    "fuzz": {"base": WHITE, "specular": NO_GLOSS, "fuzz": {"weight": 1}},
+    "all": {
+        "base": {**WHITE, "metalness": 0.3, "diffuse_roughness": 0.5},
+        "specular": {"roughness": 0.4},
+        "coat": {"weight": 0.6, "roughness": 0.5},
+        "fuzz": {"weight": 0.5, "roughness": 0.3},
+    },
+}
+COSINES = (0.1, 0.35, 0.7, 1.0)
+
+
+def material(values: dict[str, Any]) -> PbrMaterial:
+    return PbrMaterial.model_validate(values)
+
+
+def toward(cosine: float) -> Floats:
+    """A direction with this cosine to the normal, not along an axis."""
+    sine = math.sqrt(1 - cosine * cosine)
+    return turned(np.array([[0.6 * sine, 0.8 * sine, cosine]]))
+
+
+def hemisphere(cosines: int = 400, angles: int = 400) -> tuple[Floats, float]:
+    """Middles of cells of equal solid angle over the normal, and that angle."""
+    z = (np.arange(cosines) + 0.5) / cosines
+    phi = 2 * math.pi * (np.arange(angles) + 0.5) / angles
+    level = np.sqrt(1 - z * z)
+    local = np.stack(
+        np.broadcast_arrays(level[:, None] * np.cos(phi), level[:, None] * np.sin(phi), z[:, None])
+    )
+    return turned(local.reshape(3, -1).T), 2 * math.pi / (cosines * angles)
+
+
+def numbers(count: int) -> Floats:
+    from scipy.stats import qmc
+
+    return np.clip(qmc.Sobol(3, seed=5).random(count), 1e-6, 1 - 1e-6)
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("lobe", LOBES)
+def test_a_white_furnace_stays_white(lobe: str, precision: Any) -> None:
+    """Sampled: the mean of value over density is what is reflected in all."""
+    places = numbers(1 << 15)
+    for cosine in COSINES:
+        found = ask(material(LOBES[lobe]), toward(cosine), toward(cosine), places[:1], precision=precision)
+        viewers = np.repeat(toward(cosine), len(places), axis=0)
+        found = ask(material(LOBES[lobe]), viewers, viewers, places, precision=precision)
+        weights = np.where(
+            found.chosen_density[:, None] > 0,
+            found.chosen_value / np.maximum(found.chosen_density, 1e-30)[:, None],
+            0.0,
+        )
+        assert np.abs(weights.mean(axis=0) - 1).max() < 0.01, (cosine, weights.mean(axis=0))
+
+
+@pytest.mark.parametrize("lobe", LOBES)
+def test_integrals_over_the_hemisphere(lobe: str) -> None:
+    """By quadrature, without sampling: what is reflected is 1, and so is the density, but for samples below the surface."""
+    lights, each = hemisphere()
+    for cosine in COSINES[1:]:
+        found = ask(
+            material(LOBES[lobe]), np.repeat(toward(cosine), len(lights), axis=0), lights, precision="float64"
+        )
+        assert np.abs(found.value.sum(axis=0) * each - 1).max() < 0.01
+        places = numbers(1 << 14)
+        tried = ask(material(LOBES[lobe]), np.repeat(toward(cosine), len(places), axis=0), lights[:1], places)
+        usable = np.mean(tried.chosen_density > 0)
+        assert abs(found.density.sum() * each - usable) < 0.01
+
+
+@pytest.mark.parametrize("lobe", [name for name in LOBES if not {"coat", "fuzz"} & set(LOBES[name])])
+def test_the_same_both_ways(lobe: str) -> None:
+    random = np.random.default_rng(3)
+    pairs = random.normal(size=(2, 200, 3))
+    pairs[..., 2] = np.abs(pairs[..., 2]) + 0.05
+    pairs /= np.linalg.norm(pairs, axis=-1, keepdims=True)
+    one = ask(material(LOBES[lobe]), turned(pairs[0]), turned(pairs[1]), precision="float64").value
+    two = ask(material(LOBES[lobe]), turned(pairs[1]), turned(pairs[0]), precision="float64").value
+    assert np.allclose(one / pairs[1][:, 2:], two / pairs[0][:, 2:], rtol=1e-4)
+
+
+def test_samples_follow_their_density() -> None:
+    """Counts in cells of the hemisphere against the density's integral over them (chi-square)."""
+    values = LOBES["all"]
+    count, across, around = 1 << 16, 8, 12
+    random = np.random.default_rng(11)
+    viewers = np.repeat(toward(0.5), count, axis=0)
+    found = ask(material(values), viewers, viewers, np.clip(random.random((count, 3)), 1e-6, 1 - 1e-6))
+    frame = turned(np.eye(3))
+    local = found.chosen @ frame.T
+    kept = found.chosen_density > 0
+    z, phi = local[kept, 2], np.arctan2(local[kept, 1], local[kept, 0]) % (2 * math.pi)
+    counts = np.histogram2d(z, phi, bins=(across, around), range=((0, 1), (0, 2 * math.pi)))[0]
+    lights, each = hemisphere(480, 480)
+    density = ask(
+        material(values), np.repeat(toward(0.5), len(lights), axis=0), lights, precision="float64"
+    ).density
+    expected = density.reshape(across, 480 // across, around, 480 // around).sum(axis=(1, 3)) * each * count
+    usual = expected > 20
+    from scipy.stats import chi2
+
+    statistic = ((counts - expected) ** 2 / expected)[usual].sum()
+    assert statistic < chi2.ppf(0.9999, int(usual.sum()))
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
+def test_lanes_do_not_matter(lanes: int) -> None:
+    places = numbers(64)
+    random = np.random.default_rng(2)
+    viewers = random.normal(size=(64, 3))
+    viewers[:, 2] = np.abs(viewers[:, 2])
+    viewers = turned(viewers / np.linalg.norm(viewers, axis=1, keepdims=True))
+    lights = viewers[::-1].copy()
+    one = ask(material(LOBES["all"]), viewers, lights, places, lanes=1)
+    packet = ask(material(LOBES["all"]), viewers, lights, places, lanes=lanes)
+    for name in ("value", "density", "chosen", "chosen_density", "chosen_value"):
+        assert np.allclose(getattr(one, name), getattr(packet, name), rtol=1e-3, atol=1e-5), name
+
+
+def test_lambert_is_lambert() -> None:
+    lights, _ = hemisphere(20, 20)
+    values = {"base": {"color": [0.8, 0.5, 0.25], "weight": 0.5}, "specular": NO_GLOSS}
+    found = ask(material(values), np.repeat(toward(0.4), len(lights), axis=0), lights, precision="float64")
+    cosine = lights @ np.array([0.0, 0.6, 0.8])
+    expected = np.array([0.4, 0.25, 0.125]) / math.pi * cosine[:, None]
+    assert np.allclose(found.value, expected, rtol=1e-6)
+
+
+def test_a_mirror_reflects_what_fresnel_says() -> None:
+    """A smooth dielectric over black: all that comes back is the boundary's reflectance."""
+    places = numbers(1 << 12)
+    values = {"base": {"color": [0, 0, 0]}, "specular": {"roughness": 0.05, "ior": 1.5}}
+    for cosine in (0.2, 0.5, 0.9):
+        viewers = np.repeat(toward(cosine), len(places), axis=0)
+        found = ask(material(values), viewers, viewers, places, precision="float64")
+        kept = found.chosen_density > 0
+        weights = found.chosen_value[kept, 0] / found.chosen_density[kept]
+        expected = fresnel(np.array([cosine]), 1.5)[0]
+        assert abs(weights.sum() / len(places) - expected) < 0.01 * expected + 1e-4
+
+
+def test_tables_are_albedos() -> None:
+    table = albedo_tables()
+    assert table.dtype == np.float32
+    assert 0 <= table.min() <= table.max() <= 1
