@@ -22,7 +22,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
-from clfractal.scene.parts import AnyCamera, AnyMaterial, Background, Camera, Image, Output
+from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Stereo
@@ -71,7 +71,7 @@ class Scene(Section):
     lighting: Lighting = Field(default_factory=dict, validate_default=True)
     lights: Lights = Field(default_factory=lambda: [{}], validate_default=True)
     materials: Materials = Field({}, description="materials by name, for `lighting: {mode: path}`")
-    material: AnyMaterial = Field(default_factory=dict, validate_default=True)
+    material: Material = Field(default_factory=dict, validate_default=True)
     coloring: Coloring = Field(default_factory=dict, validate_default=True)
     background: Background = Field(default_factory=dict, validate_default=True)
     environment: Environment | None = None

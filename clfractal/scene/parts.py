@@ -142,12 +142,6 @@ class Material(Section):
     reflection: Fraction = Field(0.0, description="part of the surroundings that is mirrored sharply")
 
 
-AnyMaterial = Annotated[
-    Material,
-    AlsoAs(lambda value: {"name": value} if isinstance(value, str) else value, {"type": "string"}),
-]
-
-
 class Gradient(Section):
     """The background behind the set, from the top of the picture to its bottom."""
 
