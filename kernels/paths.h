@@ -105,6 +105,13 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     so_far->on_path = number_of(on_path);
 }
 
+// Adds what a path sees that has met nothing.
+INLINE void path_leaves(path *so_far, const carried *with, mask leaves, real picture_y, world w) {
+    const color past = light_past(so_far->direction, picture_y, so_far->origin, with->density, with->total, w);
+    const color more = limited(color_mul(past, so_far->through), w.settings);
+    so_far->seen = color_pick(leaves, color_add(so_far->seen, more), so_far->seen);
+}
+
 // The light of the path's present spot: what shines there, what one light brings, and where the path goes on.
 STAGE(scatter_paths) {
     if (IS_BEYOND) return;
@@ -120,9 +127,7 @@ STAGE(scatter_paths) {
     const mask lands = on_path & mask_of(found.found);
     if (bounce > 0) {
         STATE_RECALL(s, with, STATE_CARRIED);
-        color past = light_past(arrived.direction, a.y, arrived.origin, with.density, with.total, w);
-        past = limited(color_mul(past, so_far.through), w.settings);
-        so_far.seen = color_pick(on_path & ~lands, color_add(so_far.seen, past), so_far.seen);
+        path_leaves(&so_far, &with, on_path & ~lands, a.y, w);
     }
     const color shines = color_mul(color_splat(w.materials->emission), so_far.through);
     so_far.seen = color_pick(lands, color_add(so_far.seen, shines), so_far.seen);
@@ -156,12 +161,11 @@ STAGE(scatter_paths) {
     send_clipped(s, 0, asks, R(0.0), lands & less(R(0.0), asks.far), w);
 }
 
-// Adds the light that was asked for, where nothing is in its way. Ends the shot, or sends the next ray of its path.
+// Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
 STAGE(gather_paths) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const aim a = aim_kept(s.state, s.stride);
     path so_far;
     carried with;
     STATE_RECALL(s, so_far, STATE_PATH);
@@ -171,13 +175,28 @@ STAGE(gather_paths) {
     const encounter answer = queue_met(s.q, 0, s.slot);
     tally_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
-    if (bounce == settings->bounces) {
-        const spot found = spot_kept(s.state, bounce, s.stride);
-        end_shots(s, a, so_far.seen, &found, cost, w);
-        return;
-    }
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
     send_clipped(s, 0, r, R(0.0), mask_of(so_far.on_path), w);
+}
+
+// Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would
+// have a part of its weight.
+STAGE(end_paths) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const aim a = aim_kept(s.state, s.stride);
+    path so_far;
+    carried with;
+    tally cost;
+    STATE_RECALL(s, so_far, STATE_PATH);
+    STATE_RECALL(s, with, STATE_CARRIED);
+    STATE_RECALL(s, cost, STATE_TALLY);
+    const encounter last = queue_met(s.q, 0, s.slot);
+    tally_met(&cost, last, 0);
+    path_leaves(&so_far, &with, mask_of(so_far.on_path) & ~mask_of(last.hit), a.y, w);
+    const spot first_spot = spot_kept(s.state, 0, s.stride);
+    end_shots(s, a, so_far.seen, &first_spot, cost, w);
 }

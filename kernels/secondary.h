@@ -117,7 +117,7 @@ INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, i
         r.spread = R(0.0);
         r.known = RAY_NOTHING_KNOWN;
         send_clipped(s, turn, r, R(0.0), wanted, w);
-#if HAS_ENVIRONMENT
+#if HAS_AMBIENT && HAS_ENVIRONMENT
         if (turn < hemisphere_turns(w)) lanes_store(in.strength, ambient_strength(s, turn));
 #endif
     }

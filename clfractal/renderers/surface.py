@@ -224,7 +224,11 @@ class SurfaceKernel(TileKernel):
 
 def light_kernels(scene: Scene) -> tuple[str, ...]:
     """The kernels that gather the light of spots."""
-    return ("scatter_paths", "gather_paths") if isinstance(scene.lighting, PathLighting) else ("light_spots",)
+    return (
+        ("scatter_paths", "gather_paths", "end_paths")
+        if isinstance(scene.lighting, PathLighting)
+        else ("light_spots",)
+    )
 
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:

@@ -10,7 +10,7 @@ and each mirror adds what follows `begin_shots` but for the points. With `lighti
 
     scatter_paths  march  gather_paths
 
-ask for light and send the next ray of each path. See "A shot" in docs/architecture.md.
+ask for light and send the next ray of each path; after the last bounce `march  end_paths` finds out which rays leave the set. See "A shot" in docs/architecture.md.
 """
 
 from __future__ import annotations
@@ -118,6 +118,9 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
         if after > 0:
             yield from _marched(marching, after, GOAL_SHADOW)
         yield stage("light_spots", after, bounce=bounce)
+    if isinstance(scene.lighting, PathLighting):
+        yield from _marched(marching, 1, GOAL_SHADOW)
+        yield stage("end_paths", 1, bounce=bounces(scene) + 1)
 
 
 def _marched(kernels: tuple[str, ...], turns: int, goal: int) -> Iterator[Stage]:

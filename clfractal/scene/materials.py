@@ -65,11 +65,15 @@ MAX_MATERIALS, MAX_NAME = 64, 100
 class PbrMaterial(Section):
     """A material by OpenPBR's layers, for `lighting: {mode: path}`."""
 
-    base: Base = Field(default_factory=dict, validate_default=True)
-    specular: Specular = Field(default_factory=dict, validate_default=True)
-    coat: Coat = Field(default_factory=dict, validate_default=True)
-    fuzz: Fuzz = Field(default_factory=dict, validate_default=True)
-    emission: Emission = Field(default_factory=dict, validate_default=True)
+    base: Base = Field(default_factory=dict, validate_default=True, description="the body")
+    specular: Specular = Field(
+        default_factory=dict, validate_default=True, description="what the body's boundary mirrors"
+    )
+    coat: Coat = Field(default_factory=dict, validate_default=True, description="a clear layer over the body")
+    fuzz: Fuzz = Field(default_factory=dict, validate_default=True, description="short fibres over everything")
+    emission: Emission = Field(
+        default_factory=dict, validate_default=True, description="light of the material's own"
+    )
 
 
 MaterialName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME)]
