@@ -34,9 +34,12 @@ INLINE light_ray light_sample(__constant const struct Light *light, vec point, r
     return r;
 }
 
-// Whether a ray that meets nothing else goes into a disc at infinity.
+// Whether rays can meet it by chance: discs at infinity. A point light is as large as it should look from each place, and nowhere.
+INLINE int light_is_met(__constant const struct Light *light) { return light->kind == LIGHT_DIRECTIONAL && light->spread > S(0.0); }
+
+// Whether a ray that meets nothing else goes into it.
 INLINE mask light_met(__constant const struct Light *light, vec direction) {
-    if (light->kind != LIGHT_DIRECTIONAL || light->spread <= S(0.0)) return less(R(1.0), R(0.0));
+    if (!light_is_met(light)) return less(R(1.0), R(0.0));
     // 1 - cos, which keeps its digits: half the square of the distance between the directions.
     const vec apart = vec_sub(direction, vec_scale(vec_splat(light->vector), R(-1.0)));
     return less_equal(R(0.5) * vec_dot(apart, apart), (real)(light->spread));

@@ -47,7 +47,7 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     real share = R(1.0);
     mask blocked = less(R(0.0), R(1.0));
     real place = choice * total, before = R(0.0);
-    mask open = blocked;
+    mask open = blocked, both = ~blocked;
     for (int i = 0; i <= w.settings->light_count; ++i) {
         const int is_light = i < w.settings->light_count;
         __constant const struct Light *light = w.lights + (is_light ? i : 0);
@@ -73,12 +73,14 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
         chosen.light = color_pick(here, r.light, chosen.light);
         chosen.density = pick(here, r.density, chosen.density);
         share = pick(here, weight / total, share);
+        if (!is_light || light_is_met(light)) both |= here;
         if (is_light && !light->shadow) blocked &= ~here;
     }
     // A light of one direction is never met by chance.
     const mask has_size = less(R(0.0), chosen.density);
     const real asked = share * chosen.density;
-    const real weight = pick(has_size, power_share(asked, bsdf_density(b, chosen.toward)) / asked, R(1.0) / share);
+    const real other = pick(both, bsdf_density(b, chosen.toward), R(0.0));
+    const real weight = pick(has_size, power_share(asked, other) / asked, R(1.0) / share);
     *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.materials, w.albedos), chosen.light), weight);
     const mask dark = ~less(R(0.0), brightest(*brings));
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);

@@ -101,6 +101,19 @@ def test_a_disc_of_light_has_its_closed_form() -> None:
     assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < 0.005
 
 
+def test_a_point_light_with_a_size_is_as_bright() -> None:
+    """Its directions spread about its place; no ray of a path can meet it, so all of it is asked for."""
+    lamp = {"type": "point", "position": [0, -3000, 1500], "angular_size": 20}
+    colors, normals, _ = seen(
+        scene_of(lights=[lamp], lighting=path(2), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}),
+        64,
+    )
+    cosine = normals @ (np.array([0, -1, 0.5]) / math.hypot(1, 0.5))
+    lit = cosine > math.sin(math.radians(16))
+    assert lit.sum() > 250
+    assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < 0.01
+
+
 def test_a_disc_is_found_by_mirrors() -> None:
     """In a mirror the disc shows its own radiance, intensity / sin^2 of half its size: samples of the surface find it."""
     light = {"direction": [0, 1, 0], "angular_size": 40}
