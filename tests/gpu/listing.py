@@ -60,6 +60,7 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
+    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}},
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
     "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
@@ -92,7 +93,13 @@ _CUT_PLANE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "noise": _OFTEN["noise"],
     "motion": _OFTEN["motion"],
 }
-_APART = {frozenset({("coloring", "residual"), ("points", "")})}  # a plane needs points
+_APART = {
+    frozenset({("coloring", "residual"), ("points", "")}),  # a plane needs points
+    # Each sample of a path finds a spot of its own.
+    *(frozenset({("lighting", "path"), ("points", name)}) for name in _SURFACE["points"] if name),
+    frozenset({("lighting", "path"), ("coloring", "residual")}),
+    frozenset({("lighting", "path"), ("planes", "planes")}),
+}
 _FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
 
 
