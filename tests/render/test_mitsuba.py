@@ -133,7 +133,7 @@ def theirs(material: str, lights: str, folder: Path) -> Floats:
     subprocess.run(
         [sys.executable, "-c", _THEIRS], input=json.dumps(told), text=True, check=True, timeout=300
     )
-    return np.load(folder / "theirs.npy").astype(np.float64)
+    return np.asarray(np.load(folder / "theirs.npy"), np.float64)
 
 
 def ours(material: str, lights: str) -> Floats:

@@ -362,15 +362,17 @@ def test_light_bounces_at_a_click() -> None:
     """The kind of light is a switch, also where a material by OpenPBR is shown."""
     ui, _ = make_ui(SCENE)
     stage = Stage(ui, material.draw)
-    stage.click(BOX[0] + 50, BOX[1])
-    assert ui.studio.scene.lighting.mode == "path"
+
+    def click(across: float) -> str:
+        stage.click(BOX[0] + across, BOX[1])
+        return str(ui.studio.scene.lighting.mode)
+
+    assert click(50) == "path"
     ui.studio.edit({"materials.gold": {"base": {"metalness": 1}}, "material.name": "gold"})
     stage.frame()
     assert ui.studio.scene.material.name == "gold"
-    stage.click(BOX[0] - 50, BOX[1])
-    assert ui.studio.scene.lighting.mode == "direct"
-    stage.click(BOX[0] + 50, BOX[1])
-    assert ui.studio.scene.lighting.mode == "path"
+    assert click(-50) == "direct"
+    assert click(50) == "path"
 
 
 def test_first_values_are_valid() -> None:
