@@ -159,10 +159,11 @@ def _render_on(
     from clfractal.work.remarks import mixed_kinds
 
     scenes = FilmScenes(engine, scene)
-    coming = iter(files.values())
+    coming = iter(files.items())
 
     def is_missing(job: Job) -> bool:
-        return not (_is_there(job, next(coming)) if order.resume else False)
+        number, paths = next(coming)
+        return not (order.resume and _is_there(job, paths, {kept.at(number): kept.bits}))
 
     jobs = engine.in_order(
         map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
@@ -269,16 +270,25 @@ def _partial(paths: tuple[Path, ...]) -> Path:
     return paths[0].with_name(paths[0].name + PARTIAL)
 
 
-def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:
-    """Whether all files of a frame are there, and whole.
+def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path | None, int]) -> bool:
+    """Whether all files of a frame are there, whole, and stored as they are asked for.
+
+    Args:
+        bits: of PNG files that have others than the scene wants.
 
     Raises:
         FileError: one of them is of another scene, or holds none.
     """
     from clfractal.files.embedded import read_scene_text
+    from clfractal.files.png import read_form
     from clfractal.pictures.outputs import output_files
 
-    files = [file for path in paths for file in output_files(job.scene.stereo, path)]
+    scene = job.scene
+    files = {
+        file: bits.get(path, scene.output.png_bits)
+        for path in paths
+        for file in output_files(scene.stereo, path)
+    }
     there = [file for file in files if is_whole(file)]
     wanted = job.header()["scene"]
     for file in there:
@@ -287,4 +297,8 @@ def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:
                 "is a frame of another scene, or of other settings; remove it, or render without --resume",
                 Where(str(file)),
             )
-    return len(there) == len(files)
+    components = 4 if scene.background == "transparent" else 3
+    return len(there) == len(files) and all(
+        file.suffix.lower() != ".png" or read_form(file) == (depth, components)
+        for file, depth in files.items()
+    )
