@@ -206,13 +206,25 @@ animation:
     TRACK: {expression: "VALUE"}
 """
 REMOVED = {
-    ("stereo.separation", "0.2 + 0.1*u"): ("stereo=null", "cannot move: stereo is null; give it a value, or leave"),
-    ("fog.density", "0.1*u"): ("fog=null", "cannot move: fog is null; give it a value, or leave this track out"),
-    ("lights.1.intensity", "u"): ("lights=[{direction: [0, 1, -1]}]", "cannot move: lights has entries 0 to 0"),
+    ("stereo.separation", "0.2 + 0.1*u"): (
+        "stereo=null",
+        "cannot move: stereo is null; give it a value, or leave",
+    ),
+    ("fog.density", "0.1*u"): (
+        "fog=null",
+        "cannot move: fog is null; give it a value, or leave this track out",
+    ),
+    ("lights.1.intensity", "u"): (
+        "lights=[{direction: [0, 1, -1]}]",
+        "cannot move: lights has entries 0 to 0",
+    ),
     ("lights.1.position.0", "u"): ("lights.1={direction: [0, 1, -1]}", "unknown key of lights.1 'position'"),
     ("layout.views.1.camera.fov", "40 + u"): ("layout=null", "cannot move: layout is null; give it a value"),
     ("renderer.bounds.radius", "2 + u"): ("renderer={type: volume}", "unknown key of renderer 'bounds'"),
-    ("camera.focus_distance", "2 + u"): ("camera={projection: orthographic, position: [0, -3, 0], height: 3}", "unknown key of camera"),
+    ("camera.focus_distance", "2 + u"): (
+        "camera={projection: orthographic, position: [0, -3, 0], height: 3}",
+        "unknown key of camera",
+    ),
     ("formula.parameters.power", "8 - u"): (
         "formula={chain: [{name: menger_sponge}, {name: mandelbulb}]}",
         "cannot move: formula is a chain; name a value of formula.chain.0, formula.chain.1",
