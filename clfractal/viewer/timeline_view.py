@@ -109,15 +109,22 @@ class TimelineView:
 
     def change(self, studio: InFilm, edit: Callable[[Animation], Animation]) -> bool:
         """One edit of the animation, as a step; whether it was possible."""
+        return self.edit(studio, lambda animation: (edit(animation), self.selection))
+
+    def edit(self, studio: InFilm, edit: Edit) -> bool:
+        """The same of an edit that says which keys are chosen afterwards."""
         animation = studio.scene.animation
         if animation is None:
             return False
         try:
-            new = edit(animation)
+            new, selection = edit(animation)
         except ClfractalError as error:
             studio.tell(str(error), wrong=True)
             return False
-        return studio.set_animation(new)
+        if not studio.set_animation(new):
+            return False
+        self.selection = selection
+        return True
 
     def delete(self, studio: InFilm) -> None:
         """Deletes the chosen keys."""

@@ -282,6 +282,25 @@ def test_numbers_of_a_key_are_typed() -> None:
     assert film.keys() == {0: 30, 15: 42}
 
 
+def test_a_key_that_is_dragged_by_its_box_passes_its_neighbour() -> None:
+    film = Film()
+    film.stage.click(film.x(0), film.y("camera.fov"))
+    x, y = film.ui.size[0] - theme.MARGIN - 60, film.ruler - 9 + 36
+    film.stage.drag((x, y), (x + 60, y), steps=20)
+    (passed,) = film.keys().keys() - {10}
+    assert passed > 10, "the drag has to be long enough"
+    assert film.keys() == {10: 60, passed: 30}
+    assert film.view.selection == {("camera.fov", 1)}
+    assert film.ui.studio.history.depth("scene") == (1, 0)
+    # The same box goes on with the key that is chosen now.
+    film.stage.drag((x, y), (x + 15, y))
+    (later,) = film.keys().keys() - {10}
+    assert later > passed
+    assert film.ui.studio.undo("scene")
+    assert film.ui.studio.undo("scene")
+    assert film.ui.studio.document == load_scene(MOVING)
+
+
 def test_the_films_settings_and_new_tracks_open(monkeypatch: pytest.MonkeyPatch) -> None:
     film = Film()
     seen = Seen(monkeypatch)
