@@ -11,10 +11,16 @@ from hypothesis import strategies as st
 
 import clfractal
 from clfractal.scene.load import load_scene
+from clfractal.scene.parts import OrthographicCamera
 from clfractal.viewer import film_place, timeline
+from clfractal.viewer.controls import Controls
+from clfractal.viewer.motion import Motion
 from clfractal.viewer.navigation import dolly
 from clfractal.viewer.saving import save_scene
+from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
+from clfractal.viewer.settings import Settings
 from clfractal.viewer.sources import open_source
+from clfractal.viewer.standard_views import to_orthographic
 from clfractal.viewer.studio import Studio
 from tests.viewer.films import MOVING
 from tests.viewer.panel_harness import make_ui
@@ -190,6 +196,91 @@ def test_what_has_no_key_stays_behind() -> None:
     studio.go_to_frame(6)
     studio.go_to_frame(5)
     assert studio.value("camera.fov") == pytest.approx(30 * 2**0.5)
+
+
+# What tracks move stays
+
+LIT = MOVING.replace(
+    "    camera.fov:",
+    """    stereo.screen_distance: {keys: [{frame: 0, value: 0.5}, {frame: 40, value: 0.9}]}
+    lights.1.intensity: {keys: [{frame: 0, value: 2}]}
+    camera.fov:""",
+).replace(
+    "renderer:",
+    """stereo: {mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}
+lights: [{direction: [0, 1, -1]}, {direction: [1, 1, -1], intensity: 3}, {direction: [1, 0, -1]}]
+renderer:""",
+)
+FIRST, SECOND, THIRD = (each.model_dump(mode="json") for each in load_scene(LIT).lights)
+TAKEN_AWAY: dict[str, tuple[dict[str, Any], str]] = {
+    "stereo is switched off": ({"stereo": None}, "stereo.screen_distance"),
+    "the light is removed": ({"lights": [FIRST]}, "lights.1.intensity"),
+    "a light before it is removed": ({"lights": [SECOND, THIRD]}, "lights.1.intensity"),
+    "lights are reordered": ({"lights": [SECOND, FIRST, THIRD]}, "lights.1.intensity"),
+    "a light is put before it": ({"lights": [THIRD, FIRST, SECOND, THIRD]}, "lights.1.intensity"),
+}
+
+
+@pytest.mark.parametrize("frame", [None, 0, 20])
+@pytest.mark.parametrize("case", TAKEN_AWAY)
+def test_what_a_track_moves_is_not_taken_away(case: str, frame: float | None) -> None:
+    studio = studio_of(LIT, frame)
+    values, name = TAKEN_AWAY[case]
+    if "lights" in values:  # as they are at this frame
+        now = {1: studio.value("lights.1")}
+        values = {"lights": [now[1] if each is SECOND else each for each in values["lights"]]}
+    before, document = studio.scene, studio.document
+    assert not studio.edit(values)
+    assert studio.scene is before
+    assert studio.document == document
+    assert [message.text for message in studio.messages] == [
+        f"a track of the film moves {name}"
+        + (", which would be another one's" if len(values.get("lights") or [1]) > 1 else "")
+        + ": remove that track in the timeline first"
+    ]
+    # Without the track it goes, and comes back with undo.
+    assert document.animation is not None
+    assert studio.set_animation(timeline.without_track(document.animation, name))
+    assert studio.edit(values)
+    assert studio.undo("scene")
+    assert studio.undo("scene")
+    assert studio.document == document
+
+
+def test_what_no_track_moves_may_go_and_be_edited() -> None:
+    studio = studio_of(LIT, 20)
+    lights = studio.value("lights")
+    assert studio.edit({"lights": lights[:2]})
+    assert studio.edit({"lights.1.color": [1, 0.5, 0.2]})
+    assert studio.edit({"lights": [*studio.value("lights"), lights[0]]})
+    assert studio.edit({"stereo.mode": "split"})
+    assert studio.messages == []
+
+
+def test_a_camera_of_another_kind_is_refused_where_its_field_of_view_moves() -> None:
+    studio = studio_of(frame=10)
+    before = studio.scene
+    studio.set_camera(to_orthographic(before.camera, before.bounds))  # type: ignore[arg-type]
+    assert studio.scene is before
+    assert "a track of the film moves camera.fov" in studio.messages[-1].text
+    assert before.animation is not None
+    studio.set_animation(timeline.without_track(before.animation, "camera.fov"))
+    studio.set_camera(to_orthographic(studio.scene.camera, before.bounds))  # type: ignore[arg-type]
+    assert isinstance(studio.scene.camera, OrthographicCamera)
+
+
+def test_the_ways_of_stereo_go_round_past_off() -> None:
+    studio = studio_of(LIT, 0)
+    motion = Motion(studio)
+    controls = Controls(studio, Settings(), motion)
+    deeds = SceneDeeds(studio, controls, motion, Settings(), lambda: None, lambda: 0.0)
+    modes = set()
+    for _ in STEREO_MODES:
+        deeds.stereo_mode(1)
+        assert studio.scene.stereo is not None
+        modes.add(studio.scene.stereo.mode)
+    assert len(modes) >= len(STEREO_MODES) - 3
+    assert sum("moves stereo.screen_distance" in message.text for message in studio.messages) == 1
 
 
 # Undo of the film
