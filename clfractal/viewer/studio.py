@@ -242,13 +242,14 @@ class Studio(InFilm):
         """
         moving = time.perf_counter() < self._moving_until
         live = self._live if moving else ()
-        key = (render_key(self.shown_scene), self.region, live)
+        exposed_in = self.exposed_in
+        key = (render_key(self.shown_scene), self.region, live, exposed_in)
         failed = self.session.frame is None and self.session.problem is not None and not moving
         if not again and key == self._requested and not failed:
             return
         self._requested = key
         wanted = with_live(key[0], live) if live else key[0]
-        self.session.request(wanted, moving=moving, region=self.region)
+        self.session.request(wanted, moving=moving, region=self.region, exposed_in=exposed_in)
 
     def tick(self) -> None:
         """Asks for the first picture, and renders a drag that pauses with the scene's own program; called every turn."""
@@ -315,7 +316,7 @@ class Studio(InFilm):
         scene = self.as_rendered(self.scene).model_copy(update={"image": Image(width=width, height=height)})
         if samples is not None:
             scene = edited(scene, {"renderer.samples": samples})
-        still = Still(scene, paths)
+        still = Still(scene, paths, exposed_in=self.exposed_in)
         self.stills.append(still)
         self.session.add(still)
         return still
@@ -323,7 +324,11 @@ class Studio(InFilm):
     def tell(self, text: str, *, wrong: bool = False) -> None:
         """A line for the user; one that was told just now is not told twice."""
         last = self.messages[-1] if self.messages else None
-        if last is not None and last.text == " ".join(text.split()) and last.time > time.perf_counter() - _AGAIN:
+        if (
+            last is not None
+            and last.text == " ".join(text.split())
+            and last.time > time.perf_counter() - _AGAIN
+        ):
             return
         self.messages.append(Message(" ".join(text.split()), wrong, time.perf_counter()))
         del self.messages[:-MOST_MESSAGES]

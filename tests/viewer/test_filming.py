@@ -53,6 +53,49 @@ def test_a_frame_is_the_films(frame: int) -> None:
     assert studio.value("camera.fov") == pytest.approx(30 * 2 ** min(frame / 10, 1))
 
 
+def test_a_frame_has_the_films_motion_blur_until_something_has_no_key() -> None:
+    blurred = MOVING.replace("frames: 41", "frames: 41\n  shutter: 180 deg")
+    studio = studio_of(blurred, 20)
+    shown, wanted = studio.shown_scene, clfractal.at_frame(load_scene(blurred), 20)
+    assert shown.model_copy(update={"image": wanted.image}) == wanted
+    assert shown.animation is not None
+    assert (shown.animation.frame, shown.animation.shutter) == (20, 0.5)
+    assert studio.edit({"material.ambient": 0.5})
+    assert studio.shown_scene.animation == shown.animation, "what no track moves goes along"
+    assert studio.edit({"camera.fov": 33})
+    assert studio.shown_scene.animation is None, "how it moves is not known yet"
+    assert studio.set_keys() is not None
+    assert studio.shown_scene.animation is not None
+
+
+def test_the_scene_as_it_stands_has_no_motion_blur() -> None:
+    still = MOVING.replace("frames: 41", "frames: 41\n  shutter: 0.5\n  frame: 20")
+    scene = load_scene(still, posed=False)
+    studio = make_ui(scene)[0].studio
+    assert studio.frame_number is None
+    found = studio.shown_scene.animation
+    assert found is None or found.frame is None
+    assert studio.document == scene
+
+
+def test_an_exposure_is_measured_in_the_films_first_frame() -> None:
+    auto = MOVING + "output: {exposure: auto}\n"
+    studio = studio_of(auto, 20)
+    first = studio.exposed_in
+    assert first == clfractal.at_frame(load_scene(auto), 0)
+    studio.go_to_frame(30)
+    assert studio.exposed_in is first, "it is not measured anew"
+    studio.edit({"material.ambient": 0.5})
+    changed = studio.exposed_in
+    assert changed is not None
+    assert changed.material.ambient == 0.5
+    assert changed.camera == first.camera
+    studio.edit({"output.exposure": 1.0})
+    assert studio.exposed_in is None
+    studio.go_to_frame(None)
+    assert studio.exposed_in is None
+
+
 def test_looking_at_frames_changes_nothing() -> None:
     studio = studio_of()
     for frame in (3, 17.5, 40, 999):
@@ -260,12 +303,12 @@ def test_what_no_track_moves_may_go_and_be_edited() -> None:
 def test_a_camera_of_another_kind_is_refused_where_its_field_of_view_moves() -> None:
     studio = studio_of(frame=10)
     before = studio.scene
-    studio.set_camera(to_orthographic(before.camera, before.bounds))  # type: ignore[arg-type]
+    studio.set_camera(to_orthographic(before.camera, before.bounds))
     assert studio.scene is before
     assert "a track of the film moves camera.fov" in studio.messages[-1].text
     assert before.animation is not None
     studio.set_animation(timeline.without_track(before.animation, "camera.fov"))
-    studio.set_camera(to_orthographic(studio.scene.camera, before.bounds))  # type: ignore[arg-type]
+    studio.set_camera(to_orthographic(studio.scene.camera, before.bounds))
     assert isinstance(studio.scene.camera, OrthographicCamera)
 
 
