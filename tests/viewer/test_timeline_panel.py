@@ -232,6 +232,46 @@ def test_a_key_of_a_curve_is_dragged_in_time_and_value() -> None:
     assert list(film.keys()) == [0, 1]
 
 
+def test_several_keys_of_a_curve_are_dragged_together() -> None:
+    film = curved("camera.fov")
+    assert film.view.change(film.ui.studio, lambda a: t.with_key(a, "camera.fov", 20.0, 45.0))
+    film.stage.frame()
+    # A box around the second and the third.
+    film.stage.drag((film.x(7), place(film, 0, 62)[1]), (film.x(22), place(film, 0, 43)[1]))
+    assert film.view.selection == {("camera.fov", 1), ("camera.fov", 2)}
+    before = film.ui.studio.document
+    film.stage.drag(place(film, 10, 60), place(film, 16, 50))
+    assert list(film.keys()) == [0, 16, 26]
+    assert film.keys()[16] == pytest.approx(50, abs=0.7)
+    assert film.keys()[26] == pytest.approx(film.keys()[16] - 15)
+    assert film.view.selection == {("camera.fov", 1), ("camera.fov", 2)}
+    # They go no farther than the first of them may: to the end of the film, and beside the key that stays.
+    film.stage.drag(place(film, 16, film.keys()[16]), place(film, 39, film.keys()[16]))
+    assert list(film.keys()) == [0, 30, 40]
+    film.stage.drag(place(film, 40, film.keys()[40]), place(film, 3, film.keys()[40]))
+    assert list(film.keys()) == [0, 1, 11]
+    for _ in range(3):
+        assert film.ui.studio.undo("scene")
+    assert film.ui.studio.document == before
+
+
+def test_shift_chooses_keys_of_a_curve_and_drags_values_alone() -> None:
+    film = curved("camera.fov")
+    film.stage.click(*place(film, 0, 30))
+    film.stage.hold(imgui.Key.mod_shift, True)
+    film.stage.click(*place(film, 10, 60))
+    assert film.view.selection == {("camera.fov", 0), ("camera.fov", 1)}
+    film.stage.drag(place(film, 10, 60), place(film, 14, 50))
+    assert list(film.keys()) == [0, 10]
+    assert film.keys()[10] == pytest.approx(50, abs=0.7)
+    assert film.keys()[0] == pytest.approx(film.keys()[10] - 30)
+    film.stage.click(*place(film, 10, film.keys()[10]))
+    assert film.view.selection == {("camera.fov", 0)}
+    film.stage.hold(imgui.Key.mod_shift, False)
+    film.stage.click(film.x(30), place(film, 0, film.keys()[0])[1])
+    assert film.view.selection == t.NONE
+
+
 def test_handles_are_dragged() -> None:
     film = curved("camera.fov")
     film.view.selection = frozenset({("camera.fov", 0)})
