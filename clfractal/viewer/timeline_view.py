@@ -15,8 +15,8 @@ from clfractal.viewer import timeline
 from clfractal.viewer.filming import InFilm
 from clfractal.viewer.timeline import NONE, Selection
 
-_MARGIN = 0.02
-"""Part of a film that is shown before its first and after its last frame."""
+_MARGINS = 0.05, 0.02
+"""Parts of a film that are shown before its first frame, where curves have the words of their lines, and after its last."""
 _NARROWEST = 4.0
 _SAMPLES = 400
 Edit: TypeAlias = Callable[[Animation], tuple[Animation, Selection]]
@@ -58,7 +58,7 @@ class TimelineView:
     def show_all(self) -> None:
         """Shows the whole film."""
         end = max(self.count - 1, 1)
-        self.first, self.last = -_MARGIN * end, (1 + _MARGIN) * end
+        self.first, self.last = -_MARGINS[0] * end, (1 + _MARGINS[1]) * end
 
     def x_of(self, frame: float, left: float, width: float) -> float:
         """Where a frame is between two ends, points."""

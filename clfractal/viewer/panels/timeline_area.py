@@ -14,6 +14,8 @@ HEIGHT = 218.0
 """Points that the timeline is high."""
 LEFT = 158.0
 """Points for the names of tracks."""
+BAR = 10.0
+"""Points at the right that are left to the bar by which many tracks are scrolled."""
 _WHEEL = 0.85
 
 

@@ -85,7 +85,7 @@ def _grid(area: Area, frame: _Frame) -> None:
             y = frame.y(value)
             draw.add_line(imgui.ImVec2(area.left, y), imgui.ImVec2(area.right, y), theme.packed(theme.LINE))
             text = f"{value:.4g}".replace("-", "\u2212")
-            draw.add_text(imgui.ImVec2(area.left + 4, y - 12), theme.packed(theme.FAINT), text)
+            draw.add_text(imgui.ImVec2(area.left + 4, y - 12), theme.packed(theme.DIM), text)
 
 
 def _color(component: int, count: int) -> theme.Rgba:

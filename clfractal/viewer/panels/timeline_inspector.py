@@ -242,6 +242,7 @@ def _track(ui: Ui, view: TimelineView, animation: Animation, name: str) -> None:
                     lambda old, number, key=key: timeline.with_track(old, name, {key: number}),
                 )
     imgui.dummy(imgui.ImVec2(0, 1))
+    w.in_labels()
     if w.button("Remove track", icon=theme.TRASH, about="The value stays what the scene as it stands has"):
         view.selection = timeline.NONE
         view.change(ui.studio, lambda old: timeline.without_track(old, name))
@@ -310,12 +311,13 @@ def film_popup(ui: Ui, view: TimelineView) -> None:
     if width is not None:
         found = w.number_box(w.boxes(ui), "film.shutter", animation.shutter, width, Scale(0, 1, step=0.01))
         _apply(ui, view, found, lambda old, new: old.model_copy(update={"shutter": new}))
-    width = _row(ui, "Stills show this frame", "animation.frame", Animation, "frame")
+    width = _row(ui, "Frame of stills", "animation.frame", Animation, "frame")
     place = ui.studio.place
     if width is not None and w.toggle("film.still", animation.frame is not None):
         still = place.frame if animation.frame is None and place is not None else None
         view.change(ui.studio, lambda old: old.model_copy(update={"frame": still}))
     imgui.dummy(imgui.ImVec2(0, 1))
+    w.in_labels()
     if w.button("Remove the film", icon=theme.TRASH, about="The scene as it stands is kept"):
         ui.studio.set_animation(None)
         imgui.close_current_popup()
