@@ -168,9 +168,9 @@ async def simulate(count: int, address: str) -> None:
 
     def tiles(_seat: Any, _data: Any, _arrays: Any, item: Any) -> real.Answer:
         film = np.zeros((len(item.tiles), 5, TILE, TILE), np.float32)
-        address = get_worker().address
+        own, tally, seconds = get_worker(), Tally(rays=1), float(len(item.tiles))
         return real.Answer(
-            item.view, item.tiles, film, Tally(rays=1), float(len(item.tiles)), address, info.key
+            item.view, item.tiles, film, tally, seconds, own.address, str(own.name), real.maker_of(info)
         )
 
     for function in (enlist, tiles):

@@ -127,8 +127,19 @@ def test_tls(folder: Path) -> None:
         assert (ended.status, ended.err) == (0, "")
         stranger = process([*order, farm.address], folder)
         assert stranger.is_one_line(2, f"--cluster: {farm.address} needs certificates")
-        other = process([*order, farm.address], folder, {**known, f"{PREFIX}CA_FILE": "nowhere.pem"})
-        assert other.is_one_line(2, "nowhere.pem: is not there")
+        for name, option in (
+            ("CA_FILE", "ca-file"),
+            ("CLIENT__CERT", "client.cert"),
+            ("CLIENT__KEY", "client.key"),
+        ):
+            other = process([*order, farm.address], folder, {**known, f"{PREFIX}{name}": "nowhere.pem"})
+            assert other.is_one_line(2, f"nowhere.pem: is not there; it is distributed.comm.tls.{option}")
+        swapped = process([*order, farm.address], folder, {**known, f"{PREFIX}CLIENT__KEY": "ca.key"})
+        assert swapped.is_one_line(2, "farm.pem: does not go with its key")
+        scene = process([*order, farm.address], folder, {**known, f"{PREFIX}CA_FILE": "heavy.yaml"})
+        assert scene.is_one_line(2, "heavy.yaml: holds no certificate of an authority")
+        lone = {name: file for name, file in known.items() if not name.endswith("KEY")}
+        assert process([*order, farm.address], folder, lone).is_one_line(2, "farm.pem: has no key")
         unsafe = process([*order, farm.address.replace("tls", "tcp")], folder)
         assert unsafe.is_one_line(3, "does not answer within 10 s")
     assert process([*order[:8], "own.exr"], folder).status == 0
