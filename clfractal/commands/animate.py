@@ -167,7 +167,8 @@ def _render_on(
     jobs = engine.in_order(
         map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
     )
-    begun = False
+    begun = told = False
+    kinds: set[str] = set()
     with closing(jobs):
         for number, paths in files.items():
             with speaking_of(order.scene), naming_options():
@@ -176,6 +177,7 @@ def _render_on(
                 kept.begin()
                 begun = True
                 if job.others:
+                    told = True
                     shell.say(f"{order.scene}: {mixed_kinds(1 + len(job.others))}")
             shell.state = partial(counted.interrupted, number, paths[0])
             if not missing:
@@ -192,6 +194,10 @@ def _render_on(
                 bits={kept.at(number): kept.bits},
             )
             counted.rendered(state.rays)
+            kinds |= {maker.key for maker in state.makers}  # a cluster's are known when they have come
+            if len(kinds) > 1 and not told:
+                told = True
+                shell.say(f"{order.scene}: {mixed_kinds(len(kinds))}")
     return counted
 
 
