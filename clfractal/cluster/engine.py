@@ -106,7 +106,10 @@ class ClusterEngine(AnyEngine):
                 found = begun.popleft()
                 if isinstance(found, ClfractalError):
                     raise found
-                yield found
+                try:
+                    yield found
+                finally:
+                    self.cluster.leave(found[0])  # whoever took it may not have wanted to execute it
         finally:
             for each in begun:
                 if not isinstance(each, ClfractalError):
@@ -136,7 +139,11 @@ class ClusterEngine(AnyEngine):
     def _asking(self, scene: SceneLike, **settings: Any) -> _Asked:
         from clfractal.cluster import tasks
 
-        future, message = self.cluster.asking(tasks.prepared, as_scene(scene), settings)
+        loaded = as_scene(scene)
+        precision = settings.get("precision") or loaded.renderer.precision
+        future, message = self.cluster.asking(
+            tasks.prepared, loaded, settings, float64=precision == "float64"
+        )
         return _Asked(future, message)
 
     def _decided(self, asked: _Asked) -> Job:

@@ -188,7 +188,8 @@ def _render_on(
     jobs = engine.in_order(
         map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
     )
-    removed = False
+    removed = told = False
+    kinds: set[str] = set()
     with closing(jobs):
         for number, paths in files.items():
             with speaking_of(order.scene), naming_options():
@@ -197,6 +198,7 @@ def _render_on(
                 kept.begin()
                 removed = True
                 if job.others:
+                    told = True
                     shell.say(f"{order.scene}: {mixed_kinds(1 + len(job.others))}")
             shell.state = partial(counted.interrupted, number, paths[0])
             if not missing:
@@ -214,6 +216,10 @@ def _render_on(
             )
             counted.rendered(made.state.rays)
             counted.stats.add(number, job, made.state, wall_ms=made.wall_ms, write_ms=made.write_ms)
+            kinds |= {maker.key for maker in made.state.makers}  # a cluster's are known when they have come
+            if len(kinds) > 1 and not told:
+                told = True
+                shell.say(f"{order.scene}: {mixed_kinds(len(kinds))}")
     counted.looks_built_ms, counted.shares = engine.looks_built_ms, shares_of(engine)
     return counted
 
