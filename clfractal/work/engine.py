@@ -82,8 +82,10 @@ class Engine(AnyEngine):
             return
         with self._alone():
             self.executor.close()
-            for looking in self._looking.values():
-                looking.close()
+            own = self.executor
+            for executor in [own] if isinstance(own, LocalExecutor) else own.answering:
+                if id(executor) in self._looking:
+                    self._looking[id(executor)].close()
             self._closed = True
 
     @property
