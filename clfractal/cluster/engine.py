@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -59,27 +59,9 @@ class ClusterEngine(AnyEngine):
         found: Scene = self.cluster.unpacked(self.cluster.answered(asked), message)
         return found
 
-    def prepare(
-        self,
-        scene: SceneLike,
-        *,
-        precision: str | None = None,
-        samples: int | None = None,
-        region: tuple[int, int, int, int] | None = None,
-        channels: Sequence[str] | None = None,
-        quality: str | None = None,
-    ) -> Job:
-        """The job of a scene's picture for the device that most workers have; see `Engine.prepare`."""
-        return self._decided(
-            self._asking(
-                scene,
-                precision=precision,
-                samples=samples,
-                region=region,
-                channels=channels,
-                quality=quality,
-            )
-        )
+    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
+        """Decided for the device that most workers have."""
+        return self._decided(self._asking(scene, **asked, quality=quality))
 
     def in_order(
         self, scenes: Iterable[Scene], wanted: Callable[[Job], bool], **settings: Any
