@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.cluster import dispatch
+from clfractal.cluster import dispatch, tasks
 from clfractal.cluster.cluster import Cluster
 from clfractal.cluster.dispatch import Dispatcher, Work
 from clfractal.cluster.engine import ClusterEngine
@@ -29,10 +29,6 @@ from clfractal.work.engine import Engine
 from clfractal.work.job import Job
 from clfractal.work.run import Tally, WorkItem
 from tests.shell import SCENE
-
-pytest.importorskip("distributed", reason="the extra cluster")
-
-from clfractal.cluster import tasks
 
 
 @pytest.fixture(scope="module")
