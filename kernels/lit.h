@@ -94,8 +94,10 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #if HAS_FOG
     const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
     const color mist = color_splat(w.material->fog_color);
-    seen = color_mix(seen, mist, R(1.0) - exp(-(real)(w.material->fog_density) * way));
-    if (w.material->fog_background) background = mist;
+    seen = color_mix(seen, mist, R(1.0) - exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material)));
+    if (w.material->fog_background) {
+        background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
+    }
 #endif
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));

@@ -20,6 +20,9 @@
 #include "spot.h"
 #include "pixel_points.h"
 #include "secondary.h"
+#if HAS_FOG
+#include "fog.h"
+#endif
 #include "lit.h"
 #if HAS_PATHS
 #include "bsdf.h"

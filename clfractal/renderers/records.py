@@ -16,6 +16,7 @@ from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
+from clfractal.scene.base import unit
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PointLight
 from clfractal.scene.model import Scene
@@ -129,6 +130,11 @@ MATERIAL = Struct(
         Field("reflection", "real", 0, "part that is mirrored sharply"),
         Field("fog_color", "real", 3, "linear Rec. 709"),
         Field("fog_density", "real", 0, "per scene unit"),
+        Field(
+            "fog_height", "real", 0, "in which its density falls to 1/e, scene units; 0: the same everywhere"
+        ),
+        Field("fog_base", "real", 0, "how far up it has this density, scene units"),
+        Field("fog_up", "real", 3, "the direction in which it is thinner, length 1"),
         Field("fog_background", "int", 0, "1: the fog covers what is past the set"),
         Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
@@ -354,6 +360,9 @@ def material_record(
         "reflection": material.reflection,
         "fog_color": fog.color if fog else (0.0, 0.0, 0.0),
         "fog_density": fog.density if fog else 0.0,
+        "fog_height": (fog.height or 0.0) if fog else 0.0,
+        "fog_base": fog.base if fog else 0.0,
+        "fog_up": unit(fog.up) if fog else (0.0, 0.0, 1.0),
         "fog_background": int(fog is not None and fog.background and fog.density > 0),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),

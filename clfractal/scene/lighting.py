@@ -4,7 +4,17 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import Amount, Color, Position, Section, chosen_by, length, problem
+from clfractal.scene.base import (
+    Amount,
+    Color,
+    Coordinate,
+    Length,
+    Position,
+    Section,
+    chosen_by,
+    length,
+    problem,
+)
 
 MAX_LIGHTS = 64
 
@@ -101,4 +111,18 @@ class Fog(Section):
     density: float = Field(
         0.1, ge=0, le=1e6, description="per scene unit; the fraction exp(-density * distance) of light passes"
     )
+    height: Length | None = Field(
+        None,
+        description="how much higher the density is 1/e, about a third, scene units; null: it is the same everywhere",
+    )
+    base: Coordinate = Field(
+        0.0, description="how far up from the origin the fog has this density, with `height`, scene units"
+    )
+    up: Position = Field((0.0, 0.0, 1.0), description="the direction in which it gets thinner, with `height`")
     background: bool = Field(True, description="whether the fog also covers the background")
+
+    @model_validator(mode="after")
+    def _has_an_up(self) -> Self:
+        if length(self.up) < 1e-12:
+            raise problem("must not be zero", "up")
+        return self

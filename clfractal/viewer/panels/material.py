@@ -84,7 +84,13 @@ def draw_surroundings(ui: Ui) -> None:
     w.group(ui, "Fog")
     radius = ui.studio.scene.bounds[1]
     if _switch(ui, "fog", "Fog", {"density": float(f"{0.25 / radius:.2g}")}):
-        w.fields(ui, "fog", ("color", "density", "background"), background={"label": "On background"})
+        w.fields(
+            ui,
+            "fog",
+            ("color", "density", "height", "base", "up", "background"),
+            height={"auto": "everywhere", "start": float(f"{0.25 * radius:.2g}")},
+            background={"label": "On background"},
+        )
     w.group(ui, "Environment")
     if _switch(ui, "environment", "Environment", {"name": names()[0]}):
         _map(ui)
