@@ -26,7 +26,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     }
     gathered = limited(gathered, w.settings);
 #endif
-    for (; turn < s.q.turns; ++turn) {
+    for (; turn < turns_for_light(w); ++turn) {
         const int number = turn - hemisphere_turns(w);
         __constant const struct Light *light = w.lights + number / w.settings->light_rays;
         if (number % w.settings->light_rays >= light->rays) continue;
@@ -99,8 +99,16 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
         background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
     }
 #endif
+#if HAS_SHAFTS
+    color air;
+    STATE_RECALL(s, air, STATE_AIR);
+    seen = color_add(seen, air);
+#endif
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
+#if HAS_SHAFTS
+    background = color_add(background, air);
+#endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
 #if PLANES > 0

@@ -177,6 +177,13 @@ STAGE(gather_paths) {
     const encounter answer = queue_met(s.q, 0, s.slot);
     tally_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
+#if HAS_SHAFTS
+    if (bounce == 0) {
+        const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+        const spot found = spot_kept(s.state, 0, s.stride);
+        air_gather(s, &here.at, aim_kept(s.state, s.stride), &found, 1, &cost, w);
+    }
+#endif
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};

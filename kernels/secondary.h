@@ -76,6 +76,9 @@ INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, w
 // The turns of the rays that leave a spot: first those into the hemisphere, then each light's.
 INLINE int hemisphere_turns(world w) { return w.settings->cosine_rays + w.settings->map_rays; }
 
+// All turns of a spot.
+INLINE int turns_for_light(world w) { return hemisphere_turns(w) + w.settings->light_count * w.settings->light_rays; }
+
 // The direction that a ray of this turn takes, and whether anything may be in its way; false for turns that a light does not need.
 INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w, incidence *in, mask *wanted) {
 #if HAS_AMBIENT

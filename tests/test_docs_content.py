@@ -91,6 +91,7 @@ SECTIONS = {
     "background": "Gradient",
     "environment": "Environment",
     "fog": "Fog",
+    "fog.scattering": "Scattering",
     "layout": "Layout",
     "layout.views": "LayoutView",
     "stereo": "Stereo",

@@ -135,6 +135,8 @@ MATERIAL = Struct(
         ),
         Field("fog_base", "real", 0, "how far up it has this density, scene units"),
         Field("fog_up", "real", 3, "the direction in which it is thinner, length 1"),
+        Field("fog_scattering", "real", 3, "part of each light that it scatters"),
+        Field("fog_anisotropy", "real", 0, "of that, Henyey and Greenstein's g"),
         Field("fog_background", "int", 0, "1: the fog covers what is past the set"),
         Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
@@ -346,6 +348,7 @@ def material_record(
     """Material, colouring, background, and how the packed environment is laid out."""
     material, background, fog = scene.material, scene.background, scene.fog
     gradient = background if isinstance(background, Gradient) else None
+    shafts = fog.scattering if fog else None
     values = {
         "color": material.color,
         "ambient": material.ambient,
@@ -363,6 +366,8 @@ def material_record(
         "fog_height": (fog.height or 0.0) if fog else 0.0,
         "fog_base": fog.base if fog else 0.0,
         "fog_up": unit(fog.up) if fog else (0.0, 0.0, 1.0),
+        "fog_scattering": shafts.color if shafts else (0.0, 0.0, 0.0),
+        "fog_anisotropy": shafts.anisotropy if shafts else 0.0,
         "fog_background": int(fog is not None and fog.background and fog.density > 0),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),

@@ -32,7 +32,14 @@ from clfractal.renderers.planes import (
     plane_records,
 )
 from clfractal.renderers.scattering import albedo_tables
-from clfractal.renderers.waves import asks_formula, has_cones, march_kernels, most_turns, surface_stages
+from clfractal.renderers.waves import (
+    air_turns,
+    asks_formula,
+    has_cones,
+    march_kernels,
+    most_turns,
+    surface_stages,
+)
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
@@ -51,7 +58,7 @@ NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangl
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
 # Numbers of a pixel in `kernels/state.h`, without its normals.
-STATE_NUMBERS = 112
+STATE_NUMBERS = 120
 
 Floats = npt.NDArray[np.float32]
 
@@ -126,6 +133,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_NUMBERS": state_numbers(scene),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
+        "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
     }
 

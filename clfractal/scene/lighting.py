@@ -10,6 +10,7 @@ from clfractal.scene.base import (
     Coordinate,
     Length,
     Position,
+    Reflectance,
     Section,
     chosen_by,
     length,
@@ -104,6 +105,20 @@ class Environment(Section):
         return self
 
 
+class Scattering(Section):
+    """Light that the fog sends on to the eye; what stands between it and a light throws shadows into the fog."""
+
+    color: Reflectance = Field(
+        (1.0, 1.0, 1.0), description="part of each light that is scattered and not absorbed, linear Rec. 709"
+    )
+    anisotropy: float = Field(
+        0.0,
+        ge=-0.95,
+        le=0.95,
+        description="above 0 light goes on forwards, as in mist; below 0 back; 0: everywhere alike",
+    )
+
+
 class Fog(Section):
     """Fog absorbs light on its way to the eye and replaces it by its own colour, exponentially with distance."""
 
@@ -119,6 +134,9 @@ class Fog(Section):
         0.0, description="how far up from the origin the fog has this density, with `height`, scene units"
     )
     up: Position = Field((0.0, 0.0, 1.0), description="the direction in which it gets thinner, with `height`")
+    scattering: Scattering | None = Field(
+        None, description="shafts of light: what the fog scatters of each light; null: `color` alone"
+    )
     background: bool = Field(True, description="whether the fog also covers the background")
 
     @model_validator(mode="after")

@@ -68,7 +68,11 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "": {},
         "soft": {"lights": [{"type": "directional", "direction": [1, 1, -1], "angular_size": 5}]},
     },
-    "fog": {"": {}, "fog": {"fog": {"density": 0.05}}},
+    "fog": {
+        "": {},
+        "fog": {"fog": {"density": 0.05}},
+        "shafts": {"fog": {"density": 0.05, "height": 2, "scattering": {}}},
+    },
     **_OFTEN,
 }
 _STOPS = [{"at": 0.05, "opacity": 0}, {"at": 1, "opacity": 0.6}]

@@ -91,6 +91,8 @@ def draw_surroundings(ui: Ui) -> None:
             height={"auto": "everywhere", "start": float(f"{0.25 * radius:.2g}")},
             background={"label": "On background"},
         )
+        if _switch(ui, "fog.scattering", "Shafts", {}):
+            w.fields(ui, "fog.scattering", ("color", "anisotropy"))
     w.group(ui, "Environment")
     if _switch(ui, "environment", "Environment", {"name": names()[0]}):
         _map(ui)
@@ -129,7 +131,7 @@ def _background(ui: Ui) -> None:
 
 def _switch(ui: Ui, key: str, label: str, first: dict[str, Any]) -> bool:
     """The switch of a section that may be null; whether it is there. Its values come back when it is switched on again."""
-    given = getattr(ui.studio.scene, key) is not None
+    given = w.value(ui, key) is not None
     width = w.row(
         ui, label, path=key, tip=w.value_tip(ui, key), differs=given, reset=lambda: _put(ui, key, None)
     )
@@ -139,7 +141,7 @@ def _switch(ui: Ui, key: str, label: str, first: dict[str, Any]) -> bool:
             kept[key] = ui.studio.value(key)
         _put(ui, key, None if given else kept.get(key, first))
     w.problem(ui, key)
-    return getattr(ui.studio.scene, key) is not None
+    return w.value(ui, key) is not None
 
 
 def _map(ui: Ui) -> None:
