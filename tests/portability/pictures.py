@@ -65,7 +65,8 @@ _RENDERERS = {
     "plane": "{type: cut_plane, plane: {normal: [0.2, 0.3, 1], width: 3, height: 3}, samples: 2}",
 }
 _MORE = {
-    "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\nfog: {density: 0.05, height: 3, scattering: {anisotropy: 0.3}}\n",
+    "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\n"
+    "fog: {density: 0.05, height: 3, scattering: {anisotropy: 0.3}}\n",
     "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n",
     "paths": "lighting: {mode: path, bounces: 3, roulette: 1}\nenvironment: {name: studio}\n"
     "materials: {clay: {base: {color: [0.8, 0.5, 0.3], diffuse_roughness: 0.5, metalness: 0.2}, coat: {weight: 0.3},"
