@@ -31,7 +31,7 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
     for (int i = 0; i < w.settings->light_count; ++i) {
         const mask met = light_met(w.lights + i, direction);
         if (!any_lane(met)) continue;
-        const real of_light = light_weight(w.lights + i, from) / total * light_cone_density(w.lights + i);
+        const real of_light = light_weight(w.lights + i, from) / total * light_density(w.lights + i, from, direction);
         const real share = pick(less(density, R(0.0)), R(1.0), power_share(density, of_light));
         sum = color_pick(met, color_add(sum, color_scale(light_shown(w.lights + i), share)), sum);
     }
@@ -58,7 +58,7 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
         if (!any_lane(here)) continue;
         light_ray r;
         if (is_light) {
-            r = light_sample(light, point, u, v);
+            r = light_sample(light, from, u, v);
         } else {
 #if HAS_ENVIRONMENT
             r.toward = environment_sample(u, v, w.material, w.environment, &r.density);
@@ -75,6 +75,11 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
         share = pick(here, weight / total, share);
         if (is_light && !light->shadow) blocked &= ~here;
     }
+    // Lights hide what is behind them.
+    real far = chosen.distance * R(0.999), unused_density = R(0.0), unused_weight = R(0.0);
+    color unused_color = chosen.light;
+    const mask hidden = nearest_light(from, chosen.toward, 0, &far, &unused_color, &unused_density, &unused_weight, w);
+    chosen.light = color_pick(hidden, color_of(R(0.0), R(0.0), R(0.0)), chosen.light);
     // A light of one direction is never met by chance.
     const mask has_size = less(R(0.0), chosen.density);
     const real asked = share * chosen.density;
@@ -117,12 +122,22 @@ STAGE(scatter_paths) {
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
     carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
     mask on_path = mask_of(so_far.on_path);
-    const mask lands = on_path & mask_of(found.found);
+    real far = pick(mask_of(found.found), vec_dot(vec_sub(found.seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+    color shows = color_of(R(0.0), R(0.0), R(0.0));
+    real light_chance = R(0.0), light_part = R(0.0);
+    const mask shone = on_path & nearest_light(arrived.origin, arrived.direction, bounce == 0, &far, &shows, &light_chance, &light_part, w);
+    const mask lands = on_path & mask_of(found.found) & ~shone;
     if (bounce > 0) {
         STATE_RECALL(s, with, STATE_CARRIED);
         color past = light_past(arrived.direction, a.y, arrived.origin, with.density, with.total, w);
+        const real share = power_share(with.density, light_part / with.total * light_chance);
+        past = color_pick(shone, color_scale(shows, pick(less(with.density, R(0.0)), R(1.0), share)), past);
         past = limited(color_mul(past, so_far.through), w.settings);
         so_far.seen = color_pick(on_path & ~lands, color_add(so_far.seen, past), so_far.seen);
+    }
+    if (bounce == 0) {
+        so_far.seen = color_pick(shone, shows, so_far.seen);
+        spot_of_light(s, &found, arrived.origin, arrived.direction, far, shone);
     }
     const color shines = color_mul(color_splat(w.materials->emission), so_far.through);
     so_far.seen = color_pick(lands, color_add(so_far.seen, shines), so_far.seen);

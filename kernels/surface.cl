@@ -19,6 +19,7 @@
 #include "cones.h"
 #include "spot.h"
 #include "pixel_points.h"
+#include "light_places.h"
 #include "secondary.h"
 #include "lit.h"
 #if HAS_PATHS
@@ -140,7 +141,9 @@ STAGE(light_spots) {
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     path so_far;
-    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
+    const vec direction = arrived.direction;
+    path_meets_light(s, &so_far, &found, arrived, w);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT
