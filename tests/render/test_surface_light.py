@@ -214,7 +214,8 @@ def eq5(scene: Scene, points: Floats, normals: Floats, directions: Floats, *, li
     total = np.zeros(points.shape)
     for light in scene.lights:
         strength = np.full(points.shape[:-1], light.intensity)
-        if light.type == "point":
+        if not isinstance(light, DirectionalLight):
+            assert isinstance(light, PointLight)
             offset = np.array(light.position) - points
             distance = np.linalg.norm(offset, axis=-1)
             toward = offset / distance[..., None]
