@@ -11,6 +11,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.pictures.film import Film
+from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,
