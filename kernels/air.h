@@ -84,6 +84,9 @@ INLINE real way_in_fog(stage s, ray r, const spot *here) {
     STATE_RECALL(s, face, STATE_FACE);
     far = pick(mask_of(face.bare), fmin(far, face.t), far);
 #endif
+    color shows = color_of(R(0.0), R(0.0), R(0.0));
+    real density = R(0.0), weight = R(0.0);
+    nearest_light(r.origin, r.direction, 1, &far, &shows, &density, &weight, w);
     return far;
 }
 

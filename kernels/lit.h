@@ -34,10 +34,23 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
         tally_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
+        if (light_is_seen(light)) in = light_along(light, here->point, in.toward);
         const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, w.material);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }
     return gathered;
+}
+
+// A path that meets a light before the surface ends there.
+INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, world w) {
+    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+    color shows = color_of(R(0.0), R(0.0), R(0.0));
+    real density = R(0.0), weight = R(0.0);
+    const mask met = mask_of(so_far->on_path) & nearest_light(arrived.origin, arrived.direction, s.bounce == 0, &far, &shows, &density, &weight, w);
+    if (!any_lane(met)) return;
+    so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(shows, so_far->through)), so_far->seen);
+    so_far->on_path = number_of(mask_of(so_far->on_path) & ~met);
+    spot_of_light(s, found, arrived.origin, arrived.direction, far, met);
 }
 
 // Adds the light of the path's present spot, or of the sky past it, to what the path has seen.

@@ -9,13 +9,13 @@ INLINE color limited(color c, __constant const struct March *settings) {
 
 #if HAS_SOFT_LIGHT
 // The direction to the part of a light that this ray goes to; `toward` is the direction to its middle.
-INLINE vec soft_light(stage s, const packet_pixels *at, vec toward, int light_index, int turn, world w) {
+INLINE vec soft_light(stage s, const packet_pixels *at, vec point, vec toward, int light_index, int turn, world w) {
     __constant const struct Light *light = w.lights + light_index;
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed,
                                  (uint)(PURPOSE_LIGHT + 16 * (1 + light_index + 64 * s.bounce)));
     real u, v;
     unit_square((bits)((uint)(s.sample * light->rays + turn)), seed, &u, &v);
-    return cone_direction(toward, (real)(light->spread), u, v);
+    return light_direction(light, point, toward, u, v);
 }
 #endif
 
@@ -93,7 +93,8 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn
     if (ray_of_light >= light->rays) return 0;
     *in = light_at(light, here->point);
 #if HAS_SOFT_LIGHT
-    in->toward = soft_light(s, at, in->toward, light_index, ray_of_light, w);
+    in->toward = soft_light(s, at, here->point, in->toward, light_index, ray_of_light, w);
+    if (light_is_seen(light)) *in = light_along(light, here->point, in->toward);
 #endif
     if (!light->shadow) *wanted &= ~*wanted;
     return 1;

@@ -19,6 +19,7 @@
 #include "cones.h"
 #include "spot.h"
 #include "pixel_points.h"
+#include "light_places.h"
 #include "secondary.h"
 #if HAS_FOG
 #include "fog.h"
@@ -149,11 +150,13 @@ STAGE(light_spots) {
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     path so_far;
-    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
+    const vec direction = arrived.direction;
 #if HAS_SHAFTS
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     if (bounce == 0) air_gather(s, &here.at, a, &found, turns_for_light(w), &cost, w);
 #endif
+    path_meets_light(s, &so_far, &found, arrived, w);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT

@@ -111,8 +111,7 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
         "HAS_SOFT_LIGHT": int(
-            any(light.angular_size > 0 for light in scene.lights)
-            and not isinstance(scene.lighting, PathLighting)
+            any(light.has_size for light in scene.lights) and not isinstance(scene.lighting, PathLighting)
         ),
         "HAS_FOG": int(scene.fog is not None),
         "ADAPTIVE": int(renderer.noise is not None),
@@ -125,7 +124,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
-        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
+        **records.LIGHT_DEFINES,
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "ADAPTIVE": 0,
         "POINTS": several_points(scene),

@@ -7,7 +7,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import PointLight
+from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
@@ -209,7 +209,7 @@ def _check_lights(scene: Scene) -> None:
     candidates = [
         (index, light.position)
         for index, light in enumerate(scene.lights)
-        if isinstance(light, PointLight) and dist(light.position, center) <= radius
+        if isinstance(light, PlacedLight) and dist(light.position, center) <= radius
     ]
     if not candidates:
         return
