@@ -36,7 +36,7 @@ typedef struct {
 // by the angle at a lamp (Kulla and Fajardo 2012). `weight`: density of fog times what comes through, over the probability of the place.
 INLINE real scattering_place(ray r, real far, real u, __constant const struct Light *light, __constant const struct Material *m,
                              real *weight) {
-    if (light->kind == LIGHT_DIRECTIONAL || !light->inverse_square) {
+    if (light->kind == LIGHT_DIRECTIONAL || (!light_is_seen(light) && !light->inverse_square)) {
         const real depth = pick(less(far, R(1e30)), fog_depth(r.origin, r.direction, fmin(far, R(1e30)), m),
                                 -log(fmax(fog_passes_all(r.origin, r.direction, m), R(1e-30))));
         *weight = R(1.0) - exp(-depth);
@@ -77,7 +77,7 @@ INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, i
 }
 
 // How far a ray from the eye goes through the fog.
-INLINE real way_in_fog(stage s, ray r, const spot *here) {
+INLINE real way_in_fog(stage s, ray r, const spot *here, world w) {
     real far = pick(mask_of(here->found), vec_dot(vec_sub(here->seen, r.origin), r.direction), (real)(REAL_LARGEST));
 #if PLANES > 0
     plane_face face;
@@ -93,7 +93,7 @@ INLINE real way_in_fog(stage s, ray r, const spot *here) {
 // Sends a ray for each light, in the turns from `first` on.
 INLINE void air_send(stage s, const packet_pixels *at, aim a, const spot *here, int first, world w) {
     const ray r = eye_ray(&a, w.view);
-    const real far = way_in_fog(s, r, here);
+    const real far = way_in_fog(s, r, here, w);
     for (int i = 0; i < w.settings->light_count; ++i) {
         const scattering from = scattered(s, at, r, far, i, w);
         ray asks = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
@@ -106,7 +106,7 @@ INLINE void air_send(stage s, const packet_pixels *at, aim a, const spot *here, 
 // Adds what these rays bring, and keeps it to the end of the shot.
 INLINE void air_gather(stage s, const packet_pixels *at, aim a, const spot *here, int first, tally *cost, world w) {
     const ray r = eye_ray(&a, w.view);
-    const real far = way_in_fog(s, r, here);
+    const real far = way_in_fog(s, r, here, w);
     color air = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
         const encounter met = queue_met(s.q, first + i, s.slot);

@@ -91,8 +91,8 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     }
     // Lights hide what is behind them.
     real far = chosen.distance * R(0.999);
-    const lamp before = lamp_met(from, chosen.toward, 0, &far, w);
-    chosen.light = color_pick(before.met, color_of(R(0.0), R(0.0), R(0.0)), chosen.light);
+    const lamp hides = lamp_met(from, chosen.toward, 0, &far, w);
+    chosen.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), chosen.light);
     // A light of one direction is never met by chance.
     const mask has_size = less(R(0.0), chosen.density);
     const real asked = share * chosen.density;

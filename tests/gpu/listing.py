@@ -40,6 +40,11 @@ _OFTEN: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "motion": {"": {}, "motion": {"animation": {"frames": 2, "shutter": 0.5, "frame": 0}}},
 }
 # What a scene says for each value of a feature: sections that are put together.
+_SHAPES = [
+    {"type": "sphere", "position": [9, 0, 9], "radius": 1},
+    {"type": "rectangle", "position": [-9, 0, 9], "direction": [1, 0, -1], "width": 2, "height": 1},
+    {"type": "spot", "position": [0, -9, 9], "direction": [0, 1, -1]},
+]
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
@@ -67,6 +72,7 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "light": {
         "": {},
         "soft": {"lights": [{"type": "directional", "direction": [1, 1, -1], "angular_size": 5}]},
+        "shapes": {"lights": _SHAPES},
     },
     "fog": {
         "": {},

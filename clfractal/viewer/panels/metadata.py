@@ -59,6 +59,11 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Material.diffuse": (0, 1),
     "Material.specular": (0, 1),
     "Material.shininess": (1, 1000),
+    **{
+        f"{kind}Light.temperature": (1500, 12_000)
+        for kind in ("Directional", "Point", "Spot", "Sphere", "Rectangle")
+    },
+    **{f"{kind}Light.intensity": (0, 4) for kind in ("Spot", "Sphere", "Rectangle")},
     "DirectionalLight.intensity": (0, 4),
     "PointLight.intensity": (0, 4),
     "DirectionalLight.angular_size": (0, 45),
