@@ -5,7 +5,45 @@
 #include "albedos.h"
 #include "microfacets.h"
 
-// A material at a spot.
+// The parameters of a material at a spot, which may differ from lane to lane.
+typedef struct {
+    color base;   // the colour of the body or the metal
+    real base_metalness, base_diffuse_roughness;
+    color specular_color;
+    real specular_weight, specular_roughness, specular_ior;
+    color coat_color;
+    real coat_weight, coat_roughness, coat_ior, coat_darkening;
+    color fuzz_color;
+    real fuzz_weight, fuzz_roughness;
+    color emission;
+} pbr;
+
+// `tint`: the colouring's colour.
+INLINE pbr pbr_of(__constant const struct Pbr *m, color tint) {
+    pbr p;
+    p.base = color_scale(m->base_own ? color_splat(m->base_color) : tint, (real)(m->base_weight));
+    p.base_metalness = (real)(m->base_metalness);
+    p.base_diffuse_roughness = (real)(m->base_diffuse_roughness);
+    p.specular_color = color_splat(m->specular_color);
+    p.specular_weight = (real)(m->specular_weight);
+    p.specular_roughness = (real)(m->specular_roughness);
+    p.specular_ior = (real)(m->specular_ior);
+    p.coat_color = color_splat(m->coat_color);
+    p.coat_weight = (real)(m->coat_weight);
+    p.coat_roughness = (real)(m->coat_roughness);
+    p.coat_ior = (real)(m->coat_ior);
+    p.coat_darkening = (real)(m->coat_darkening);
+    p.fuzz_color = color_splat(m->fuzz_color);
+    p.fuzz_weight = (real)(m->fuzz_weight);
+    p.fuzz_roughness = (real)(m->fuzz_roughness);
+    p.emission = color_splat(m->emission);
+    return p;
+}
+
+// Whether any lane has some of it.
+INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }
+
+// A material at a spot, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...
     vec out;                // ... and in it the direction to the viewer
@@ -20,6 +58,7 @@ typedef struct {
 } bsdf;
 
 INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
+INLINE real brightest(color c) { return fmax(fmax(c.r, c.g), c.b); }
 INLINE real luminance(color c) { return R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b; }
 INLINE color color_less(color c) { return color_of(R(1.0) - c.r, R(1.0) - c.g, R(1.0) - c.b); }
 
@@ -30,50 +69,48 @@ INLINE real through_boundary(albedo o, albedo i) {
 
 INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
 
-// `base`: the colour of the body or the metal; `to_viewer` has length 1.
-INLINE bsdf bsdf_at(__constant const struct Pbr *m, color base, vec normal, vec to_viewer, __global const float *tables) {
+// `to_viewer` has length 1.
+INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const float *tables) {
     bsdf b;
     b.normal = normal;
     make_frame(normal, &b.side, &b.up);
     b.out = bsdf_local(&b, to_viewer);
     b.seen = less(R(0.0), b.out.z);
     b.out.z = fmax(b.out.z, R(1e-4));
-    b.metal = b.body = color_scale(base, (real)(m->base_weight));
-    b.metalness = (real)(m->base_metalness);
-    b.rough_body = (real)(m->base_diffuse_roughness);
-    b.rough = (real)(m->specular_roughness);
+    b.metal = b.body = p->base;
+    b.metalness = p->base_metalness;
+    b.rough_body = p->base_diffuse_roughness;
+    b.rough = p->specular_roughness;
     b.alpha = alpha_of(b.rough);
-    b.edge = color_splat(m->specular_color);
-    const scalar bend = (m->specular_ior - S(1.0)) / (m->specular_ior + S(1.0));
-    b.root = fmin((real)(bend) * sqrt((real)(m->specular_weight)), R(0.98));
+    b.gloss = b.edge = p->specular_color;
+    b.root = fmin((p->specular_ior - R(1.0)) / (p->specular_ior + R(1.0)) * sqrt(p->specular_weight), R(0.98));
     b.ior = (R(1.0) + b.root) / (R(1.0) - b.root);
-    b.gloss = b.edge;
-    b.coat = (real)(m->coat_weight);
-    b.coat_tint = color_mix(color_of(R(1.0), R(1.0), R(1.0)), color_splat(m->coat_color), b.coat);
-    b.coat_rough = (real)(m->coat_roughness);
+    b.coat = p->coat_weight;
+    b.coat_tint = color_mix(color_of(R(1.0), R(1.0), R(1.0)), p->coat_color, b.coat);
+    b.coat_rough = p->coat_roughness;
     b.coat_alpha = alpha_of(b.coat_rough);
-    b.coat_ior = (real)(m->coat_ior);
+    b.coat_ior = p->coat_ior;
     b.coat_root = (b.coat_ior - R(1.0)) / (b.coat_ior + R(1.0));
-    b.fuzz = color_scale(color_splat(m->fuzz_color), (real)(m->fuzz_weight));
-    b.fuzz_rough = fmax((real)(m->fuzz_roughness), SMOOTHEST_FUZZ);
-    if (m->coat_weight > S(0.0) && m->coat_darkening > S(0.0)) {
+    b.fuzz = color_scale(p->fuzz_color, p->fuzz_weight);
+    b.fuzz_rough = fmax(p->fuzz_roughness, SMOOTHEST_FUZZ);
+    b.coat_albedo = b.fuzz_albedo = R(0.0);
+    if (any_of(b.coat)) {
         // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
         const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
-        const real most = b.coat * (real)(m->coat_darkening);
+        const real most = b.coat * p->coat_darkening;
 #define DARKENED(c) c *= R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * c)
         DARKENED(b.body.r);
         DARKENED(b.body.g);
         DARKENED(b.body.b);
 #undef DARKENED
         b.metal = b.body;
+        b.coat_albedo = b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction;
     }
-    b.coat_albedo = m->coat_weight > S(0.0) ? b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction : R(0.0);
-    b.fuzz_albedo = R(0.0);
-    if (m->fuzz_weight > S(0.0)) {
-        const real most = fmax(fmax(b.fuzz.r, b.fuzz.g), b.fuzz.b);
-        b.fuzz_albedo = most * albedo_at(tables + ALBEDO_FUZZ, b.out.z, b.fuzz_rough).of_direction;
+    if (any_of(brightest(b.fuzz))) {
+        b.fuzz_albedo = brightest(b.fuzz) * albedo_at(tables + ALBEDO_FUZZ, b.out.z, b.fuzz_rough).of_direction;
     }
-    const real of_gloss = m->base_metalness < S(1.0) && m->specular_weight > S(0.0) ? albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction : R(0.0);
+    real of_gloss = R(0.0);
+    if (any_of((R(1.0) - b.metalness) * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
     const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + (R(1.0) - b.metalness) * of_gloss;
     const real scattered = (R(1.0) - b.metalness) * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
                            + luminance(b.fuzz);
@@ -103,18 +140,18 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, __global cons
 }
 
 // f * cosine; 0 for directions below the surface.
-INLINE color bsdf_value(const bsdf *b, vec toward, __constant const struct Pbr *m, __global const float *tables) {
+INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables) {
     vec i = bsdf_local(b, toward);
     const mask over = b->seen & less(R(0.0), i.z);
     i.z = fmax(i.z, R(1e-6));
     const vec h = middle_way(b->out, i);
     const real single = ggx_value(b->out, i, h, b->alpha);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
-    if (m->base_metalness < S(1.0)) {
+    if (any_of(R(1.0) - b->metalness)) {
         const color body = eon_value(b->body, b->out, i, b->rough_body);
         albedo o = {R(0.0), R(0.0)}, other = o;
         real gloss = R(0.0);
-        if (m->specular_weight > S(0.0)) {
+        if (any_of(b->root)) {
             o = albedo_of_dielectric(tables, b->out.z, b->rough, b->root);
             other = albedo_of_dielectric(tables, i.z, b->rough, b->root);
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
@@ -122,13 +159,13 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __constant const struct Pbr *
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other))),
                           R(1.0) - b->metalness);
     }
-    if (m->base_metalness > S(0.0)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, tables), b->metalness));
-    if (m->coat_weight > S(0.0)) {
+    if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, tables), b->metalness));
+    if (any_of(b->coat)) {
         const real coat = b->coat * ggx_value(b->out, i, h, b->coat_alpha) * fresnel_dielectric(vec_dot(b->out, h), b->coat_ior);
         sum = color_mul(sum, color_scale(b->coat_tint, R(1.0) - b->coat_albedo));
         sum = color_add(sum, color_of(coat, coat, coat));
     }
-    if (m->fuzz_weight > S(0.0)) {
+    if (any_of(brightest(b->fuzz))) {
         const real fibres = fuzz_value(b->out, i, b->fuzz_rough) * i.z;
         sum = color_add(color_scale(sum, R(1.0) - b->fuzz_albedo), color_scale(b->fuzz, fibres));
     }

@@ -6,8 +6,6 @@ INLINE real power_share(real own, real other) {
     return square / fmax(square + other * other, (real)(REAL_SMALLEST));
 }
 
-INLINE real brightest(color c) { return fmax(fmax(c.r, c.g), c.b); }
-
 INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w, real *u, real *v) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, purpose + 16u * (uint)s.bounce);
     unit_square((bits)((uint)s.sample), seed, u, v);
@@ -98,7 +96,7 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     const real asked = share * chosen.density;
     const real other = pick(both, bsdf_density(b, chosen.toward), R(0.0));
     const real weight = pick(has_size, power_share(asked, other) / asked, R(1.0) / share);
-    *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.materials, w.albedos), chosen.light), weight);
+    *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.albedos), chosen.light), weight);
     const mask dark = ~less(R(0.0), brightest(*brings));
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
@@ -113,7 +111,7 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
     so_far->direction = bsdf_sample(b, choice, u, v, &with->density);
     mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density);
-    const color part = color_scale(bsdf_value(b, so_far->direction, w.materials, w.albedos), R(1.0) / with->density);
+    const color part = color_scale(bsdf_value(b, so_far->direction, w.albedos), R(1.0) / with->density);
     so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
     on_path &= less(R(0.0), brightest(so_far->through));
     if (s.bounce >= w.settings->roulette) {
@@ -156,8 +154,6 @@ STAGE(scatter_paths) {
         so_far.seen = color_pick(before.met, before.shows, so_far.seen);
         spot_of_light(s, &found, arrived.origin, arrived.direction, far, before.met);
     }
-    const color shines = color_mul(color_splat(w.materials->emission), so_far.through);
-    so_far.seen = color_pick(lands, color_add(so_far.seen, shines), so_far.seen);
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
@@ -165,8 +161,9 @@ STAGE(scatter_paths) {
 #if !COLORING_PER_POINT
         found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
 #endif
-        const color base = w.materials->base_own ? color_splat(w.materials->base_color) : found.tint;
-        const bsdf b = bsdf_at(w.materials, base, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
+        const pbr p = pbr_of(w.materials, found.tint);
+        so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(p.emission, so_far.through)), so_far.seen);
+        const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
         so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), found.normal);
         with.total = weight_of_all(so_far.origin, w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, w, &with.awaited);

@@ -54,8 +54,9 @@ __kernel void scatter(__global const scalar *in, __global scalar *out, __constan
     const vec viewer = vec_of(load(in), load(in + count), load(in + 2 * count));
     const vec light = vec_of(load(in + 3 * count), load(in + 4 * count), load(in + 5 * count));
     const vec normal = vec_of(R(0.0), R(0.6), R(0.8));
-    const bsdf b = bsdf_at(material, color_splat(material->base_color), normal, viewer, albedos);
-    const color value = bsdf_value(&b, light, material, albedos);
+    const pbr p = pbr_of(material, color_splat(material->base_color));
+    const bsdf b = bsdf_at(&p, normal, viewer, albedos);
+    const color value = bsdf_value(&b, light, albedos);
     PUT_COLOR(0, value);
     store(out + 3 * count, bsdf_density(&b, light));
     real density;
@@ -64,7 +65,7 @@ __kernel void scatter(__global const scalar *in, __global scalar *out, __constan
     store(out + 5 * count, chosen.y);
     store(out + 6 * count, chosen.z);
     store(out + 7 * count, density);
-    const color there = bsdf_value(&b, chosen, material, albedos);
+    const color there = bsdf_value(&b, chosen, albedos);
     PUT_COLOR(8, there);
 }
 """
