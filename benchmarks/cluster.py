@@ -1,10 +1,12 @@
-"""What a cluster costs and gains: python -m benchmarks.cluster [--rounds 3] [--workers 200]
+"""What a cluster costs and gains: python -m benchmarks.cluster [--rounds 3] [--workers 200] [--frames 10000] [--side 16384]
 
 - `speed`: a picture by one worker of one core, and by two of one core each, in turn; each worker, the scheduler and this
   process are processes of their own, on this machine.
 - `tasks`: how many tasks a scheduler holds, with simulated workers that answer at once (several in each of two processes).
   All of it shares this machine's cores, so the processor time of the scheduler and of this process for each task are
   measured beside the rate: a machine with cores for all of them reaches the inverse of these.
+- `memory`: what scheduler and client hold while a film of many frames, and a large picture, are made by simulated workers.
+  The client is the command itself, with its journal and its files; only the pixels are none.
 """
 
 from __future__ import annotations
@@ -43,7 +45,17 @@ formula: {name: mandelbulb, iterations: 8}
 image: {width: 4096, height: 4096}
 camera: {position: [0, -3, 0]}
 """
+FILM = """version: 1
+formula: {name: mandelbulb, iterations: 4}
+image: {width: 64, height: 64}
+camera: {position: [0, -3, 0]}
+animation:
+  frames: FRAMES
+  tracks: {camera.fov: {expression: "40 + 10*u"}}
+"""
 SIMULATED = "--simulated-workers"
+# Simulated time of a tile, seconds: one tile in a task, or the bundles of a usual picture.
+_SLOW, _USUAL = 1.0, 1 / 256
 
 
 @contextmanager
@@ -125,7 +137,7 @@ def tasks(workers: int, rounds: int) -> None:
     with ExitStack() as stack:
         address, running = stack.enter_context(scheduler())
         for count in (workers // 2, workers - workers // 2):
-            own = ["-m", "benchmarks.cluster", SIMULATED, f"{count},{address}"]
+            own = ["-m", "benchmarks.cluster", SIMULATED, f"{count},{_SLOW},{address}"]
             stack.enter_context(process(own))
         cluster = stack.enter_context(Cluster(address))
         begun = time.perf_counter()
@@ -151,8 +163,54 @@ def tasks(workers: int, rounds: int) -> None:
             )
 
 
-async def simulate(count: int, address: str) -> None:
-    """Workers that answer at once: a task has one tile of zeros, and says that it took a second."""
+def memory(frames: int, side: int) -> None:
+    """Prints what scheduler and client hold at each quarter of a film of many frames, and of a large picture."""
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        address, running = stack.enter_context(scheduler())
+        own = ["-m", "benchmarks.cluster", SIMULATED, f"8,{_USUAL},{address}"]
+        stack.enter_context(process(own))
+        (folder / "film.yaml").write_text(FILM.replace("FRAMES", str(frames)))
+        (folder / "large.yaml").write_text(LARGE)
+        order = ["animate", str(folder / "film.yaml"), "-o", str(folder / "f_#####.png")]
+        watched(f"film of {frames} frames", [*order, "--cluster", address], running)
+        print(f"  {len(list(folder.glob('f_*.png')))} frames are there")
+        for each in (side // 4, side):
+            order = ["render", str(folder / "large.yaml"), "--size", f"{each}x{each}", "--samples", "1"]
+            order += ["-o", str(folder / f"{each}.exr"), "--cluster", address]
+            watched(f"picture of {each} x {each}", order, running)
+            print(f"  {(folder / f'{each}.exr').stat().st_size / 2**20:.0f} MiB are there")
+
+
+def watched(what: str, order: Sequence[str], running: psutil.Process) -> None:
+    """Prints the memory of a command and of the scheduler, at its highest, for each quarter of the command's time.
+
+    A process's own memory is told without pages of files, which the system takes back when it needs them.
+    """
+    found: list[tuple[float, int, int]] = []
+    start = time.perf_counter()
+    with process(["-m", "clfractal", *order, "--quiet"]) as client:
+        while client.status() != psutil.STATUS_ZOMBIE:
+            with suppress(psutil.NoSuchProcess, psutil.ZombieProcess):
+                found.append((time.perf_counter() - start, own_bytes(client), own_bytes(running)))
+            time.sleep(0.2)
+        status = client.wait()
+        assert status == 0, f"{what}: exit status {status}"
+    seconds = found[-1][0]
+    for name, place in (("client", 1), ("scheduler", 2)):
+        parts = [[each[place] for each in found if q <= 4 * each[0] / seconds <= q + 1] for q in range(4)]
+        quarters = ", ".join(f"{max(part, default=0) / 2**20:.0f}" for part in parts)
+        print(f"{what}, {seconds:.0f} s: {name} {quarters} MiB in the quarters", flush=True)
+
+
+def own_bytes(process: psutil.Process) -> int:
+    """Memory that is a process's own, bytes; where the system does not tell which, all of it."""
+    told = process.memory_info()
+    return int(told.rss - getattr(told, "shared", 0))
+
+
+async def simulate(count: int, seconds: float, address: str) -> None:
+    """Workers that answer at once with tiles of zeros, and say that each tile took some seconds."""
     import numpy as np
     from distributed import Worker, get_worker
 
@@ -166,11 +224,13 @@ async def simulate(count: int, address: str) -> None:
     def enlist(*_: Any) -> dict[str, Any]:
         return {"version": "", "fingerprint": fingerprint(), "pid": os.getpid(), "device": info}
 
-    def tiles(_seat: Any, _data: Any, _arrays: Any, item: Any) -> real.Answer:
-        film = np.zeros((len(item.tiles), 5, TILE, TILE), np.float32)
-        address = get_worker().address
+    def tiles(_seat: Any, data: Any, arrays: Any, item: Any) -> real.Answer:
+        with real._one_at_a_time:
+            channels = len(real._unpacked(data, arrays).channels)
+        film = np.zeros((len(item.tiles), channels, TILE, TILE), np.float32)
+        own, tally, took = get_worker(), Tally(rays=1), seconds * len(item.tiles)
         return real.Answer(
-            item.view, item.tiles, film, Tally(rays=1), float(len(item.tiles)), address, info.key
+            item.view, item.tiles, film, tally, took, own.address, str(own.name), real.maker_of(info)
         )
 
     for function in (enlist, tiles):
@@ -188,17 +248,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--workers", type=int, default=200)
-    parser.add_argument("--only", choices=("speed", "tasks"))
+    parser.add_argument("--only", choices=("speed", "tasks", "memory"))
+    parser.add_argument("--frames", type=int, default=10_000, help="of the film whose memory is measured")
+    parser.add_argument("--side", type=int, default=16384, help="of the picture whose memory is measured")
     parser.add_argument(SIMULATED, help=argparse.SUPPRESS)
     wanted = parser.parse_args()
     if wanted.simulated_workers:
-        count, _, address = wanted.simulated_workers.partition(",")
-        asyncio.run(simulate(int(count), address))
+        count, seconds, address = wanted.simulated_workers.split(",")
+        asyncio.run(simulate(int(count), float(seconds), address))
         return
     if wanted.only in (None, "speed"):
         speed(wanted.rounds)
     if wanted.only in (None, "tasks"):
         tasks(wanted.workers, wanted.rounds)
+    if wanted.only in (None, "memory"):
+        memory(wanted.frames, wanted.side)
 
 
 if __name__ == "__main__":

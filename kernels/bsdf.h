@@ -107,7 +107,7 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __constant const struct Pbr *
     vec i = bsdf_local(b, toward);
     const mask over = b->seen & less(R(0.0), i.z);
     i.z = fmax(i.z, R(1e-6));
-    const vec h = half_way(b->out, i);
+    const vec h = middle_way(b->out, i);
     const real single = ggx_value(b->out, i, h, b->alpha);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     if (m->base_metalness < S(1.0)) {
@@ -137,7 +137,7 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __constant const struct Pbr *
 
 // Probability per steradian with which bsdf_sample chooses a direction.
 INLINE real bsdf_density(const bsdf *b, vec toward) {
-    const vec i = bsdf_local(b, toward), h = half_way(b->out, i);
+    const vec i = bsdf_local(b, toward), h = middle_way(b->out, i);
     const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss) * fmax(i.z, R(0.0)) / BSDF_PI;
     const real sum = hemisphere + b->by_gloss * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
     return pick(b->seen & less(R(0.0), i.z), sum, R(0.0));

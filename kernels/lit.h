@@ -26,7 +26,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     }
     gathered = limited(gathered, w.settings);
 #endif
-    for (; turn < s.q.turns; ++turn) {
+    for (; turn < turns_for_light(w); ++turn) {
         const int number = turn - hemisphere_turns(w);
         __constant const struct Light *light = w.lights + number / w.settings->light_rays;
         if (number % w.settings->light_rays >= light->rays) continue;
@@ -34,10 +34,23 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
         tally_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
+        if (light_is_seen(light)) in = light_along(light, here->point, in.toward);
         const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, w.material);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }
     return gathered;
+}
+
+// A path that meets a light before the surface ends there.
+INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, world w) {
+    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+    color shows = color_of(R(0.0), R(0.0), R(0.0));
+    real density = R(0.0), weight = R(0.0);
+    const mask met = mask_of(so_far->on_path) & nearest_light(arrived.origin, arrived.direction, s.bounce == 0, &far, &shows, &density, &weight, w);
+    if (!any_lane(met)) return;
+    so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(shows, so_far->through)), so_far->seen);
+    so_far->on_path = number_of(mask_of(so_far->on_path) & ~met);
+    spot_of_light(s, found, arrived.origin, arrived.direction, far, met);
 }
 
 // Adds the light of the path's present spot, or of the sky past it, to what the path has seen.
@@ -94,11 +107,21 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #if HAS_FOG
     const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
     const color mist = color_splat(w.material->fog_color);
-    seen = color_mix(seen, mist, R(1.0) - exp(-(real)(w.material->fog_density) * way));
-    if (w.material->fog_background) background = mist;
+    seen = color_mix(seen, mist, R(1.0) - exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material)));
+    if (w.material->fog_background) {
+        background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
+    }
+#endif
+#if HAS_SHAFTS
+    color air;
+    STATE_RECALL(s, air, STATE_AIR);
+    seen = color_add(seen, air);
 #endif
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
+#if HAS_SHAFTS
+    background = color_add(background, air);
+#endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
 #if PLANES > 0

@@ -16,7 +16,7 @@ INLINE real ggx_normals(vec h, real alpha) {
     return a2 / (BSDF_PI * t * t);
 }
 
-INLINE vec half_way(vec o, vec i) { return vec_normalize(vec_add(o, i)); }
+INLINE vec middle_way(vec o, vec i) { return vec_normalize(vec_add(o, i)); }
 
 // What GGX reflects, with a reflectance of 1: f * cosine. Both directions over the surface.
 INLINE real ggx_value(vec o, vec i, vec h, real alpha) {
@@ -90,7 +90,7 @@ INLINE color eon_value(color base, vec o, vec i, real roughness) {
 // Fibres that stand on the surface: Estevez and Kulla 2017 with the shadows of Neubelt and Pettineo 2013. f, not times the cosine.
 INLINE real fuzz_value(vec o, vec i, real roughness) {
     const real power = R(1.0) / fmax(roughness, SMOOTHEST_FUZZ);
-    const vec h = half_way(o, i);
+    const vec h = middle_way(o, i);
     const real sine2 = fmax(R(1.0) - h.z * h.z, R(1e-12));
     const real density = (R(2.0) + power) * pow(sine2, R(0.5) * power) / (R(2.0) * BSDF_PI);
     return density / (R(4.0) * fmax(o.z + i.z - o.z * i.z, R(1e-6)));

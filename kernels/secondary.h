@@ -9,13 +9,13 @@ INLINE color limited(color c, __constant const struct March *settings) {
 
 #if HAS_SOFT_LIGHT
 // The direction to the part of a light that this ray goes to; `toward` is the direction to its middle.
-INLINE vec soft_light(stage s, const packet_pixels *at, vec toward, int light_index, int turn, world w) {
+INLINE vec soft_light(stage s, const packet_pixels *at, vec point, vec toward, int light_index, int turn, world w) {
     __constant const struct Light *light = w.lights + light_index;
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed,
                                  (uint)(PURPOSE_LIGHT + 16 * (1 + light_index + 64 * s.bounce)));
     real u, v;
     unit_square((bits)((uint)(s.sample * light->rays + turn)), seed, &u, &v);
-    return cone_direction(toward, (real)(light->spread), u, v);
+    return light_direction(light, point, toward, u, v);
 }
 #endif
 
@@ -76,6 +76,9 @@ INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, w
 // The turns of the rays that leave a spot: first those into the hemisphere, then each light's.
 INLINE int hemisphere_turns(world w) { return w.settings->cosine_rays + w.settings->map_rays; }
 
+// All turns of a spot.
+INLINE int turns_for_light(world w) { return hemisphere_turns(w) + w.settings->light_count * w.settings->light_rays; }
+
 // The direction that a ray of this turn takes, and whether anything may be in its way; false for turns that a light does not need.
 INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w, incidence *in, mask *wanted) {
 #if HAS_AMBIENT
@@ -90,7 +93,8 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn
     if (ray_of_light >= light->rays) return 0;
     *in = light_at(light, here->point);
 #if HAS_SOFT_LIGHT
-    in->toward = soft_light(s, at, in->toward, light_index, ray_of_light, w);
+    in->toward = soft_light(s, at, here->point, in->toward, light_index, ray_of_light, w);
+    if (light_is_seen(light)) *in = light_along(light, here->point, in->toward);
 #endif
     if (!light->shadow) *wanted &= ~*wanted;
     return 1;
@@ -117,7 +121,7 @@ INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, i
         r.spread = R(0.0);
         r.known = RAY_NOTHING_KNOWN;
         send_clipped(s, turn, r, R(0.0), wanted, w);
-#if HAS_ENVIRONMENT
+#if HAS_AMBIENT && HAS_ENVIRONMENT
         if (turn < hemisphere_turns(w)) lanes_store(in.strength, ambient_strength(s, turn));
 #endif
     }

@@ -10,7 +10,7 @@ typedef struct {
     real strength;   // intensity after falloff
 } incidence;
 
-INLINE incidence light_at(__constant const struct Light *light, vec point) {
+INLINE incidence light_from_middle(__constant const struct Light *light, vec point) {
     incidence in;
     in.strength = (real)(light->intensity);
     if (light->kind == LIGHT_DIRECTIONAL) {
@@ -23,6 +23,29 @@ INLINE incidence light_at(__constant const struct Light *light, vec point) {
         in.distance = sqrt(square);
         if (light->inverse_square) in.strength /= square;
     }
+    return in;
+}
+
+// What a point shows of a light whose middle lies that far: a spot's cone, a ball's or a rectangle's size.
+INLINE real light_shape(__constant const struct Light *light, vec toward, real square) {
+    const vec axis = vec_splat(light->axis);
+    const real along = -vec_dot(toward, axis);
+    if (light->kind == LIGHT_SPHERE) return least((real)(light->radius * light->radius) / square, R(1.0));
+    if (light->kind == LIGHT_RECTANGLE) {
+        return (real)(light->area) * R(0.3183098861837907) * most(along, R(0.0)) / square;
+    }
+    // Of the angle, which keeps its digits in narrow cones.
+    const vec across = vec_cross(toward, axis);
+    const real angle = atan2(sqrt(vec_dot(across, across)), along);
+    const scalar wide = light->rim[0], narrow = light->rim[1];
+    if (wide <= narrow) return pick(less_equal(angle, (real)(wide)), R(1.0), R(0.0));
+    const real t = most(least(((real)(wide) - angle) * (real)(S(1.0) / (wide - narrow)), R(1.0)), R(0.0));
+    return t * t * (R(3.0) - R(2.0) * t);
+}
+
+INLINE incidence light_at(__constant const struct Light *light, vec point) {
+    incidence in = light_from_middle(light, point);
+    if (light->kind >= LIGHT_SPOT) in.strength *= light_shape(light, in.toward, in.distance * in.distance);
     return in;
 }
 

@@ -19,7 +19,14 @@
 #include "cones.h"
 #include "spot.h"
 #include "pixel_points.h"
+#include "light_places.h"
 #include "secondary.h"
+#if HAS_FOG
+#include "fog.h"
+#endif
+#if HAS_SHAFTS
+#include "air.h"
+#endif
 #include "lit.h"
 #if HAS_PATHS
 #include "bsdf.h"
@@ -127,6 +134,9 @@ STAGE(find_spots) {
     if (COLORING == COLORING_RESIDUAL) found.quantity = found.residual;
     spot_keep(&found, s.state, bounce, s.stride);
     send_for_light(s, &here.at, &found, next_turns, w);
+#if HAS_SHAFTS
+    if (bounce == 0) air_send(s, &here.at, a, &found, HAS_PATHS ? 1 : next_turns, w);
+#endif
 }
 
 #if !HAS_PATHS
@@ -140,7 +150,13 @@ STAGE(light_spots) {
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     path so_far;
-    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
+    const vec direction = arrived.direction;
+#if HAS_SHAFTS
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+    if (bounce == 0) air_gather(s, &here.at, a, &found, turns_for_light(w), &cost, w);
+#endif
+    path_meets_light(s, &so_far, &found, arrived, w);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT

@@ -7,18 +7,18 @@ typedef struct {
     color light;
     real through, t, value;
     vec normal;
-    mask found, on_plane, half_way;   // the last: where it was met by what came last
+    mask found, on_plane, middle_way;   // the last: where it was met by what came last
 } sight;
 
 // A place with the given `opacity` becomes visible; returns the part of its own light that reaches the eye.
 INLINE real sight_pass(sight *s, real opacity, real t, real value, mask adds) {
     const real weight = pick(adds, s->through * opacity, R(0.0));
     s->through = pick(adds, s->through * (R(1.0) - opacity), s->through);
-    const mask half_way = adds & ~s->found & less_equal(s->through, R(0.5));
-    s->t = pick(half_way, t, s->t);
-    s->value = pick(half_way, value, s->value);
-    s->found |= half_way;
-    s->half_way = half_way;
+    const mask middle_way = adds & ~s->found & less_equal(s->through, R(0.5));
+    s->t = pick(middle_way, t, s->t);
+    s->value = pick(middle_way, value, s->value);
+    s->found |= middle_way;
+    s->middle_way = middle_way;
     return weight;
 }
 
@@ -26,8 +26,8 @@ INLINE real sight_pass(sight *s, real opacity, real t, real value, mask adds) {
 INLINE void sight_add(sight *s, color light, real opacity, real t, real value, vec normal, mask of_plane, mask adds) {
     const real weight = sight_pass(s, opacity, t, value, adds);
     s->light = color_pick(adds, color_add(s->light, color_scale(light, weight)), s->light);
-    s->normal = vec_pick(s->half_way, normal, s->normal);
-    s->on_plane |= s->half_way & of_plane;
+    s->normal = vec_pick(s->middle_way, normal, s->normal);
+    s->on_plane |= s->middle_way & of_plane;
 }
 
 // The quads in the picture that are still ahead of a ray; where a surface is shown they are added after it.
@@ -131,7 +131,7 @@ typedef struct {
     color sum;                 // the light of those before
 } unlit;
 
-INLINE void unlit_add(unlit *u, real number, real value, real weight, mask half_way, mask adds) {
+INLINE void unlit_add(unlit *u, real number, real value, real weight, mask middle_way, mask adds) {
     for (int k = 0; k < TURNS(PENDING); ++k) {
         const mask here = adds & equal(u->count, (real)((scalar)k));
         u->places[k].number = pick(here, number, u->places[k].number);
@@ -139,7 +139,7 @@ INLINE void unlit_add(unlit *u, real number, real value, real weight, mask half_
         u->places[k].weight = pick(here, weight, u->places[k].weight);
     }
     u->count += pick(adds, R(1.0), R(0.0));
-    u->half_number = pick(half_way, number, u->half_number);
+    u->half_number = pick(middle_way, number, u->half_number);
 }
 
 INLINE void unlit_light(unlit *u, sight *e, ray r, grid_ray g, vec to_viewer, world w, real *looked) {
@@ -171,7 +171,7 @@ INLINE mask sight_step(sight *e, unlit *u, grid_ray g, mask active, real *number
             const real t = distance_of(g, *number, w);
             sight_quads(e, t, adds, q, w);
             const real weight = sight_pass(e, opacity, t, value, adds);
-            unlit_add(u, *number, value, weight, e->half_way, adds);
+            unlit_add(u, *number, value, weight, e->middle_way, adds);
             active &= less(R(1.0) - (real)(w.settings->opacity_limit), e->through);
         }
     }

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 from clfractal.device.cache_folder import set_drivers_folder
+
+if TYPE_CHECKING:
+    from tests.shell import InProcess
 
 # Where it belongs, although a test may be the first to use OpenCL that has a cache folder of its own.
 set_drivers_folder()
@@ -18,3 +25,23 @@ settings.register_profile(
     max_examples=100,
 )
 settings.load_profile("repeatable")
+
+
+@pytest.fixture
+def clf(
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> InProcess:
+    """The program, in a folder of the test's own with a scene.yaml.
+
+    That is the SCENE of the test's file, none if that is None, else a small one.
+    """
+    from tests.shell import SCENE, InProcess
+
+    monkeypatch.chdir(tmp_path)
+    scene = getattr(request.module, "SCENE", SCENE)
+    if scene is not None:
+        (tmp_path / "scene.yaml").write_text(scene)
+    return InProcess(capfd)

@@ -32,13 +32,6 @@ animation:
 """
 
 
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 def names() -> list[str]:
     return sorted(path.name for path in Path().iterdir() if path.name != "scene.yaml")
 
@@ -189,6 +182,67 @@ def test_mistakes_are_refused_before_a_frame(clf: InProcess, options: tuple[str,
     before = names()
     assert clf("animate", "scene.yaml", *options).is_one_line(2, REFUSED[options])
     assert names() == before
+
+
+PARTS_THAT_MOVE = """version: 1
+formula: {name: mandelbulb, iterations: 6}
+image: {width: 40, height: 24}
+camera: {position: [0, -3, 0], focus_distance: 2}
+stereo: {mode: split, separation: 0.2}
+lights: [{direction: [0, 1, -1]}, {type: point, position: [1, -2, 1]}]
+layout: {views: [{}, {camera: {position: [0, 3, 0]}}]}
+fog: {density: 0.1}
+renderer: {type: surface, bounds: {center: [0, 0, 0], radius: 2}}
+animation:
+  frames: 3
+  tracks:
+    TRACK: {expression: "VALUE"}
+"""
+REMOVED = {
+    ("stereo.separation", "0.2 + 0.1*u"): (
+        "stereo=null",
+        "cannot move: stereo is null; give it a value, or leave",
+    ),
+    ("fog.density", "0.1*u"): (
+        "fog=null",
+        "cannot move: fog is null; give it a value, or leave this track out",
+    ),
+    ("lights.1.intensity", "u"): (
+        "lights=[{direction: [0, 1, -1]}]",
+        "cannot move: lights has entries 0 to 0",
+    ),
+    ("lights.1.position.0", "u"): ("lights.1={direction: [0, 1, -1]}", "unknown key of lights.1 'position'"),
+    ("layout.views.1.camera.fov", "40 + u"): ("layout=null", "cannot move: layout is null; give it a value"),
+    ("renderer.bounds.radius", "2 + u"): ("renderer={type: volume}", "unknown key of renderer 'bounds'"),
+    ("camera.focus_distance", "2 + u"): (
+        "camera={projection: orthographic, position: [0, -3, 0], height: 3}",
+        "unknown key of camera",
+    ),
+    ("formula.parameters.power", "8 - u"): (
+        "formula={chain: [{name: menger_sponge}, {name: mandelbulb}]}",
+        "cannot move: formula is a chain; name a value of formula.chain.0, formula.chain.1",
+    ),
+}
+
+
+@pytest.mark.parametrize("track", REMOVED, ids=lambda track: track[0])
+def test_a_track_of_what_an_override_removes_is_refused_at_its_line(
+    clf: InProcess, track: tuple[str, str]
+) -> None:
+    """Whatever is moved is there without the override, and the message names the track, not the override."""
+    name, value = track
+    text = PARTS_THAT_MOVE.replace("TRACK", name).replace("VALUE", value)
+    others = tuple({"stereo", "layout"} - {name.partition(".")[0]})  # neither goes with all that is moved
+    text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith(others))
+    Path("scene.yaml").write_text(text)
+    clfractal.load_scene("scene.yaml")
+    override, message = REMOVED[track]
+    line = text[: text.index("{expression")].count("\n") + 1
+    for shell in (["animate", "scene.yaml", "-o", "f#.png"], ["check", "scene.yaml"]):
+        ended = clf(*shell, "--set", override)
+        assert ended.is_one_line(2, f"scene.yaml:{line}:"), ended
+        assert f": animation.tracks.{name}: {message}" in ended.err
+    assert names() == []
 
 
 def test_no_output_replaces_the_scene(clf: InProcess) -> None:

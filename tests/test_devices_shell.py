@@ -96,6 +96,42 @@ def test_the_header_and_the_statistics_name_the_devices(whole: Path, halves: str
     assert sum(int(run.split("*")[0]) for run in header["clfractalTileDevices"].split()) == TILES
 
 
+def told_tiles(lines: str) -> dict[str, int]:
+    """Of `clfractalDevices`: how many tiles each device made, by its index."""
+    return {line.split(" ")[1]: int(line.split(": ")[-1].split()[0]) for line in lines.split("\n")}
+
+
+@pytest.mark.parametrize("layout", [False, True])
+def test_each_view_of_a_file_names_its_own_devices(
+    halves: str,
+    layout: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """By view, and together as the statistics tell it."""
+    scene = HEAVY.replace("samples: 16", "samples: 1") + "stereo: {mode: multi_view, separation: 0.1}\n"
+    if layout:
+        scene += "layout: {views: [{}, {renderer: {samples: 2}}]}\n"
+    (tmp_path / "heavy.yaml").write_text(scene)
+    monkeypatch.chdir(tmp_path)
+    render = ("render", "heavy.yaml", "-o", "out.exr", "--device", halves, "--stats", "stats.json")
+    assert InProcess(capsys)(*render).status == 0
+    header = read_exr(tmp_path / "out.exr")[1]
+    shares = json.loads((tmp_path / "stats.json").read_text())
+    assert "clfractalDevices" not in header
+    assert "clfractalTileDevices" not in header
+    found: dict[str, int] = {}
+    for view in ("left", "right"):
+        own = told_tiles(header[f"{view}.clfractalDevices"])
+        assert sum(own.values()) == shares["tiles"] / 2
+        assert (f"{view}.clfractalTileDevices" in header) != layout
+        for index, tiles in own.items():
+            found[index] = found.get(index, 0) + tiles
+    assert found == {each["index"]: each["tiles"] for each in shares["devices"]}
+    assert header["clfractalSeconds"] > 0
+
+
 def test_no_device_is_left(
     whole: Path,
     halves: str,

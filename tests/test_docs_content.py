@@ -84,6 +84,9 @@ SECTIONS = {
     "renderer.bounds": "Ball",
     "lights, directional": "DirectionalLight",
     "lights, point": "PointLight",
+    "lights, spot": "SpotLight",
+    "lights, sphere": "SphereLight",
+    "lights, rectangle": "RectangleLight",
     "material": "Material",
     "coloring": "Coloring",
     "coloring.palette": "Stop",
@@ -91,6 +94,7 @@ SECTIONS = {
     "background": "Gradient",
     "environment": "Environment",
     "fog": "Fog",
+    "fog.scattering": "Scattering",
     "layout": "Layout",
     "layout.views": "LayoutView",
     "stereo": "Stereo",
@@ -113,6 +117,16 @@ VOLUMES = {
     "renderer.transfer": "Transfer",
     "renderer.transfer.opacity": "OpacityStop",
     "renderer.transfer.color": "ColorStop",
+}
+PATHS = {
+    "lighting, direct": "DirectLighting",
+    "lighting, path": "PathLighting",
+    "materials": "PbrMaterial",
+    "base": "Base",
+    "specular": "Specular",
+    "coat": "Coat",
+    "fuzz": "Fuzz",
+    "emission": "Emission",
 }
 ANIMATION = {
     "animation": "Animation",
@@ -198,7 +212,7 @@ def expected_rows(name: str) -> list[list[str]]:
 
 
 def test_every_part_of_a_scene_is_described() -> None:
-    told = {*SECTIONS.values(), *CUT_PLANES.values(), *VOLUMES.values(), *ANIMATION.values()}
+    told = {*SECTIONS.values(), *CUT_PLANES.values(), *VOLUMES.values(), *ANIMATION.values(), *PATHS.values()}
     assert told == set(load.schema()["$defs"])
     keys = {code(row[0]) for row in table("scenes.md", "The top level")}
     assert keys == set(load.schema()["properties"])
@@ -222,6 +236,12 @@ def test_keys_defaults_and_ranges_of_cut_planes(heading: str) -> None:
 def test_keys_defaults_and_ranges_of_volumes(heading: str) -> None:
     told = [row[:3] for row in table("volumes.md", heading)]
     assert sorted(told) == sorted(expected_rows(VOLUMES[heading]))
+
+
+@pytest.mark.parametrize("heading", PATHS)
+def test_keys_defaults_and_ranges_of_paths(heading: str) -> None:
+    told = [row[:3] for row in table("paths.md", heading)]
+    assert sorted(told) == sorted(expected_rows(PATHS[heading]))
 
 
 @pytest.mark.parametrize("heading", ANIMATION)

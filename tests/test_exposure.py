@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -25,29 +23,22 @@ output: {precision: {R: float, G: float, B: float}}
 """
 
 
-@pytest.fixture
-def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
-def colors(shell: InProcess, name: str, *settings: str) -> npt.NDArray[np.float32]:
+def colors(clf: InProcess, name: str, *settings: str) -> npt.NDArray[np.float32]:
     """R, G and B of an EXR, which is rendered beside a PNG."""
     options = [word for setting in settings for word in ("--set", setting)]
     outputs = ("-o", f"{name}.exr", "-o", f"{name}.png", "--quiet")
-    assert shell("render", "scene.yaml", *outputs, *options) == Ended(0, "", "")
+    assert clf("render", "scene.yaml", *outputs, *options) == Ended(0, "", "")
     planes = read_exr(f"{name}.exr")[0]
     return np.stack([planes[channel] for channel in "RGB"])
 
 
-def test_files_of_the_shell(shell: InProcess) -> None:
-    plain = colors(shell, "plain")
-    free = colors(shell, "free", "renderer.firefly_limit=null")
+def test_files_of_the_shell(clf: InProcess) -> None:
+    plain = colors(clf, "plain")
+    free = colors(clf, "free", "renderer.firefly_limit=null")
     assert (free > plain).mean() > 0.05  # the limit is one
     mean = []
     for number, stops in enumerate((-3, 0, 1.5, 4)):
-        found = colors(shell, f"a{number}", f"output.exposure={stops}")
+        found = colors(clf, f"a{number}", f"output.exposure={stops}")
         np.testing.assert_array_equal(found.view(np.uint32), plain.view(np.uint32))
         with Image.open(f"a{number}.png") as picture:
             mean.append(float(np.asarray(picture).mean()))

@@ -30,13 +30,6 @@ animation:
 """
 
 
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 @given(st.sets(st.integers(0, 60)))
 def test_ranges_name_the_numbers(numbers: set[int]) -> None:
     found = list(ranges(sorted(numbers)))

@@ -220,7 +220,7 @@ REFUSED: dict[tuple[str, Recipe, tuple[int, int]], str] = {
     ("a.mp4", Recipe(), (127, 96)): "needs an even width and height with chroma 420, got 127 x 96",
     ("a.mov", Recipe(), (127, 95)): "needs an even width with chroma 422, got 127 x 95",
     ("a.mp4", Recipe("ffv1"), SIZE): "cannot hold ffv1; it goes into .mkv",
-    ("a.mp4", Recipe("vp9"), SIZE): "must be h264, h265, ffv1, prores, got 'vp9'",
+    ("a.mp4", Recipe("vp9"), SIZE): "must be h264, h265, av1, ffv1, prores, got 'vp9'",
     ("a.mp4", Recipe(bits=12), SIZE): "does not fit: h264 has 420 with 8 bits, 422 with 8 bits",
     ("a.mov", Recipe(chroma="420"), SIZE): "does not fit: prores has 422 with 10 bits, 444 with 10 bits",
     ("a.webm", Recipe(), SIZE): "unknown extension '.webm'",

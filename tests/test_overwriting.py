@@ -114,6 +114,8 @@ REFUSED = {
     "animate frame_1.png -o frame_#.png": f"frame_1.png: {READ}",
     "animate moving.yaml -o f#.png -o f#.png": f"f0.png: {TWICE}",
     "animate frame_1.png --preview frame_1.png": f"frame_1.png: {READ}",
+    "animate moving.yaml -o f.mp4 --stats f.mp4": f"f.mp4: {TWICE}",
+    "animate frame_1.png -o f.mp4 --stats frame_1.png": f"frame_1.png: {READ}",
     "animate moving.yaml -o f.mp4 -o f.mp4": f"f.mp4: {TWICE}",
     "sound track.wav -o deep/sound.csv": f"deep/sound.csv: {READ}, but it is the file 'track.wav'",
     "scenes --sheet shipped.png": f"shipped.png: {READ}, but it is the file",

@@ -24,14 +24,6 @@ from clfractal.work.framing import Framing
 from clfractal.work.quality import PRESETS, with_quality
 from tests.shell import SCENE, InProcess
 
-
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 # --- scenes ---
 
 

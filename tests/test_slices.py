@@ -25,13 +25,6 @@ output: {channels: [R, G, B, iterations, P.X, P.Y, P.Z]}
 """
 
 
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 def names() -> list[str]:
     return sorted(path.name for path in Path().iterdir() if path.name != "scene.yaml")
 

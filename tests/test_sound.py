@@ -21,18 +21,14 @@ from clfractal.files.sound import Sound, read_sound
 from clfractal.work.loudness import Shaping, loudness, shaped
 from tests.shell import InProcess
 
+SCENE = None  # of these tests each writes its own
+
 RATE = 44_100
 
 
 def sine(hertz: float, seconds: float = 2.0, rate: int = RATE, scale: float = 1.0) -> npt.NDArray[np.float32]:
     times = np.arange(int(seconds * rate)) / rate
     return (scale * np.sin(2 * np.pi * hertz * times)).astype(np.float32)
-
-
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    return InProcess(capfd)
 
 
 @pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint8, np.float32, np.float64])

@@ -20,13 +20,6 @@ from tests.shell import SCENE, InProcess
 SMALL = ("--size", "32x18", "--count", "3")
 
 
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 def names(folder: str = ".") -> list[str]:
     return sorted(path.name for path in Path(folder).iterdir() if path.name != "scene.yaml")
 

@@ -20,7 +20,7 @@ import numpy as np
 from clfractal import arguments
 from clfractal.cluster import local
 from clfractal.cluster.dispatch import Dispatcher, Work
-from clfractal.cluster.link import ANSWER_SECONDS, Link
+from clfractal.cluster.link import ANSWER_SECONDS, Link, usual_key
 from clfractal.cluster.local import Place
 from clfractal.cluster.message import Array, Digests, Message, pack, unpack
 from clfractal.device.activity import doing
@@ -106,7 +106,7 @@ class Cluster:
         self._digests = Digests()
         self._number = 0
         self._begun: dict[int, Work] = {}
-        self._shares: dict[str, Share] = {}
+        self._shares: dict[tuple[str, str], Share] = {}  # by address and device
         self._closed = False
         self._processes: Any = None
         self._loop = asyncio.new_event_loop()
@@ -182,7 +182,7 @@ class Cluster:
                     self._count(answer)
                     # Programs are built side by side.
                     tally = replace(answer.tally, build_ms=answer.tally.build_ms / max(len(self._shares), 1))
-                    yield Result(answer.view, tiles, film, tally)
+                    yield Result(answer.view, tiles, film, tally, answer.maker)
                 finally:
                     self._call(self._dispatcher.stored)
         finally:
@@ -224,13 +224,9 @@ class Cluster:
                     raise self._dispatcher.error
 
     def _count(self, answer: Answer) -> None:
-        link = self._dispatcher.link
-        member = link.members.get(answer.worker) if link is not None else None
-        if answer.worker not in self._shares:
-            name = member.name if member is not None else answer.worker
-            device = member.device.name if member is not None else answer.device
-            self._shares[answer.worker] = Share(name, answer.worker, device)
-        share = self._shares[answer.worker]
+        share = self._shares.setdefault(
+            (answer.worker, answer.maker.key), Share(answer.name, answer.worker, answer.maker.name)
+        )
         share.bundles += 1
         share.tiles += len(answer.tiles)
         share.seconds += answer.seconds
@@ -239,11 +235,19 @@ class Cluster:
 
     # Questions to a worker
 
-    def asking(self, function: Callable[..., Any], thing: Any, *more: Any) -> tuple[Future[Any], Message]:
-        """Asks a function of `tasks`, of a worker with the device that most have; what is asked for is not waited for."""
+    def asking(
+        self, function: Callable[..., Any], thing: Any, *more: Any, float64: bool = False
+    ) -> tuple[Future[Any], Message]:
+        """Asks a function of `tasks`, of a worker with the device that most have; what is asked for is not waited for.
+
+        Args:
+            float64: whether the answer needs a device with float64, if the cluster has ever had one.
+        """
         self._check()
         message = pack(thing, self._digests)
-        asked = asyncio.run_coroutine_threadsafe(self._dispatcher.ask(function, message, *more), self._loop)
+        asked = asyncio.run_coroutine_threadsafe(
+            self._dispatcher.ask(function, message, *more, float64=float64), self._loop
+        )
         return asked, message
 
     def answered(self, asked: Future[Any]) -> Any:
@@ -259,11 +263,10 @@ class Cluster:
     def others(self) -> tuple[int, int, list[str]]:
         """The number of workers, of those whose device is another than most have, and the names of these devices."""
         link = self._dispatcher.link
-        if link is None:
-            return 0, 0, []
-        key, members = link.usual_key(), [link.members[address] for address in link.serving]
-        other = [member.device.name for member in members if member.device.key != key]
-        return len(members), len(other), sorted(set(other))
+        roll = link.roll if link is not None else ()
+        key = usual_key(roll)
+        other = [member.device.name for member in roll if member.device.key != key]
+        return len(roll), len(other), sorted(set(other))
 
     # The loop's thread
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 import asyncio
 import queue
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 from uuid import uuid4
 
-from clfractal.cluster.link import Link, Lost, Tell
+from clfractal.cluster.link import Link, Lost, Tell, usual_key
 from clfractal.cluster.message import Array, Message
 from clfractal.cluster.sizes import Pace
 from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
@@ -67,6 +67,11 @@ class Work:
     ended: bool = False
 
     @property
+    def float64(self) -> bool:
+        """Whether only devices with float64 can do it."""
+        return any(view.plan.precision == "float64" for view in self.job.views)
+
+    @property
     def left(self) -> int:
         """Tiles that are not given out yet."""
         return sum(len(item.tiles) for item in self.items)
@@ -78,6 +83,26 @@ class Work:
             self.items.appendleft(WorkItem(item.view, item.tiles[size:], item.samples))
             item = WorkItem(item.view, item.tiles[:size], item.samples)
         return item
+
+
+class _Permit:
+    """A permit to read a result: whoever holds it gives it back once, however its task ends."""
+
+    def __init__(self, of: asyncio.Semaphore) -> None:
+        self._of, self._held = of, False
+
+    async def take(self) -> None:
+        await self._of.acquire()
+        self._held = True
+
+    def give_back(self) -> None:
+        if self._held:
+            self._held = False
+            self._of.release()
+
+    def pass_on(self) -> None:
+        """Another one gives it back."""
+        self._held = False
 
 
 class Dispatcher:
@@ -97,7 +122,8 @@ class Dispatcher:
         self.pace = Pace()
         self._works: list[Work] = []
         self._given: set[asyncio.Task[None]] = set()  # bundles that are given out
-        self._waiting = 0  # tasks for which there is no worker
+        self._waiting: Counter[bool] = Counter()  # tasks without a worker, by whether they need float64
+        self._had_float64 = False  # whether there ever was a worker that has it
         self._alone_since = time.monotonic()
         self._news = asyncio.Event()  # set, and replaced, whenever who works has changed
         self._read = asyncio.Semaphore(_READ_AT_ONCE)
@@ -129,6 +155,8 @@ class Dispatcher:
         link.on_news = self._tell_news
 
     def _tell_news(self) -> None:
+        if self.link is not None and self.link.fit(float64=True):
+            self._had_float64 = True
         self._news.set()
         self._news = asyncio.Event()
         self._give_out()
@@ -150,17 +178,24 @@ class Dispatcher:
 
     async def _guarded(self, link: Link, watching: asyncio.Task[None]) -> ClfractalError | None:
         """Returns when the scheduler is gone, or with an error when work waits for a worker for too long."""
+        told = False
         while not watching.done():
             await asyncio.wait([watching], timeout=0.25)
-            if link.serving or not (self._waiting or any(work.items for work in self._works)):
-                self._alone_since = time.monotonic()
+            needs = {float64 for float64, count in self._waiting.items() if count}
+            needs |= {work.float64 for work in self._works if work.items}
+            if all(link.fit(float64) for float64 in needs):
+                self._alone_since, told = time.monotonic(), False
                 continue
-            reasons = list(link.refused.values())
+            lacking = "worker with float64" if link.serving else "worker"
             waited = time.monotonic() - self._alone_since
-            if reasons and waited > _OTHERS_SECONDS and not link.joining:
-                return DeviceError(f"{self._place}: no worker is fit: {reasons[-1]}")
+            if link.reason and not (link.serving or link.has_lost or link.joining):
+                if waited > _OTHERS_SECONDS:
+                    return DeviceError(f"{self._place}: no worker is fit: {link.reason}")
+            elif link.serving and not told and not link.joining:
+                told = True
+                self._tell(f"{self._place}: no {lacking} is left; waiting {RETURN_SECONDS:.0f} s for one")
             if waited > RETURN_SECONDS:
-                return DeviceError(f"{self._place}: there has been no worker for {RETURN_SECONDS:.0f} s")
+                return DeviceError(f"{self._place}: there has been no {lacking} for {RETURN_SECONDS:.0f} s")
         return None
 
     async def _again(self, old: Link) -> None:
@@ -178,35 +213,43 @@ class Dispatcher:
             return
         self.error = DeviceError(f"{self._place}: the scheduler is gone, and did not return in time")
 
-    async def serving(self) -> Link:
+    async def serving(self, float64: bool = False) -> Link:
         """The connection, as soon as there is one with a worker.
+
+        Args:
+            float64: with a worker whose device has it.
 
         Raises:
             ClfractalError: it was waited for too long.
         """
-        self._waiting += 1
+        self._waiting[float64] += 1
         try:
             while True:
                 if self.error is not None:
                     raise self.error
                 link = self.link
-                if link is not None and not link.over and link.serving:
+                if link is not None and not link.over and link.fit(float64):
                     return link
                 await self._news.wait()
         finally:
-            self._waiting -= 1
+            self._waiting[float64] -= 1
 
     # Questions
 
-    async def ask(self, function: Callable[..., Any], message: Message, *more: Any) -> Any:
+    async def ask(
+        self, function: Callable[..., Any], message: Message, *more: Any, float64: bool = False
+    ) -> Any:
         """What a function answers to a message, on a worker with the device that most have.
+
+        Args:
+            float64: only of a worker with float64, if there ever was one; else what it says to that is the answer.
 
         Raises:
             ClfractalError: what it failed with.
         """
 
         def submit(link: Link) -> tuple[Any, Sequence[str] | None]:
-            key = link.usual_key()
+            key = usual_key(link.roll, float64=float64)
             assert key is not None
             among = link.with_key(key)
             future = link.client.submit(
@@ -226,7 +269,17 @@ class Dispatcher:
         async def collect(link: Link, future: Any) -> Any:
             return await link.client.gather(future, direct=link.direct)
 
-        return await self._done(submit, collect)
+        return await self._done(submit, collect, float64 and await self._has_float64())
+
+    async def _has_float64(self) -> bool:
+        """Whether there ever was a worker with float64; the first ones are waited for while others may be joining."""
+        await self.serving()
+        until = time.monotonic() + _OTHERS_SECONDS
+        while not self._had_float64 and self.link is not None:
+            if time.monotonic() > until and not self.link.joining:
+                break
+            await asyncio.sleep(_PAUSE_SECONDS)
+        return self._had_float64
 
     # Work
 
@@ -258,8 +311,10 @@ class Dispatcher:
         link = self.link
         if link is None or link.over or not link.serving:
             return
-        workers = len(link.serving)
         for place, work in enumerate(self._works):
+            workers = len(link.fit(work.float64))
+            if not workers:
+                continue
             while work.items and len(self._given) < _FOR_EACH * workers + 1:
                 left = sum(each.left for each in self._works[place:])
                 samples = work.items[0].samples[1] - work.items[0].samples[0]
@@ -275,13 +330,12 @@ class Dispatcher:
         """Has one bundle done, however often it takes, and puts its answer into the queue."""
         from clfractal.cluster import tasks
 
-        float64 = any(view.plan.precision == "float64" for view in work.job.views)
-        offers = {tasks.RESOURCE: 1, **({tasks.FLOAT64: 1} if float64 else {})}
-        own = asyncio.current_task()
+        offers = {tasks.RESOURCE: 1, **({tasks.FLOAT64: 1} if work.float64 else {})}
+        own, permit = asyncio.current_task(), _Permit(self._read)
         assert own is not None
 
         def submit(link: Link) -> tuple[Any, Sequence[str] | None]:
-            among = link.serving if link.left_out else None
+            among = link.fit(work.float64) if link.left_out else None
             future = link.client.submit(
                 tasks.tiles,
                 self._seat,
@@ -302,17 +356,19 @@ class Dispatcher:
                 # Its result stays with the worker, which goes on with other bundles.
                 self._free(own)
                 await work.wanted.wait()
-            await self._read.acquire()
+            nonlocal permit
+            reading = permit = _Permit(self._read)
+            await reading.take()
             answer = None
             try:
                 answer = await link.client.gather(future, direct=link.direct)
             finally:
                 if not isinstance(answer, tasks.Answer):
-                    self._read.release()
+                    reading.give_back()
             return answer
 
         try:
-            answer = await self._done(submit, collect)
+            answer = await self._done(submit, collect, work.float64)
         except ClfractalError as error:
             work.answers.put(error)
         except Exception as error:  # a mistake of this program's
@@ -321,6 +377,9 @@ class Dispatcher:
             seconds = max(answer.seconds - 1e-3 * answer.tally.build_ms, 1e-6)
             self.pace.learn(len(item.tiles), item.samples[1] - item.samples[0], seconds)
             work.answers.put(answer)
+            permit.pass_on()  # to whoever takes the answer out of the queue
+        finally:
+            permit.give_back()  # of an answer that came when nobody wanted it any more
 
     def _free(self, task: asyncio.Task[None]) -> None:
         """Counts a bundle as done: there is room for another one."""
@@ -328,23 +387,26 @@ class Dispatcher:
             self._given.remove(task)
             self._give_out()
 
-    async def _done(self, submit: Submit, collect: Collect) -> Any:
+    async def _done(self, submit: Submit, collect: Collect, float64: bool) -> Any:
         """Has a task done, however often it takes; gives its answer.
+
+        Args:
+            float64: whether only workers with float64 can do it.
 
         Raises:
             ClfractalError: what it failed with, or there is nobody who could do it.
         """
         rounds = 0
         while True:
-            link = await self.serving()
+            link = await self.serving(float64)
             if link.client.status != "running":  # it is about to be seen that the scheduler is gone
                 await asyncio.sleep(_PAUSE_SECONDS)
                 continue
             future, among = submit(link)
             try:
-                await link.while_alive(_finished(future), future, among)
+                await link.while_alive(_finished(future), future, among, float64=float64)
                 if future.status == "finished":
-                    answer = await link.while_alive(collect(link, future), future, among)
+                    answer = await link.while_alive(collect(link, future), future, among, float64=float64)
                     if self._is_final(link, answer):
                         return answer
                 elif future.status == "error":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -59,27 +59,9 @@ class ClusterEngine(AnyEngine):
         found: Scene = self.cluster.unpacked(self.cluster.answered(asked), message)
         return found
 
-    def prepare(
-        self,
-        scene: SceneLike,
-        *,
-        precision: str | None = None,
-        samples: int | None = None,
-        region: tuple[int, int, int, int] | None = None,
-        channels: Sequence[str] | None = None,
-        quality: str | None = None,
-    ) -> Job:
-        """The job of a scene's picture for the device that most workers have; see `Engine.prepare`."""
-        return self._decided(
-            self._asking(
-                scene,
-                precision=precision,
-                samples=samples,
-                region=region,
-                channels=channels,
-                quality=quality,
-            )
-        )
+    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
+        """Decided for the device that most workers have."""
+        return self._decided(self._asking(scene, **asked, quality=quality))
 
     def in_order(
         self, scenes: Iterable[Scene], wanted: Callable[[Job], bool], **settings: Any
@@ -106,7 +88,10 @@ class ClusterEngine(AnyEngine):
                 found = begun.popleft()
                 if isinstance(found, ClfractalError):
                     raise found
-                yield found
+                try:
+                    yield found
+                finally:
+                    self.cluster.leave(found[0])  # whoever took it may not have wanted to execute it
         finally:
             for each in begun:
                 if not isinstance(each, ClfractalError):
@@ -136,7 +121,11 @@ class ClusterEngine(AnyEngine):
     def _asking(self, scene: SceneLike, **settings: Any) -> _Asked:
         from clfractal.cluster import tasks
 
-        future, message = self.cluster.asking(tasks.prepared, as_scene(scene), settings)
+        loaded = as_scene(scene)
+        precision = settings.get("precision") or loaded.renderer.precision
+        future, message = self.cluster.asking(
+            tasks.prepared, loaded, settings, float64=precision == "float64"
+        )
         return _Asked(future, message)
 
     def _decided(self, asked: _Asked) -> Job:

@@ -16,7 +16,7 @@ from uuid import uuid4
 
 import clfractal
 from clfractal.cluster.fingerprint import fingerprint
-from clfractal.device.select import DeviceInfo
+from clfractal.device.select import DeviceInfo, has_float64
 
 if TYPE_CHECKING:
     from clfractal.cluster.tasks import Seat
@@ -38,16 +38,18 @@ class Lost(Exception):  # noqa: N818
     """The scheduler is gone, or no worker is left: what was under way has to be done again."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Member:
     """A worker that takes part.
 
     Attributes:
+        address: where it is.
         name: what Dask calls it.
         device: what it renders with.
         pid: its process.
     """
 
+    address: str
     name: str
     device: DeviceInfo
     pid: int
@@ -74,7 +76,13 @@ class Link:
     def __init__(self, client: Any, seat: Seat, tell: Tell, local: int | None) -> None:
         self.client, self._seat, self._tell, self._local = client, seat, tell, local
         self.members: dict[str, Member] = {}
-        self.refused: dict[str, str] = {}
+        self.roll: tuple[Member, ...] = ()
+        """The members that get work. Other threads may read it, since it is replaced and never changed."""
+        self.refused: set[str] = set()
+        self.reason = ""
+        """Why the last one was refused."""
+        self.has_lost = False
+        """Whether a worker that was fit is gone: it may return."""
         self.left_out: set[str] = set()
         self.over = False
         """Whether the scheduler is gone."""
@@ -111,11 +119,19 @@ class Link:
             for task in self._enlisting.values():
                 task.cancel()
 
-    async def while_alive(self, awaited: Awaitable[T], future: Any, among: Sequence[str] | None = None) -> T:
+    async def while_alive(
+        self,
+        awaited: Awaitable[T],
+        future: Any,
+        among: Sequence[str] | None = None,
+        *,
+        float64: bool = False,
+    ) -> T:
         """What is awaited of a future, as long as there is somebody who can bring it.
 
         Args:
             among: the workers that can; None: any.
+            float64: only those that have it can.
 
         Raises:
             Lost: there is nobody any more.
@@ -124,8 +140,9 @@ class Link:
         self.under_way[future.key] = future
         try:
             while not task.done():
-                alive = not self.over and self.serving and future.key not in self._stuck
-                if not alive or (among and not set(among) & set(self.serving)):
+                fit = self.fit(float64)
+                alive = not self.over and fit and future.key not in self._stuck
+                if not alive or (among and not set(among) & set(fit)):
                     raise Lost
                 news = asyncio.ensure_future(self.news.wait())
                 try:
@@ -144,6 +161,7 @@ class Link:
             self._stuck.discard(future.key)
 
     def _changed(self) -> None:
+        self.roll = tuple(member for address, member in self.members.items() if address not in self.left_out)
         self.news.set()
         self.news = asyncio.Event()
         self.on_news()
@@ -167,20 +185,21 @@ class Link:
                 ):  # others' workers are not ours to judge
                     await self._dismiss(address)
                 continue
-            known = self.members.keys() | self.refused.keys() | self._enlisting.keys()
+            known = self.members.keys() | self.refused | self._enlisting.keys()
             if address not in known and about.get("status", "running") == "running":
                 self._enlisting[address] = asyncio.create_task(self._enlist(address, about["name"]))
         for address in [address for address in self._heard if address not in workers]:
             del self._heard[address]
-            self.left_out.discard(address)  # another one may come to its place
-            if len(self.refused) > 1:
-                self.refused.pop(address, None)
+            # It may return, or another one may come to its place: then it is asked again.
+            self.left_out.discard(address)
+            self.refused.discard(address)
 
     def _gone(self, address: str) -> None:
         task = self._enlisting.pop(address, None)
         if task is not None:
             task.cancel()
         if self.members.pop(address, None) is not None:
+            self.has_lost = self.has_lost or address not in self.left_out
             self._doubts = _DOUBTS
             self._changed()
 
@@ -251,7 +270,7 @@ class Link:
         if "device" in report:
             if not self.members:
                 self.direct = self._local is not None or await _answers(address)
-            self.members[address] = Member(str(name), report["device"], report["pid"])
+            self.members[address] = Member(address, str(name), report["device"], report["pid"])
             self._changed()
         elif "fault" in report:
             self._refuse(address, name, report["fault"])
@@ -261,7 +280,8 @@ class Link:
             self._refuse(address, name, f"it has {theirs}, and this is {own}")
 
     def _refuse(self, address: str, name: object, reason: str) -> None:
-        self.refused[address] = reason
+        self.refused.add(address)
+        self.reason = reason
         self._tell(f"worker {name} ({address}) is left out: {reason}")
         self._changed()
 
@@ -271,21 +291,30 @@ class Link:
         if member is not None and address not in self.left_out:
             self.left_out.add(address)
             self._refuse(address, member.name, reason)
-            self._changed()
 
     @property
     def serving(self) -> list[str]:
         """The workers that get work."""
-        return [address for address in self.members if address not in self.left_out]
+        return [member.address for member in self.roll]
 
-    def usual_key(self) -> str | None:
-        """The key of the device that most workers have, the first by name if several have equally many."""
-        keys = Counter(self.members[address].device.key for address in self.serving)
-        return min(keys, key=lambda key: (-keys[key], key)) if keys else None
+    def fit(self, float64: bool) -> list[str]:
+        """Those of them that can do work which needs float64, or any work."""
+        return [member.address for member in self.roll if has_float64(member.device) or not float64]
 
     def with_key(self, key: str) -> list[str]:
         """The workers with such a device."""
-        return [address for address in self.serving if self.members[address].device.key == key]
+        return [member.address for member in self.roll if member.device.key == key]
+
+
+def usual_key(roll: Sequence[Member], *, float64: bool = False) -> str | None:
+    """The key of the device that most workers have, the first by name if several have equally many.
+
+    Args:
+        float64: only devices with float64 count, if there are any.
+    """
+    able = [member for member in roll if has_float64(member.device)] if float64 else []
+    keys = Counter(member.device.key for member in able or roll)
+    return min(keys, key=lambda key: (-keys[key], key)) if keys else None
 
 
 async def _answers(address: str) -> bool:

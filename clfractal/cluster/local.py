@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import ssl
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +14,7 @@ from clfractal.errors import DeviceError, FileError, SceneError, Where
 
 _MOST_LOCAL = 256
 _LEAST_PORT = 1023
+_TLS = "distributed.comm.tls"
 _PROTOCOLS = ("tcp", "tls", "ws", "wss", "ucx", "ucxx", "inproc")
 
 
@@ -75,20 +79,54 @@ def check_certificates(place: Place, security: Any) -> None:
 
     Raises:
         SceneError: there are none.
-        FileError: one cannot be read.
+        FileError: one is not there, cannot be read, or is none.
     """
     if not place.address.startswith(("tls:", "wss:")):
         return
     used = security if security is not None else library().Security()
-    for option, file in (("ca-file", used.tls_ca_file), ("client.cert", used.tls_client_cert)):
-        if not file:
+    authority, own, key = used.tls_ca_file, used.tls_client_cert, used.tls_client_key
+    for option, file in (("ca-file", authority), ("client.cert", own), ("client.key", key)):
+        if file:
+            _check_readable(file, f"{_TLS}.{option}")
+        elif option != "client.key":  # the key may stand in the certificate's file
             raise SceneError(
-                f"{place} needs certificates: Dask's configuration has no distributed.comm.tls.{option}",
+                f"{place} needs certificates: Dask's configuration has no {_TLS}.{option}",
                 Where(path="cluster"),
             )
-        # (Dask also takes the text of a certificate.)
-        if "\n" not in file and not Path(file).is_file():
-            raise FileError("is not there; it is named in distributed.comm.tls", Where(file))
+    with _located(authority, "holds no certificate of an authority"):
+        given = {"cadata": authority} if _is_text(authority) else {"cafile": authority}
+        ssl.create_default_context(**given)
+    what = "has no key, which Dask's configuration does not name" if not key else "does not go with its key"
+    with _located(own, f"{what}, or is no certificate"):
+        used.get_connection_args("client")
+
+
+def _is_text(file: str) -> bool:
+    """Whether it is a certificate itself, and no name of a file: Dask takes both."""
+    return "\n" in file
+
+
+def _check_readable(file: str, option: str) -> None:
+    if _is_text(file):
+        return
+    try:
+        Path(file).open("rb").close()
+    except FileNotFoundError:
+        raise FileError(f"is not there; it is {option} of Dask's configuration", Where(file)) from None
+    except OSError as error:
+        raise FileError(
+            f"cannot be read: {error.strerror}; it is {option} of Dask's configuration", Where(file)
+        ) from error
+
+
+@contextmanager
+def _located(file: str, problem: str) -> Iterator[None]:
+    """Tells of a certificate that cannot be used."""
+    try:
+        yield
+    except OSError as error:  # those of `ssl` are some, too
+        where = Where(path="cluster") if _is_text(file) else Where(file)
+        raise FileError(problem, where, details=str(error)) from error
 
 
 async def start(workers: int) -> Any:

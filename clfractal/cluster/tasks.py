@@ -24,8 +24,9 @@ from clfractal import errors
 from clfractal.cluster.fingerprint import fingerprint
 from clfractal.cluster.message import Arrays, Digests, Message, pack, unpack
 from clfractal.device.cancel import CancelToken
-from clfractal.device.select import Device, choose
+from clfractal.device.select import Device, DeviceInfo, choose, has_float64
 from clfractal.errors import ClfractalError, Stopped, Where
+from clfractal.pictures.makers import Maker
 from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.work.job import Job
 from clfractal.work.run import Floats, Tally, Tiles, WorkItem
@@ -96,7 +97,8 @@ class Answer:
         tally: what they took.
         seconds: wall time of the worker, with what it had to build.
         worker: its address.
-        device: the device's key.
+        name: what Dask calls it.
+        maker: the device.
     """
 
     view: int
@@ -105,7 +107,13 @@ class Answer:
     tally: Tally
     seconds: float
     worker: str
-    device: str
+    name: str
+    maker: Maker
+
+
+def maker_of(device: DeviceInfo) -> Maker:
+    """How a picture calls a worker's device: without the index, which names another device on another machine."""
+    return Maker.of("", device.name, device.key)
 
 
 def enlist(wanted: str, device: str | None, share: tuple[int, int] | None) -> dict[str, Any]:
@@ -137,7 +145,7 @@ def enlist(wanted: str, device: str | None, share: tuple[int, int] | None) -> di
     worker = get_worker()
     if _PLUGIN not in worker.plugins:
         sync(worker.loop, worker.plugin_add, plugin=_Ending(), name=_PLUGIN)
-    offers = {RESOURCE: 1, FLOAT64: 1 if report["device"].has_float64 else 0}
+    offers = {RESOURCE: 1, FLOAT64: 1 if has_float64(report["device"]) else 0}
     if any(worker.state.total_resources.get(name) != count for name, count in offers.items()):
         sync(worker.loop, worker.set_resources, **offers)
     return report
@@ -162,7 +170,8 @@ def tiles(seat: Seat, data: bytes, arrays: Arrays, item: WorkItem) -> Answer | F
             tally,
             time.perf_counter() - start,
             get_worker().address,
-            engine.device.info.key,
+            str(get_worker().name),
+            maker_of(engine.device.info),
         )
 
     return _answered(seat, work)

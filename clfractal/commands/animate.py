@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clfractal.commands.engines import engine_of
+from clfractal.commands.engines import engine_of, shares_of
 from clfractal.commands.film_parts import (
     Part,
     check_pattern,
@@ -23,23 +23,23 @@ from clfractal.commands.film_parts import (
 from clfractal.commands.kept import Kept
 from clfractal.commands.order import PARTIAL, naming_options
 from clfractal.commands.pipes import piped, refuse_stream
-from clfractal.commands.progress import shown_rate
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.commands.slices import check_numbered
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, speaking_of
+from clfractal.files.atomic import check_output
 from clfractal.files.film_kinds import Recipe
 from clfractal.files.whole import is_whole
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 
 if TYPE_CHECKING:
+    from clfractal.commands.film_count import FilmCount
     from clfractal.files.moving import Plan
     from clfractal.work.any_engine import AnyEngine
     from clfractal.work.job import Job
 
-_LINE_SECONDS = 2.0
 # Frames that took longer keep their tiles while they are in work, seconds.
 _LONG_FRAME = 2.0
 
@@ -56,8 +56,11 @@ def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> Non
     for path in order.outputs:
         refuse_stream(path, "frames are several files")
         check_pattern(path)
-    with piped(shell, order.scene, [(path, "") for path in order.outputs]) as files:
-        _animate(replace(order, scene=files.source, folder=files.folder), part, recipe, shell)
+    stats = () if order.stats is None else ((order.stats, ".json"),)
+    with piped(shell, order.scene, [*((path, "") for path in order.outputs), *stats]) as files:
+        written = files.outputs[-1] if stats else None
+        named = replace(order, scene=files.source, folder=files.folder, stats=written)
+        _animate(named, part, recipe, shell)
 
 
 def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
@@ -75,21 +78,34 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
         if kept.pattern is not None:
             patterns.append(kept.pattern)
         files = {number: tuple(frame_file(path, number) for path in patterns) for number in numbers}
-        check_numbered(scene, [*files.values()], [film.path for film in films])
+        others = [film.path for film in films]
+        if order.stats is not None:
+            check_output(order.stats, (order.stats.suffix.lower(),))
+            others.append(order.stats)
+        check_numbered(scene, [*files.values()], others)
         for film in films:
             if not film.tells_stereo:
                 shell.say(f"{film.path}: players are not told how it holds two pictures; choose it there")
-        counted = _render_frames(order, scene, files, _Count(shell, len(numbers), begun), kept, shell)
+        counted = _render_frames(order, scene, files, begun, kept, shell)
+        rendered = time.perf_counter()
         if kept.pattern is not None:
             shell.state = lambda: f"{films[0].path}: interrupted; all frames are kept; --resume continues"
             kept.write([frame_file(kept.pattern, number) for number in numbers])
     shell.state = lambda: "clfractal: interrupted"
+    # Imported only now: mistakes in the input are reported without waiting for NumPy.
+    from clfractal.work.stats import sentence, write_statistics
+
+    values = counted.statistics(1e3 * (time.perf_counter() - rendered))
+    if order.stats is not None:
+        write_statistics(order.stats, values)
     named = [f"{files[numbers[0]][0]} to {files[numbers[-1]][0].name}"] if patterns[0] != kept.pattern else []
     shell.say(f"{', '.join([*named, *(str(film.path) for film in films)])}: {counted.summary()}")
-    others = [number for number in range(animation.count) if number not in numbers]
-    lacking = _missing(scene, [path for path in patterns if path != kept.pattern], others)
+    left = [number for number in range(animation.count) if number not in numbers]
+    lacking = _missing(scene, [path for path in patterns if path != kept.pattern], left)
     if lacking:
         shell.say(f"{len(lacking)} frames of the film are missing: {shown_ranges(lacking)}")
+    if shell.verbose:
+        shell.say(sentence(values))
 
 
 def list_missing(order: Order, part: Part, shell: Shell) -> None:
@@ -98,6 +114,8 @@ def list_missing(order: Order, part: Part, shell: Shell) -> None:
     Raises:
         ClfractalError: anything wrong with the input.
     """
+    if order.stats is not None:
+        raise SceneError("applies to frames that are rendered; leave it out", Where("--stats"))
     if any(is_film(path) for path in order.outputs):
         raise SceneError("applies to numbered pictures; a film is only made whole", Where("--missing"))
     for path in order.outputs:
@@ -132,16 +150,16 @@ def _render_frames(
     order: Order,
     scene: Scene,
     files: Mapping[int, tuple[Path, ...]],
-    counted: _Count,
+    begun: float,
     kept: Kept,
     shell: Shell,
-) -> _Count:
+) -> FilmCount:
     """Renders the frames that are not there yet."""
     with speaking_of(order.scene), doing("checking all frames"):
         for number in files:
             movement_of(scene).scene(number)
     with engine_of(order, shell) as engine:
-        return _render_on(engine, order, scene, files, counted, kept, shell)
+        return _render_on(engine, order, scene, files, begun, kept, shell)
 
 
 def _render_on(
@@ -149,40 +167,45 @@ def _render_on(
     order: Order,
     scene: Scene,
     files: Mapping[int, tuple[Path, ...]],
-    counted: _Count,
+    begun: float,
     kept: Kept,
     shell: Shell,
-) -> _Count:
+) -> FilmCount:
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
+    from clfractal.commands.film_count import FilmCount
     from clfractal.commands.numbered import render_one
     from clfractal.work.frames import FilmScenes
     from clfractal.work.remarks import mixed_kinds
 
+    counted = FilmCount(shell, len(files), begun)
     scenes = FilmScenes(engine, scene)
-    coming = iter(files.values())
+    coming = iter(files.items())
 
     def is_missing(job: Job) -> bool:
-        return not (_is_there(job, next(coming)) if order.resume else False)
+        number, paths = next(coming)
+        return not (order.resume and _is_there(job, paths, {kept.at(number): kept.bits}))
 
     jobs = engine.in_order(
         map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
     )
-    begun = False
+    removed = told = False
+    kinds: set[str] = set()
     with closing(jobs):
         for number, paths in files.items():
             with speaking_of(order.scene), naming_options():
                 job, missing = next(jobs)
-            if not begun:
+            if not removed:
                 kept.begin()
-                begun = True
+                removed = True
                 if job.others:
+                    told = True
                     shell.say(f"{order.scene}: {mixed_kinds(1 + len(job.others))}")
             shell.state = partial(counted.interrupted, number, paths[0])
             if not missing:
-                counted.kept += 1
+                counted.stats.keep(job)
                 continue
             each = counted.seconds_each
-            state = render_one(
+            made = render_one(
                 job,
                 engine,
                 paths,
@@ -191,7 +214,13 @@ def _render_on(
                 keep=each is None or each > _LONG_FRAME or _partial(paths).exists(),
                 bits={kept.at(number): kept.bits},
             )
-            counted.rendered(state.rays)
+            counted.rendered(made.state.rays)
+            counted.stats.add(number, job, made.state, wall_ms=made.wall_ms, write_ms=made.write_ms)
+            kinds |= {maker.key for maker in made.state.makers}  # a cluster's are known when they have come
+            if len(kinds) > 1 and not told:
+                told = True
+                shell.say(f"{order.scene}: {mixed_kinds(len(kinds))}")
+    counted.looks_built_ms, counted.shares = engine.looks_built_ms, shares_of(engine)
     return counted
 
 
@@ -221,64 +250,29 @@ def _planned_films(order: Order, scene: Scene, recipe: Recipe, fps: float) -> li
     return [plan_film(path, recipe, content.size, fps, stereo=mode, swap=swap) for path in films]
 
 
-class _Count:
-    """How far a film is."""
-
-    def __init__(self, shell: Shell, frames: int, begun: float) -> None:
-        self._shell, self._frames, self._begun, self._told = shell, frames, begun, begun
-        self._first = begun  # when the first frame was done, for which programs are compiled
-        self.kept, self._rendered, self._rays = 0, 0, 0
-
-    @property
-    def seconds_each(self) -> float | None:
-        """The time that a frame takes; None as long as that is unknown: the first one waits for programs."""
-        further = self._rendered - 1
-        return (time.perf_counter() - self._first) / further if further > 0 else None
-
-    def rendered(self, rays: int) -> None:
-        """Counts a frame; now and then it is told how many are left."""
-        self._rendered += 1
-        self._rays += rays
-        now = time.perf_counter()
-        if self._rendered == 1:
-            self._first = now
-            return
-        left = self._frames - self.kept - self._rendered
-        if left and now - self._told > _LINE_SECONDS:
-            self._told = now
-            done = self._frames - left
-            self._shell.say(
-                f"animate: {done} of {self._frames} frames, {left * (self.seconds_each or 0):.0f} s left"
-            )
-
-    def interrupted(self, number: int, file: Path) -> str:
-        """What to say of an interrupt during a frame."""
-        done = self.kept + self._rendered
-        return f"{file}: interrupted in frame {number}, with {done} of {self._frames} frames done; --resume continues"
-
-    def summary(self) -> str:
-        """The text of the last line."""
-        seconds = time.perf_counter() - self._begun
-        if not self._rendered:
-            return f"all {self._frames} frames were there already"
-        kept = f", {self.kept} were there already" if self.kept else ""
-        return f"{self._rendered} frames{kept}, {seconds:.2f} s, {shown_rate(self._rays / seconds)}"
-
-
 def _partial(paths: tuple[Path, ...]) -> Path:
     return paths[0].with_name(paths[0].name + PARTIAL)
 
 
-def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:
-    """Whether all files of a frame are there, and whole.
+def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path | None, int]) -> bool:
+    """Whether all files of a frame are there, whole, and stored as they are asked for.
+
+    Args:
+        bits: of PNG files that have others than the scene wants.
 
     Raises:
         FileError: one of them is of another scene, or holds none.
     """
     from clfractal.files.embedded import read_scene_text
+    from clfractal.files.png import read_form
     from clfractal.pictures.outputs import output_files
 
-    files = [file for path in paths for file in output_files(job.scene.stereo, path)]
+    scene = job.scene
+    files = {
+        file: bits.get(path, scene.output.png_bits)
+        for path in paths
+        for file in output_files(scene.stereo, path)
+    }
     there = [file for file in files if is_whole(file)]
     wanted = job.header()["scene"]
     for file in there:
@@ -287,4 +281,8 @@ def _is_there(job: Job, paths: tuple[Path, ...]) -> bool:
                 "is a frame of another scene, or of other settings; remove it, or render without --resume",
                 Where(str(file)),
             )
-    return len(there) == len(files)
+    components = 4 if scene.background == "transparent" else 3
+    return len(there) == len(files) and all(
+        file.suffix.lower() != ".png" or read_form(file) == (depth, components)
+        for file, depth in files.items()
+    )

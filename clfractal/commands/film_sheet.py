@@ -32,6 +32,8 @@ def preview_film(order: Order, sheet: Path, part: Part, shell: Shell) -> None:
     """
     if order.outputs:
         raise SceneError("writes a sheet alone; leave out -o", Where("--preview"))
+    if order.stats is not None:
+        raise SceneError("applies to frames that are rendered; leave it out", Where("--stats"))
     refuse_stream(sheet, "the sheet needs a file")
     with piped(shell, order.scene, ()) as files:
         _preview(replace(order, scene=files.source, folder=files.folder), sheet, part, shell)

@@ -118,7 +118,9 @@ def animate(
     ] = False,
     codec: Annotated[
         str | None,
-        typer.Option("--codec", help="Of films: h264, h265, ffv1 or prores.  [default: by the file's name]"),
+        typer.Option(
+            "--codec", help="Of films: h264, h265, av1, ffv1 or prores.  [default: by the file's name]"
+        ),
     ] = None,
     bits: Annotated[int | None, typer.Option("--bits", help="Of films: bits per channel.")] = None,
     chroma: Annotated[str | None, typer.Option("--chroma", help="Of films: 420, 422, 444 or rgb.")] = None,
@@ -128,6 +130,9 @@ def animate(
     ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    stats: Annotated[
+        Path | None, typer.Option("--stats", metavar="FILE.json", help="Write times and counts as JSON.")
+    ] = None,
 ) -> Work:
     """Render the frames of a scene's animation to numbered picture files, or films."""
     from clfractal.commands.animate import animate_scene, list_missing
@@ -147,6 +152,7 @@ def animate(
         samples=samples,
         quality=quality,
         resume=resume,
+        stats=stats,
     )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
     recipe = Recipe(codec, bits, chroma, crf)

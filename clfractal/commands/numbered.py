@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,15 @@ if TYPE_CHECKING:
 _IN_MEMORY = 1 << 28
 
 
+@dataclass(frozen=True, slots=True)
+class Made:
+    """One picture that was made: the last state of its work, and the times of all, and of writing its files, in ms."""
+
+    state: Progress
+    wall_ms: float
+    write_ms: float
+
+
 def render_one(
     job: Job,
     engine: AnyEngine,
@@ -33,28 +43,33 @@ def render_one(
     resume: bool = False,
     keep: bool = False,
     bits: Mapping[Path | None, int] | None = None,
-) -> Progress:
+) -> Made:
     """Renders one picture and writes its files.
 
     Args:
         resume: whether to continue tiles that an earlier run has kept.
         keep: whether tiles are kept beside the first file until it is whole, however small the picture is.
         bits: of PNG files that have others than the scene wants.
-
-    Returns:
-        The last state of the work.
     """
+    begun = time.perf_counter()
     header = job.header()
     reporter = Reporter(shell, job.tiles)
     if not keep and 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
         films = JobFilms(job)
         state = _run(job, films.films, engine, reporter)
+        rendered = time.perf_counter()
         _save(job, films.films, paths, header, bits or {})
-        return state
+        return _made(state, begun, rendered)
     with Unfinished(job, header, paths[0], shell, resume=resume) as unfinished:
         state = _run(job, unfinished.films, engine, reporter)
+        rendered = time.perf_counter()
         _save(job, unfinished.films, paths, header, bits or {})
-        return state
+        return _made(state, begun, rendered)
+
+
+def _made(state: Progress, begun: float, rendered: float) -> Made:
+    now = time.perf_counter()
+    return Made(state, 1e3 * (now - begun), 1e3 * (now - rendered))
 
 
 def _save(

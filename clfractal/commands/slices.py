@@ -85,7 +85,7 @@ def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     for number, each, paths in zip(numbers, scenes, files, strict=True):
         with naming_options():
             job = engine.prepare(each, precision=precision, samples=order.samples)
-        rays += render_one(job, engine, paths, shell).rays
+        rays += render_one(job, engine, paths, shell).state.rays
         now = time.perf_counter()
         if now - told > _LINE_SECONDS and number < stack.count:
             told = now

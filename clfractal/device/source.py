@@ -17,6 +17,7 @@ from clfractal.errors import KernelBuildError, Where, nearest
 from clfractal.resources import folder
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))')
+_ENDIF = re.compile(r"^[ \t]*#[ \t]*endif\b")
 _LINE = re.compile(r'^#line (?P<line>\d+) "(?P<name>[^"]*)"')
 
 
@@ -81,8 +82,8 @@ def flatten(
         user: the generated texts that come from the user's formula.
         kernels: another folder than the one that travels with the program.
 
-    Every text is taken in once, where it is first included: includes must not depend on `#if`. Quoted
-    includes are looked for beside the including file, then in the kernels folder.
+    Every text is taken in once, where it is first included: an include that depends on `#if` is the only one of its
+    file. Quoted includes are looked for beside the including file, then in the kernels folder.
 
     Raises:
         KernelBuildError: an include cannot be found or is not quoted, with its file and line.
@@ -131,11 +132,17 @@ class _Flattener:
             return
         self.texts[shown] = text
         self.lines.append(f'#line 1 "{shown}"')
+        included = False
         for number, line in enumerate(text.splitlines(), start=1):
             include = _INCLUDE.match(line)
             if include is None:
                 self.lines.append(line)
+                if included and _ENDIF.match(line):
+                    # Where the condition was false, the compiler has not seen the directive behind the include.
+                    self.lines.append(f'#line {number + 1} "{shown}"')
+                    included = False
                 continue
+            included = True
             place = Where(file=shown, line=number)
             if include["name"] is None:
                 raise KernelBuildError(

@@ -32,8 +32,6 @@ class Codec:
 
 _YUV8 = {(8, "420"): "yuv420p", (8, "422"): "yuv422p", (8, "444"): "yuv444p"}
 _YUV10 = {(10, "420"): "yuv420p10le", (10, "422"): "yuv422p10le", (10, "444"): "yuv444p10le"}
-# Not AV1: SVT-AV1 (4.1), the only encoder of it in av's wheels, makes the calling thread, and all that this starts later,
-# real-time ones of the highest priority where it runs as root; then other programs of the machine hardly run any more.
 CODECS: Mapping[str, Codec] = {
     "h264": Codec("libx264", (".mp4", ".mkv", ".mov"), {**_YUV8, **_YUV10}, ("crf", 0, 51, 16)),
     "h265": Codec(
@@ -43,6 +41,15 @@ CODECS: Mapping[str, Codec] = {
         ("crf", 0, 51, 18),
         {"x265-params": "log-level=error"},
         least_side=64,  # of smaller pictures x265 writes beyond its memory
+    ),
+    # SVT-AV1, the only software encoder of it in av's wheels, knows no other chroma.
+    "av1": Codec(
+        "libsvtav1",
+        (".mp4", ".mkv"),
+        {(10, "420"): "yuv420p10le", (8, "420"): "yuv420p"},
+        ("crf", 1, 63, 18),
+        {"preset": "6"},
+        least_side=64,
     ),
     "ffv1": Codec("ffv1", (".mkv",), {(8, "rgb"): "bgr0", (16, "rgb"): "gbrp16le"}, None, {"level": "3"}),
     "prores": Codec("prores_ks", (".mov", ".mkv"), {(10, "422"): "yuv422p10le", (10, "444"): "yuv444p10le"}),

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from clfractal.errors import FileError, SceneError, Where
 from clfractal.files.atomic import atomic_writer, check_output, file_error
+from clfractal.files.encoding import as_usual_threads
 from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, MATROSKA, PACKING, Codec, Recipe
 
 if TYPE_CHECKING:
@@ -168,6 +169,8 @@ def write_film(plan: Plan, pictures: Iterable[Path]) -> None:
                 options={"movflags": "+faststart"} if form in ("mp4", "mov") else {},
             ) as film:
                 stream = _stream(plan, film)
+                with as_usual_threads(plan.codec.library):
+                    stream.codec_context.open()
                 for number, picture in enumerate(pictures):
                     frame = _frame(av, plan, _read(av, picture, plan))
                     frame.pts = number

@@ -24,6 +24,9 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 SCENE_KEY = "clfractal"
 """Keyword of the text chunk that holds the scene."""
 
+# Components of a pixel by colour type (section 11.2.1), whose byte ends this beginning of a file.
+_COMPONENTS = {0: 1, 2: 3, 4: 2, 6: 4}
+_TO_COLOR_TYPE = 26
 _LARGEST_TEXT = 16 << 20  # bytes; a scene with a formula library inlined has some ten thousand
 
 
@@ -154,6 +157,23 @@ def read_texts(path: str | Path) -> dict[str, str]:
             raise file_error(path, "cannot be read", error) from error
         except _DamagedError as damage:
             raise file_error(path, str(damage), "") from None
+
+
+def read_form(path: str | Path) -> tuple[int, int]:
+    """Bits of a component, and components of a pixel, of a PNG file; a palette's indices count as one component.
+
+    Raises:
+        FileError: it cannot be read, or does not begin as a PNG file.
+    """
+    with open_regular(path) as stream:
+        try:
+            start = stream.read(_TO_COLOR_TYPE)
+        except OSError as error:
+            raise file_error(path, "cannot be read", error) from error
+    if len(start) < _TO_COLOR_TYPE or start[:8] != SIGNATURE or start[12:16] != b"IHDR":
+        raise file_error(path, "is not a PNG file", "")
+    bits, color_type = start[24], start[25]
+    return bits, _COMPONENTS.get(color_type, 1)
 
 
 def read_scene_text(path: str | Path) -> str | None:

@@ -25,7 +25,8 @@ from clfractal.scene.stereo import APART, Stereo
 # Names of the header's keys in a file: OpenEXR's own names are kept, the others begin with the program's name.
 _MATRICES = ("worldToCamera", "worldToNDC")
 _FILE_KEYS = {"scene": "clfractal"} | {name: name for name in (*_MATRICES, "view", "multiView")}
-_FILE_KEYS |= {f"{view}.{name}": f"{view}.{name}" for view in VIEWS for name in _MATRICES}
+# In a file with both eyes' pictures each has its own of these, with its view before the name.
+_OF_VIEWS = (*_MATRICES, "devices", "tileDevices")
 
 
 def save_outputs(
@@ -140,7 +141,8 @@ def save_views(
     """Writes both eyes' pictures to one multi-view EXR, the left one as its default view; memory as of `save_outputs`.
 
     The standard attributes worldToCamera and worldToNDC are the left eye's. Each eye's are there too, with its view
-    before the name, as in `right.worldToCamera`.
+    before the name, as in `right.worldToCamera`; so are the devices that made each eye's tiles, if several did. The
+    seconds are those of both.
 
     Args:
         left, right: pictures of one size and region with the same channels.
@@ -159,12 +161,15 @@ def save_views(
     pictures = dict(zip(VIEWS, (left, right), strict=True))
     if half is None:
         half = {name for name in left.channels if CHANNELS[name].precision == "half"}
-    cameras = {
+    own = {
         f"{view}.{name}": picture.header[name]
         for view, picture in pictures.items()
-        for name in _MATRICES
+        for name in _OF_VIEWS
         if name in picture.header
     }
+    common = {name: value for name, value in left.header.items() if name not in ("devices", "tileDevices")}
+    if "seconds" in common:
+        common["seconds"] = sum(picture.header.get("seconds", 0.0) for picture in pictures.values())
     region = left.region
     write_exr(
         path,
@@ -180,7 +185,7 @@ def save_views(
         region=(region.x, region.y, region.width, region.height),
         channels=[in_view(name, view) for view in VIEWS for name in left.channels],
         half={in_view(name, view) for view in VIEWS for name in half},
-        header=_attributes({**left.header, **cameras, **(header or {}), "view": None, "multiView": VIEWS}),
+        header=_attributes({**common, **own, **(header or {}), "view": None, "multiView": VIEWS}),
     )
 
 
@@ -214,6 +219,9 @@ def _colors(picture: Picture, *, alpha: bool) -> Iterator[Floats]:
 
 
 def _file_key(key: str) -> str:
+    view, dot, name = key.rpartition(".")
+    if dot:
+        return f"{view}.{_file_key(name)}"
     return _FILE_KEYS.get(key) or f"clfractal{key[:1].upper()}{key[1:]}"
 
 

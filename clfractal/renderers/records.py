@@ -16,8 +16,17 @@ from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
+from clfractal.scene.base import unit
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import PointLight
+from clfractal.scene.lighting import (
+    Light,
+    PlacedLight,
+    PointLight,
+    RectangleLight,
+    SmallLight,
+    SphereLight,
+    SpotLight,
+)
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient
 
@@ -97,12 +106,21 @@ LIGHT = Struct(
         ),
         Field("color", "real", 3, "linear Rec. 709"),
         Field("intensity", "real", 0, "factor on the colour"),
-        Field("kind", "int", 0, "LIGHT_DIRECTIONAL or LIGHT_POINT"),
+        Field("kind", "int", 0, "one of LIGHT_KINDS"),
         Field("inverse_square", "int", 0, "1: weakens with the square of the distance"),
         Field("shadow", "int", 0, "1: blocked by the set"),
         Field("spread", "real", 0, "1 - cos of half its angular size"),
         Field("rays", "int", 0, "shadow rays of a shot"),
         Field("share", "real", 0, "one over that"),
+        Field("axis", "real", 3, "of a spot's cone or a rectangle's shining side, length 1"),
+        Field("side", "real", 3, "a rectangle's middle to its right rim, scene units"),
+        Field("upward", "real", 3, "the same, to its upper rim"),
+        Field("radius", "real", 0, "of a sphere, scene units"),
+        Field("area", "real", 0, "of a rectangle, square scene units"),
+        Field(
+            "rim", "real", 2, "of a spot: half angles where it is dark, and where it begins to fade, radians"
+        ),
+        Field("visible", "int", 0, "1: the eye sees it"),
     ],
 )
 
@@ -129,6 +147,13 @@ MATERIAL = Struct(
         Field("reflection", "real", 0, "part that is mirrored sharply"),
         Field("fog_color", "real", 3, "linear Rec. 709"),
         Field("fog_density", "real", 0, "per scene unit"),
+        Field(
+            "fog_height", "real", 0, "in which its density falls to 1/e, scene units; 0: the same everywhere"
+        ),
+        Field("fog_base", "real", 0, "how far up it has this density, scene units"),
+        Field("fog_up", "real", 3, "the direction in which it is thinner, length 1"),
+        Field("fog_scattering", "real", 3, "part of each light that it scatters"),
+        Field("fog_anisotropy", "real", 0, "of that, Henyey and Greenstein's g"),
         Field("fog_background", "int", 0, "1: the fog covers what is past the set"),
         Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
@@ -143,7 +168,8 @@ MATERIAL = Struct(
 
 STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR)
 
-LIGHT_DIRECTIONAL, LIGHT_POINT = 0, 1
+LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
+LIGHT_DEFINES = {f"LIGHT_{kind.upper()}": number for kind, number in LIGHT_KINDS.items()}
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
@@ -311,26 +337,48 @@ def hemisphere_rays(scene: Scene) -> HemisphereRays:
     return HemisphereRays(max(open_rays, (lit_rays + 1) // 2), lit_rays // 2, lit_rays > 0)
 
 
+def _light_row(light: Light) -> Mapping[str, object]:
+    placed = isinstance(light, PlacedLight)
+    vector = np.array(light.position if isinstance(light, PlacedLight) else light.direction, float)
+    row: dict[str, object] = {
+        "vector": vector if placed else vector / np.linalg.norm(vector),
+        "color": light.used_color,
+        "intensity": light.intensity,
+        "kind": LIGHT_KINDS[light.type],
+        "inverse_square": int(
+            isinstance(light, PointLight | SpotLight) and light.falloff == "inverse_square"
+        ),
+        "shadow": int(light.shadow),
+        "rays": light.used_rays,
+        "share": 1 / light.used_rays,
+        "spread": 0.0,
+        "axis": (0.0, 0.0, 0.0),
+        "side": (0.0, 0.0, 0.0),
+        "upward": (0.0, 0.0, 0.0),
+        "radius": 0.0,
+        "area": 0.0,
+        "rim": (0.0, 0.0),
+        "visible": 0,
+    }
+    if isinstance(light, SmallLight):
+        # 1 - cos a = 2 sin(a/2)^2, which keeps its digits for the smallest lights.
+        row["spread"] = 2 * math.sin(math.radians(light.angular_size) / 4) ** 2
+    if isinstance(light, SpotLight):
+        half = math.radians(light.angle) / 2
+        row["axis"] = unit(light.direction)
+        row["rim"] = (half, half * (1 - light.softness))
+    elif isinstance(light, SphereLight):
+        row.update(radius=light.radius, visible=int(light.visible))
+    elif isinstance(light, RectangleLight):
+        side, upward = (np.array(way) for way in light.frame)
+        row.update(axis=unit(light.direction), area=light.width * light.height, visible=int(light.visible))
+        row.update(side=side * light.width / 2, upward=upward * light.height / 2)
+    return row
+
+
 def light_records(scene: Scene, precision: Precision) -> Record:
     """The lights; one unused record where there are none, since no buffer is empty."""
-    rows: list[Mapping[str, object]] = []
-    for light in scene.lights:
-        point = isinstance(light, PointLight)
-        vector = np.array(light.position if isinstance(light, PointLight) else light.direction, float)
-        rows.append(
-            {
-                "vector": vector if point else vector / np.linalg.norm(vector),
-                "color": light.color,
-                "intensity": light.intensity,
-                "kind": LIGHT_POINT if point else LIGHT_DIRECTIONAL,
-                "inverse_square": int(isinstance(light, PointLight) and light.falloff == "inverse_square"),
-                "shadow": int(light.shadow),
-                # 1 - cos a = 2 sin(a/2)^2, which keeps its digits for the smallest lights.
-                "spread": 2 * math.sin(math.radians(light.angular_size) / 4) ** 2,
-                "rays": light.used_rays,
-                "share": 1 / light.used_rays,
-            }
-        )
+    rows = [_light_row(light) for light in scene.lights]
     return LIGHT.array(precision, rows) if rows else np.zeros(1, LIGHT.dtype(precision))
 
 
@@ -340,6 +388,7 @@ def material_record(
     """Material, colouring, background, and how the packed environment is laid out."""
     material, background, fog = scene.material, scene.background, scene.fog
     gradient = background if isinstance(background, Gradient) else None
+    shafts = fog.scattering if fog else None
     values = {
         "color": material.color,
         "ambient": material.ambient,
@@ -354,6 +403,11 @@ def material_record(
         "reflection": material.reflection,
         "fog_color": fog.color if fog else (0.0, 0.0, 0.0),
         "fog_density": fog.density if fog else 0.0,
+        "fog_height": (fog.height or 0.0) if fog else 0.0,
+        "fog_base": fog.base if fog else 0.0,
+        "fog_up": unit(fog.up) if fog else (0.0, 0.0, 1.0),
+        "fog_scattering": shafts.color if shafts else (0.0, 0.0, 0.0),
+        "fog_anisotropy": shafts.anisotropy if shafts else 0.0,
         "fog_background": int(fog is not None and fog.background and fog.density > 0),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),

@@ -32,7 +32,14 @@ from clfractal.renderers.planes import (
     plane_records,
 )
 from clfractal.renderers.scattering import albedo_tables
-from clfractal.renderers.waves import asks_formula, has_cones, march_kernels, most_turns, surface_stages
+from clfractal.renderers.waves import (
+    air_turns,
+    asks_formula,
+    has_cones,
+    march_kernels,
+    most_turns,
+    surface_stages,
+)
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
@@ -51,7 +58,7 @@ NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangl
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
 # Numbers of a pixel in `kernels/state.h`, without its normals.
-STATE_NUMBERS = 112
+STATE_NUMBERS = 120
 
 Floats = npt.NDArray[np.float32]
 
@@ -104,8 +111,7 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
         "HAS_SOFT_LIGHT": int(
-            any(light.angular_size > 0 for light in scene.lights)
-            and not isinstance(scene.lighting, PathLighting)
+            any(light.has_size for light in scene.lights) and not isinstance(scene.lighting, PathLighting)
         ),
         "HAS_FOG": int(scene.fog is not None),
         "ADAPTIVE": int(renderer.noise is not None),
@@ -118,7 +124,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
-        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
+        **records.LIGHT_DEFINES,
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "ADAPTIVE": 0,
         "POINTS": several_points(scene),
@@ -126,6 +132,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_NUMBERS": state_numbers(scene),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
+        "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
     }
 
@@ -224,7 +231,11 @@ class SurfaceKernel(TileKernel):
 
 def light_kernels(scene: Scene) -> tuple[str, ...]:
     """The kernels that gather the light of spots."""
-    return ("scatter_paths", "gather_paths") if isinstance(scene.lighting, PathLighting) else ("light_spots",)
+    return (
+        ("scatter_paths", "gather_paths", "end_paths")
+        if isinstance(scene.lighting, PathLighting)
+        else ("light_spots",)
+    )
 
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:

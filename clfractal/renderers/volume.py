@@ -80,7 +80,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         **pass_defines(plan),
         "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
-        "LIGHT_DIRECTIONAL": records.LIGHT_DIRECTIONAL,
+        **records.LIGHT_DEFINES,
         "TRANSFER_SIZE": TRANSFER_SIZE,
         "SURFACE": int(settings.transfer.opacity is None),
         "VALUE_IS_FLOAT": int(grid.kind == "float"),

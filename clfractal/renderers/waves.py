@@ -10,7 +10,8 @@ and each mirror adds what follows `begin_shots` but for the points. With `lighti
 
     scatter_paths  march  gather_paths
 
-ask for light and send the next ray of each path. See "A shot" in docs/architecture.md.
+ask for light and send the next ray of each path, and after the last bounce `march  end_paths` finds out which rays
+leave the set. See "A shot" in docs/architecture.md.
 """
 
 from __future__ import annotations
@@ -65,9 +66,15 @@ def light_turns(scene: Scene) -> int:
     return rays.cosine + rays.map + len(scene.lights) * light_rays(scene)
 
 
+def air_turns(scene: Scene) -> int:
+    """Rays that leave the fog before the first spot: one to each light."""
+    fog = scene.fog
+    return len(scene.lights) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
+
+
 def most_turns(scene: Scene) -> int:
     """The most rays that a pixel sends for one purpose."""
-    return max(1, scene.surface.used_points.count, light_turns(scene))
+    return max(scene.surface.used_points.count, max(light_turns(scene), 1) + air_turns(scene))
 
 
 def march_kernels(plan: Plan) -> tuple[str, ...]:
@@ -110,14 +117,18 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
             yield stage("color_spots", bounce=bounce)
         if scene.cut_planes and bounce == 0:
             yield stage("find_planes")
+        air = air_turns(scene) if bounce == 0 else 0
         if isinstance(scene.lighting, PathLighting):
             yield stage("scatter_paths", 1, bounce=bounce)
-            yield from _marched(marching, 1, GOAL_SHADOW)
-            yield stage("gather_paths", 1, bounce=bounce)
+            yield from _marched(marching, 1 + air, GOAL_SHADOW)
+            yield stage("gather_paths", 1 + air, bounce=bounce)
             continue
-        if after > 0:
-            yield from _marched(marching, after, GOAL_SHADOW)
-        yield stage("light_spots", after, bounce=bounce)
+        if after + air > 0:
+            yield from _marched(marching, after + air, GOAL_SHADOW)
+        yield stage("light_spots", after + air, bounce=bounce)
+    if isinstance(scene.lighting, PathLighting):
+        yield from _marched(marching, 1, GOAL_SHADOW)
+        yield stage("end_paths", 1, bounce=bounces(scene) + 1)
 
 
 def _marched(kernels: tuple[str, ...], turns: int, goal: int) -> Iterator[Stage]:

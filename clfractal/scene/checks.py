@@ -6,7 +6,8 @@ from math import dist
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.lighting import PointLight
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
@@ -30,6 +31,7 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if isinstance(scene.renderer, VolumeRenderer):
         _check_volume(scene, scene.renderer)
     _check_planes(scene)
+    check_lighting(scene)
     if scene.stereo is not None:
         _check_eyes(scene)
         if whole:
@@ -171,12 +173,43 @@ def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
         )
 
 
+def check_lighting(scene: Scene) -> None:
+    """Raises SceneError for a material that is not there, and for what paths cannot show yet."""
+    from clfractal.errors import unknown_name
+
+    name = scene.material.name
+    if name is not None and name not in scene.materials:
+        if not scene.materials:
+            raise SceneError(f"names {name!r}, but the scene has no materials", Where(path="material.name"))
+        raise SceneError(unknown_name("material", name, tuple(scene.materials)), Where(path="material.name"))
+    if not isinstance(scene.lighting, PathLighting):
+        return
+    renderer = scene.renderer
+    if isinstance(renderer, VolumeRenderer):
+        raise SceneError(
+            "must be direct for a volume, got path; surfaces are lit along paths", Where(path="lighting.mode")
+        )
+    if isinstance(renderer, SurfaceRenderer):
+        _check_paths(scene, renderer)
+
+
+def _check_paths(scene: Scene, renderer: SurfaceRenderer) -> None:
+    if renderer.used_points.count > 1:
+        key = "points" if renderer.points is not None else "normal"
+        raise SceneError(
+            "cannot be combined with lighting.mode path, whose samples find spots of their own; use renderer.samples",
+            Where(path=f"renderer.{key}"),
+        )
+    if scene.cut_planes:
+        raise SceneError("cannot be combined with lighting.mode path yet", Where(path="cut_planes"))
+
+
 def _check_lights(scene: Scene) -> None:
     center, radius = scene.bounds
     candidates = [
         (index, light.position)
         for index, light in enumerate(scene.lights)
-        if isinstance(light, PointLight) and dist(light.position, center) <= radius
+        if isinstance(light, PlacedLight) and dist(light.position, center) <= radius
     ]
     if not candidates:
         return

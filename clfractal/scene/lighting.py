@@ -4,7 +4,23 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import Amount, Color, Position, Reflectance, Section, chosen_by, length, problem
+from clfractal.scene.base import (
+    Amount,
+    Color,
+    Coordinate,
+    Fraction,
+    Length,
+    Position,
+    Reflectance,
+    Section,
+    Vector,
+    chosen_by,
+    cross,
+    length,
+    problem,
+    unit,
+)
+from clfractal.scene.temperature import black_body
 
 MAX_LIGHTS = 64
 
@@ -13,27 +29,57 @@ class LightBase(Section):
     """Keys that every light has."""
 
     color: Color = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
+    temperature: Annotated[float, Field(strict=True, ge=1000, le=40000)] | None = Field(
+        None,
+        description="kelvin: the colour of a black body, of luminance 1, in place of `color`; null: `color`",
+    )
     intensity: Amount = Field(1.0, description="factor on the colour")
     shadow: bool = Field(True, description="whether the set blocks this light")
+    rays: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
+        None, description="shadow rays per sample for a soft shadow; null: 8. A hard shadow takes one"
+    )
+
+    @model_validator(mode="after")
+    def _one_color(self) -> Self:
+        if self.temperature is not None and self.color != (1.0, 1.0, 1.0):
+            raise problem("cannot be combined with color: give one of color or temperature", "temperature")
+        return self
+
+    @property
+    def used_color(self) -> Vector:
+        """Linear Rec. 709: the light's own colour, or that of its temperature."""
+        return self.color if self.temperature is None else black_body(self.temperature)
+
+    @property
+    def has_size(self) -> bool:
+        """Whether its light comes from more than one direction, so that shadows are soft."""
+        return True
+
+    @property
+    def used_rays(self) -> int:
+        """Shadow rays per sample: one for a hard shadow, because further rays would be the same."""
+        if not self.has_size:
+            return 1
+        return self.rays if self.rays is not None else 8
+
+
+class SmallLight(LightBase):
+    """A light that has one direction at each place, or about one."""
+
     angular_size: float = Field(
         0.0,
         ge=0,
         le=170,
         description="diameter of the light as seen from the surface, degrees; 0: hard shadows",
     )
-    rays: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
-        None, description="shadow rays per sample for a soft shadow; null: 8. A hard shadow takes one"
-    )
 
     @property
-    def used_rays(self) -> int:
-        """Shadow rays per sample: one for a hard shadow, because further rays would be the same."""
-        if self.angular_size == 0:
-            return 1
-        return self.rays if self.rays is not None else 8
+    def has_size(self) -> bool:
+        """Whether shadows are soft."""
+        return self.angular_size > 0
 
 
-class DirectionalLight(LightBase):
+class DirectionalLight(SmallLight):
     """Light from infinitely far away."""
 
     tag = "directional"
@@ -47,7 +93,7 @@ class DirectionalLight(LightBase):
         return self
 
 
-class PointLight(LightBase):
+class PointLight(SmallLight):
     """Light from a point."""
 
     tag = "point"
@@ -58,8 +104,77 @@ class PointLight(LightBase):
     )
 
 
+class SpotLight(SmallLight):
+    """Light from a point into a cone."""
+
+    tag = "spot"
+    type: Literal["spot"] = "spot"
+    position: Position = Field(description="scene units")
+    direction: Position = Field(
+        (0.0, 0.0, -1.0), description="axis of the cone, along which the light travels"
+    )
+    angle: float = Field(40.0, gt=0, le=180, description="full angle of the cone, degrees")
+    softness: Fraction = Field(
+        0.2, description="part of the cone's half angle over which the light fades at its rim; 0: a sharp rim"
+    )
+    falloff: Literal["none", "inverse_square"] = Field(
+        "inverse_square", description="how the light weakens with distance"
+    )
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if length(self.direction) < 1e-12:
+            raise problem("must not be zero", "direction")
+        return self
+
+
+class SphereLight(LightBase):
+    """A ball that shines evenly; `intensity` times the colour is the radiance that it shows."""
+
+    tag = "sphere"
+    type: Literal["sphere"] = "sphere"
+    position: Position = Field(description="its centre, scene units")
+    radius: Length = Field(0.1, description="scene units")
+    visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
+
+
+class RectangleLight(LightBase):
+    """A rectangle that shines on one side; `intensity` times the colour is the radiance that it shows."""
+
+    tag = "rectangle"
+    type: Literal["rectangle"] = "rectangle"
+    position: Position = Field(description="its middle, scene units")
+    direction: Position = Field((0.0, 0.0, -1.0), description="where its shining side looks to")
+    up: Position = Field((0.0, 1.0, 0.0), description="about along its height; not along `direction`")
+    width: Length = Field(1.0, description="scene units")
+    height: Length = Field(1.0, description="scene units")
+    visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
+
+    @model_validator(mode="after")
+    def _has_a_frame(self) -> Self:
+        if length(self.direction) < 1e-12:
+            raise problem("must not be zero", "direction")
+        if length(self.up) < 1e-12:
+            raise problem("must not be zero", "up")
+        if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
+            raise problem("must not be along direction", "up")
+        return self
+
+    @property
+    def frame(self) -> tuple[Vector, Vector]:
+        """Directions of its width and of its height, length 1."""
+        side = unit(cross(self.direction, self.up))
+        return side, unit(cross(side, self.direction))
+
+
+AreaLight = SphereLight | RectangleLight
+PlacedLight = PointLight | SpotLight | SphereLight | RectangleLight
 Light = Annotated[
-    Annotated[DirectionalLight, Tag("directional")] | Annotated[PointLight, Tag("point")],
+    Annotated[DirectionalLight, Tag("directional")]
+    | Annotated[PointLight, Tag("point")]
+    | Annotated[SpotLight, Tag("spot")]
+    | Annotated[SphereLight, Tag("sphere")]
+    | Annotated[RectangleLight, Tag("rectangle")],
     chosen_by("type", "directional"),
 ]
 Lights = Annotated[tuple[Light, ...], Field(strict=False, max_length=MAX_LIGHTS)]
@@ -113,6 +228,20 @@ class Environment(Section):
         return self
 
 
+class Scattering(Section):
+    """Light that the fog sends on to the eye; what stands between it and a light throws shadows into the fog."""
+
+    color: Reflectance = Field(
+        (1.0, 1.0, 1.0), description="part of each light that is scattered and not absorbed, linear Rec. 709"
+    )
+    anisotropy: float = Field(
+        0.0,
+        ge=-0.95,
+        le=0.95,
+        description="above 0 light goes on forwards, as in mist; below 0 back; 0: everywhere alike",
+    )
+
+
 class Fog(Section):
     """Fog absorbs light on its way to the eye and replaces it by its own colour, exponentially with distance."""
 
@@ -120,4 +249,21 @@ class Fog(Section):
     density: float = Field(
         0.1, ge=0, le=1e6, description="per scene unit; the fraction exp(-density * distance) of light passes"
     )
+    height: Length | None = Field(
+        None,
+        description="how much higher the density is 1/e, about a third, scene units; null: it is the same everywhere",
+    )
+    base: Coordinate = Field(
+        0.0, description="how far up from the origin the fog has this density, with `height`, scene units"
+    )
+    up: Position = Field((0.0, 0.0, 1.0), description="the direction in which it gets thinner, with `height`")
+    scattering: Scattering | None = Field(
+        None, description="shafts of light: what the fog scatters of each light; null: `color` alone"
+    )
     background: bool = Field(True, description="whether the fog also covers the background")
+
+    @model_validator(mode="after")
+    def _has_an_up(self) -> Self:
+        if length(self.up) < 1e-12:
+            raise problem("must not be zero", "up")
+        return self

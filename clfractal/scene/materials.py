@@ -2,9 +2,9 @@
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
-from clfractal.scene.base import Amount, Color, Fraction, Reflectance, Section
+from clfractal.scene.base import Amount, Color, Fraction, Reflectance, Section, problem
 
 Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]
 WHITE = (1.0, 1.0, 1.0)
@@ -65,12 +65,24 @@ MAX_MATERIALS, MAX_NAME = 64, 100
 class PbrMaterial(Section):
     """A material by OpenPBR's layers, for `lighting: {mode: path}`."""
 
-    base: Base = Field(default_factory=dict, validate_default=True)
-    specular: Specular = Field(default_factory=dict, validate_default=True)
-    coat: Coat = Field(default_factory=dict, validate_default=True)
-    fuzz: Fuzz = Field(default_factory=dict, validate_default=True)
-    emission: Emission = Field(default_factory=dict, validate_default=True)
+    base: Base = Field(default_factory=dict, validate_default=True, description="the body")
+    specular: Specular = Field(
+        default_factory=dict, validate_default=True, description="what the body's boundary mirrors"
+    )
+    coat: Coat = Field(default_factory=dict, validate_default=True, description="a clear layer over the body")
+    fuzz: Fuzz = Field(
+        default_factory=dict, validate_default=True, description="short fibres over everything"
+    )
+    emission: Emission = Field(
+        default_factory=dict, validate_default=True, description="light of the material's own"
+    )
 
 
-MaterialName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME)]
+def _fitting(name: str) -> str:
+    if not name.isprintable() or name.isspace() or "." in name:
+        raise problem("a material's name must be printable text on one line, without a dot")
+    return name
+
+
+MaterialName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME), AfterValidator(_fitting)]
 Materials = Annotated[dict[MaterialName, PbrMaterial], Field(max_length=MAX_MATERIALS)]

@@ -42,9 +42,15 @@ class Movement:
         Raises:
             SceneError: a value is out of its range then, or the formula has no meaning with it; at its track.
         """
-        seeds = _seeds(self._scene, int(frame)) if self.animation.noise == "new" else {}
-        own = self.animation.model_copy(update={"frame": float(frame)}) if self.animation.shutter else None
-        return self._made(frame, seeds, own)
+        return self._made(frame, self._noise(self._scene, frame), self._exposed(frame))
+
+    def _noise(self, scene: Scene, frame: float) -> dict[tuple[str, ...], Any]:
+        """The seeds of a frame, by path."""
+        return dict(_seeds(scene, int(frame))) if self.animation.noise == "new" else {}
+
+    def _exposed(self, frame: float) -> Animation | None:
+        """The animation of a frame's scene, if its shutter makes it a part of the picture."""
+        return self.animation.model_copy(update={"frame": float(frame)}) if self.animation.shutter else None
 
     def instant(self, time: float) -> Scene:
         """The scene at a moment of the film, frames, with the noise that it has; errors as above."""
@@ -81,10 +87,18 @@ class Movement:
         except ClfractalError as error:
             raise self._blamed(error, frame) from error
 
-    def rendered(self, posed: Scene, frame: float) -> Scene:
-        """What is rendered of a scene that was posed, and perhaps edited; without edits and motion blur that is `scene`."""
+    def rendered(self, posed: Scene, frame: float, *, blurred: bool = True) -> Scene:
+        """What is rendered of a scene that was posed, and perhaps edited; without edits that is `scene`.
+
+        Args:
+            blurred: whether the film's shutter blurs it: then values of tracks are the film's, edited or not.
+        """
         found = _with_live(posed, self.targets.values())
-        return with_values(found, _seeds(found, int(frame))) if self.animation.noise == "new" else found
+        own = self._exposed(frame) if blurred else None
+        found = with_values(found, self._noise(found, frame), animation=own)
+        if own is not None:
+            found.take_tables(posed)
+        return found
 
     def _blamed(self, error: ClfractalError, frame: float) -> ClfractalError:
         """The error at the track that is the reason, with the frame."""

@@ -87,6 +87,9 @@ def target_of(scene: Scene, name: str) -> Target:
         raise SceneError("must name a value by its dotted keys, such as camera.position")
     if path[0] in _FIXED and path != ("output", "exposure"):
         raise SceneError(f"cannot move: it {_FIXED[path[0]]}")
+    if path[0] == "formula" and path[1:2] not in ((), ("chain",)) and scene.formula.chain is not None:
+        known = ", ".join(f"formula.chain.{number}" for number in range(len(scene.formula.chain)))
+        raise SceneError(f"cannot move: formula is a chain; name a value of {known}")
     owner: Any = None
     value: Any = scene
     for depth in range(len(path)):
@@ -110,7 +113,7 @@ def _below(value: Any, path: Sequence[str], depth: int) -> Any:
             raise SceneError(f"cannot move: {shown} has {entries}")
         return value[int(part)]
     if value is None:
-        raise SceneError(f"cannot move: {shown} is null; give it a value first")
+        raise SceneError(f"cannot move: {shown} is null; give it a value, or leave this track out")
     raise SceneError(f"cannot move: {shown} is a single value, so it has no key {part!r}")
 
 

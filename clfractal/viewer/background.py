@@ -15,7 +15,7 @@ from clfractal.errors import ClfractalError
 from clfractal.pictures.develop import rgb8
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
-from clfractal.viewer.fitting import Cancellable
+from clfractal.viewer.fitting import Cancellable, measured_exposure, with_exposure
 from clfractal.work.films import JobFilms
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
@@ -48,10 +48,26 @@ class Task(Protocol):
         """It cannot be done."""
 
 
-def prepared(scene: Scene, executor: LocalExecutor, token: CancelToken, tell: Tell, *, colors: bool) -> Job:
-    """The job of a scene's picture; `colors`: with the colour channels alone."""
+def prepared(
+    scene: Scene,
+    executor: LocalExecutor,
+    token: CancelToken,
+    tell: Tell,
+    *,
+    colors: bool,
+    exposed_in: Scene | None = None,
+) -> Job:
+    """The job of a scene's picture.
+
+    Args:
+        colors: with the colour channels alone.
+        exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
+    """
     channels = ("R", "G", "B", "A") if colors else None
-    scene = settled(scene, Look(executor.device, Cancellable(executor, token)))
+    look = Look(executor.device, Cancellable(executor, token))
+    if exposed_in is not None and isinstance(scene.output.exposure, str):
+        scene = with_exposure(scene, measured_exposure(exposed_in, look))
+    scene = settled(scene, look)
     return prepare(scene, executor.device, channels=channels, on_start=tell)
 
 
@@ -128,8 +144,15 @@ class Still:
         written: the files, when it is done.
     """
 
-    def __init__(self, scene: Scene, paths: tuple[Path, ...], header: dict[str, Any] | None = None) -> None:
-        self.scene, self.paths = scene, paths
+    def __init__(
+        self,
+        scene: Scene,
+        paths: tuple[Path, ...],
+        header: dict[str, Any] | None = None,
+        *,
+        exposed_in: Scene | None = None,
+    ) -> None:
+        self.scene, self.paths, self._exposed_in = scene, paths, exposed_in
         self.share = 0.0
         self.problem = ""
         self.written: tuple[Path, ...] = ()
@@ -171,7 +194,9 @@ class Still:
         if self.cancelled:
             return
         if self._films is None or self._films.job.device != executor.device.info:
-            self._films = JobFilms(prepared(self.scene, executor, token, tell, colors=False))
+            self._films = JobFilms(
+                prepared(self.scene, executor, token, tell, colors=False, exposed_in=self._exposed_in)
+            )
         films = self._films
         run(films.job, films.films, executor, token=token, progress=self._told)
         self._films = self._token = None

@@ -15,6 +15,7 @@ from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.load import check_scene
 from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
+from clfractal.viewer.tracked import check_tracked
 
 
 def plain_section(scene: Scene, key: str) -> Any:
@@ -92,6 +93,8 @@ def replaced(scene: Scene, sections: Mapping[str, Any]) -> Scene:
         document = Document(node_from_plain({**scene.resolved(), **plain}, None))
         raise first_error(error, document, Scene) from error
     result = scene.model_copy(update={name: getattr(checked, name) for name in sections})
+    if "animation" not in sections:
+        check_tracked(scene, result)
     check_scene(result)
     return result
 

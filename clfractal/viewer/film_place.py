@@ -61,9 +61,23 @@ def place_at(document: Scene, frame: float) -> FilmPlace:
     return FilmPlace(frame, document, movement_of(document).posed(frame))
 
 
-def rendered(scene: Scene, frame: float) -> Scene:
-    """What is rendered of a scene that is edited at a frame: the bits of the film's frame, if nothing was edited."""
-    return movement_of(scene).rendered(scene, frame) if scene.animation is not None else scene
+def rendered(scene: Scene, frame: float, *, blurred: bool) -> Scene:
+    """What is rendered of a scene that is edited at a frame: the bits of the film's frame, if nothing was edited.
+
+    Args:
+        blurred: see `Movement.rendered`.
+    """
+    if scene.animation is None:
+        return scene
+    return movement_of(scene).rendered(scene, frame, blurred=blurred)
+
+
+def as_it_stands(scene: Scene) -> Scene:
+    """A scene as it is rendered while none of its film's frames is shown: its own values, without the film's shutter."""
+    animation = scene.animation
+    if animation is None or animation.frame is None:
+        return scene
+    return scene.model_copy(update={"animation": animation.model_copy(update={"frame": None})})
 
 
 # Keys for what changed

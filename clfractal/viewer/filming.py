@@ -42,6 +42,7 @@ class InFilm(ABC):
         self.auto_keys = self.recording = False
         self._moving_until = 0.0
         self._document: tuple[Scene, FilmPlace, Scene] | None = None
+        self._first: tuple[Scene, Scene] | None = None
 
     @abstractmethod
     def refresh(self, *, again: bool = False) -> None:
@@ -154,8 +155,27 @@ class InFilm(ABC):
         self.refresh()
 
     def as_rendered(self, scene: Scene) -> Scene:
-        """What is rendered of a scene that is edited here."""
-        return film_place.rendered(scene, self.place.frame) if self.place is not None else scene
+        """What is rendered of a scene that is edited here.
+
+        At a frame it has the film's motion blur, unless what a track moves was changed there: its way is not known yet.
+        """
+        if self.place is None:
+            return film_place.as_it_stands(scene)
+        return film_place.rendered(scene, self.place.frame, blurred=not self.unkeyed())
+
+    @property
+    def exposed_in(self) -> Scene | None:
+        """The scene in which an exposure of `auto` is measured: a film's first frame; None: the one that is shown."""
+        if self.place is None or not isinstance(self.scene.output.exposure, str):
+            return None
+        document, known = self.document, self._first
+        if known is None or known[0] is not document:
+            try:
+                first = movement_of(document).scene(0)
+            except ClfractalError:  # while a key is dragged; the drag's end tells it
+                return None
+            known = self._first = (document, first)
+        return known[1] if isinstance(known[1].output.exposure, str) else None
 
     # Keys
 

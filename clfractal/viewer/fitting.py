@@ -33,36 +33,68 @@ class Cancellable:
         return self._executor.execute(job, items, self._token)
 
 
+def measured_exposure(scene: Scene, look: Look) -> float:
+    """The exposure of a scene with `auto`, stops.
+
+    Raises:
+        DeviceError, KernelBuildError: as of a render.
+        Stopped: the look was ended.
+    """
+    try:
+        return settled(scene, look).output.stops
+    except SceneError:
+        return settled(_unfitted(scene), look).output.stops
+
+
+def with_exposure(scene: Scene, stops: float) -> Scene:
+    """The scene with an exposure, stops."""
+    return scene.model_copy(update={"output": scene.output.model_copy(update={"exposure": stops})})
+
+
+def _unfitted(scene: Scene) -> Scene:
+    """A scene without `stereo.fit`, in which nothing is in sight, for example: the plane stays at the camera's target."""
+    assert scene.stereo is not None
+    return scene.model_copy(update={"stereo": scene.stereo.model_copy(update={"fit": None})})
+
+
 class Fits:
     """Settles scenes (see `settle.settled`), and remembers the last one."""
 
     def __init__(self, device: Device, executor: LocalExecutor) -> None:
         self._device, self._executor = device, executor
         self._last: tuple[Scene, Scene] | None = None
+        self._exposed: tuple[Scene, float] | None = None
 
-    def fitted(self, scene: Scene, moving: bool, token: CancelToken) -> Scene:
+    def fitted(
+        self, scene: Scene, moving: bool, token: CancelToken, exposed_in: Scene | None = None
+    ) -> Scene:
         """The scene with all that is to be measured; as it is if that is nothing. Where nothing is in sight, defaults.
 
         While it moves the last measures are used, at the same distances from the camera.
+
+        Args:
+            exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
 
         Raises:
             DeviceError, KernelBuildError: as of a render.
             Stopped: the token was set.
         """
+        look = Look(self._device, Cancellable(self._executor, token))
+        if exposed_in is not None and isinstance(scene.output.exposure, str):
+            known = self._exposed
+            if known is None or not (moving or known[0] is exposed_in or known[0] == exposed_in):
+                known = self._exposed = (exposed_in, measured_exposure(exposed_in, look))
+            scene = with_exposure(scene, known[1])
         if is_settled(scene):
             return scene
         if self._last is not None and self._last[0] == scene:
             return self._last[1]
         if moving and self._last is not None:
             return _carried(self._last[1], scene)
-        look = Look(self._device, Cancellable(self._executor, token))
         try:
             found = settled(scene, look)
         except SceneError:
-            # Nothing is in sight, for example: the plane stays where the camera's target is.
-            assert scene.stereo is not None
-            unfitted = scene.stereo.model_copy(update={"fit": None})
-            return settled(scene.model_copy(update={"stereo": unfitted}), look)
+            return settled(_unfitted(scene), look)
         self._last = (scene, found)
         return found
 

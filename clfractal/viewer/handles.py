@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import View
-from clfractal.scene.lighting import DirectionalLight, PointLight
+from clfractal.scene.lighting import DirectionalLight, PlacedLight
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST
 from clfractal.viewer.pointer import Floats, Size, point_at, project
 
-Light = DirectionalLight | PointLight
+Light = DirectionalLight | PlacedLight
 Bounds = tuple[npt.ArrayLike, float]
 
 # Radius of the circle, parts of the picture's smaller side.
@@ -61,7 +61,7 @@ def handle_position(light: Light, view: View, size: Size, bounds: Bounds) -> tup
 
     A point light may be outside the picture.
     """
-    if isinstance(light, PointLight):
+    if isinstance(light, PlacedLight):
         x, y, depth = project(view, light.position, size)
         return (x, y) if isfinite(x) and isfinite(y) and depth > 0 else None
     circle, source = light_circle(view, size, bounds), _source(light)
@@ -87,7 +87,7 @@ def dragged(
     """
     if not (isfinite(x) and isfinite(y)):
         return light
-    if isinstance(light, PointLight):
+    if isinstance(light, PlacedLight):
         depth = project(view, light.position, size)[2]
         if handle_position(light, view, size, bounds) is None:
             depth = _middle_depth(view, bounds)
@@ -112,7 +112,7 @@ def pushed(light: Light, view: View, factor: float) -> Light:
 
     By parallel rays, the depth is scaled.
     """
-    if not isinstance(light, PointLight) or not (isfinite(factor) and factor > 0):
+    if not isinstance(light, PlacedLight) or not (isfinite(factor) and factor > 0):
         return light
     position = np.array(light.position)
     depth = float((position - view.origin) @ view.axis)
@@ -137,7 +137,7 @@ def _source(light: DirectionalLight) -> Floats:
     return found
 
 
-def _placed(light: PointLight, position: Floats) -> PointLight:
+def _placed(light: PlacedLight, position: Floats) -> PlacedLight:
     if not np.all(np.abs(position) <= LARGEST):
         return light
     return light.model_copy(update={"position": tuple(position.tolist())})

@@ -319,7 +319,7 @@ class SceneDeeds:
                 self.studio.tell(f"stereo: {mode or 'off'}")
                 return
             problem = self.studio.problems.pop("stereo", "not possible")
-            self.studio.tell(f"stereo: {mode}: {problem}", wrong=True)
+            self.studio.tell(problem if mode is None else f"stereo: {mode}: {problem}", wrong=True)
             if stereo is None and not isinstance(self.studio.scene.camera, PerspectiveCamera):
                 return  # no other way would fit either
 

@@ -44,12 +44,14 @@ class Wanted:
         scene: with the size of the viewport.
         moving: whether more requests will follow soon.
         region: x, y, width, height of the only part to refine, pixels of each eye's picture; None: all.
+        exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
     """
 
     number: int
     scene: Scene
     moving: bool
     region: tuple[int, int, int, int] | None = None
+    exposed_in: Scene | None = None
 
 
 class Session:
@@ -100,18 +102,24 @@ class Session:
         self._thread.start()
 
     def request(
-        self, scene: Scene, *, moving: bool = False, region: tuple[int, int, int, int] | None = None
+        self,
+        scene: Scene,
+        *,
+        moving: bool = False,
+        region: tuple[int, int, int, int] | None = None,
+        exposed_in: Scene | None = None,
     ) -> int:
         """Asks for a picture; what is under way ends at once. Gives the request's number.
 
         Args:
-            scene: its image has the size of the viewport.
+            scene: its image has the size of the viewport. Motion blur comes when it rests: what is coarse is sharp.
             moving: whether more requests will follow soon: then a frame comes at the wanted rate, as coarse as that needs.
             region: the only part that is refined.
+            exposed_in: the scene in which an exposure of `auto` is measured; None: this one.
         """
         with self._changed:
             self._number += 1
-            self._wanted = Wanted(self._number, scene, moving, region)
+            self._wanted = Wanted(self._number, scene, moving, region, exposed_in)
             self.paused = False
             # A coarse frame of a movement is short, and is finished: if each move of a pointer ended it, none would come.
             if not (moving and self._shielded):
@@ -234,8 +242,8 @@ class Session:
             raise
 
     def _begun(self, wanted: Wanted, token: CancelToken) -> _Gathering:
-        scene = self._fits.fitted(wanted.scene, wanted.moving, token)
-        job = prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
+        scene = self._fits.fitted(wanted.scene, wanted.moving, token, wanted.exposed_in)
+        job = self._prepared(_sharp(scene))
         pixels = sum(view.plan.region.pixels for view in job.views)
         divider = self.pacing.divider(pixels)
         seconds = 0.0
@@ -246,13 +254,16 @@ class Session:
         if wanted.moving:
             self._settle(token)
             if scene is not wanted.scene:
-                scene = self._fits.fitted(wanted.scene, False, token)
-                job = prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
+                scene = self._fits.fitted(wanted.scene, False, token, wanted.exposed_in)
+                job = self._prepared(_sharp(scene))
         while divider > 2 and self.pacing.estimate(pixels) > _HALVED_ABOVE:
             divider //= 2
             if divider > 1:
                 seconds += self._coarse(wanted, job, divider, token, seconds)
-        return _Gathering(wanted, job, seconds)
+        return _Gathering(wanted, job if scene.animation is None else self._prepared(scene), seconds)
+
+    def _prepared(self, scene: Scene) -> Job:
+        return prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
 
     def _is_shown(self, wanted: Wanted) -> bool:
         """Whether the newest frame is a whole picture of the wanted scene."""
@@ -426,6 +437,11 @@ class Session:
 
 def _internal(error: Exception) -> DeviceError:
     return DeviceError(f"internal error, please report it: {type(error).__name__}: {error}")
+
+
+def _sharp(scene: Scene) -> Scene:
+    """A scene without motion blur, whose noise would hide a coarse picture."""
+    return scene.model_copy(update={"animation": None}) if scene.animation is not None else scene
 
 
 class _Gathering:

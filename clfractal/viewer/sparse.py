@@ -8,8 +8,8 @@ from clfractal.files.fragments import same
 from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
 
-# The kinds of camera, renderer and light that a section without its word for them has.
-USUAL_KINDS = frozenset(("perspective", "surface", "directional"))
+# The kinds of camera, renderer, light and lighting that a section without its word for them has.
+USUAL_KINDS = frozenset(("perspective", "surface", "directional", "direct"))
 
 
 def without_defaults(scene: Scene) -> dict[str, Any]:

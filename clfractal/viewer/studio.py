@@ -28,6 +28,7 @@ from clfractal.viewer.live import with_live
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.picking import Pick, picked
 from clfractal.viewer.session import Session
+from clfractal.viewer.tracked import TrackedError, check_tracked
 from clfractal.viewer.viewport import image_of, render_key
 from clfractal.work.show import Look
 
@@ -35,6 +36,8 @@ Camera = PerspectiveCamera | OrthographicCamera
 MESSAGE_SECONDS = 6.0
 # How long the window waits for a device to end what it does, seconds.
 _PATIENCE = 0.25
+# Within so many seconds an equal line is the same event.
+_AGAIN = 0.1
 _PATIENCE_AT_END = 2.0
 MOST_MESSAGES = 200
 MOST_THUMBNAILS = 300
@@ -101,8 +104,13 @@ class Studio(InFilm):
         try:
             changed = edited(self.scene, values)
         except ClfractalError as error:
+            tracked = isinstance(error, TrackedError)
+            of_film = not tracked and (error.where.path or "").startswith("animation.")
+            text = str(error) if of_film else error.message
             for path in values:
-                self.problems[path] = error.message
+                self.problems[path] = text
+            if (tracked or of_film) and gesture is None:  # no panel of what is edited has a place for it
+                self.tell(text, wrong=True)
             return False
         for path in values:
             self.problems.pop(path, None)
@@ -114,8 +122,18 @@ class Studio(InFilm):
         return True
 
     def set_camera(self, camera: Camera, gesture: str | None = None) -> None:
-        """Moves the camera; it is a step of the camera's own undo."""
-        self._replace(self.scene.model_copy(update={"camera": camera}), gesture)
+        """Moves the camera; it is a step of the camera's own undo.
+
+        A camera of another kind is refused, by a message, if a track moves what it does not have.
+        """
+        changed = self.scene.model_copy(update={"camera": camera})
+        if type(camera) is not type(self.scene.camera):
+            try:
+                check_tracked(self.scene, changed)
+            except ClfractalError as error:
+                self.tell(error.message, wrong=True)
+                return
+        self._replace(changed, gesture)
 
     def set_scene(self, scene: Scene, gesture: str | None = None) -> None:
         """Another scene in the place of this one, as a step that can be undone (a variation, for example)."""
@@ -224,13 +242,14 @@ class Studio(InFilm):
         """
         moving = time.perf_counter() < self._moving_until
         live = self._live if moving else ()
-        key = (render_key(self.shown_scene), self.region, live)
+        exposed_in = self.exposed_in
+        key = (render_key(self.shown_scene), self.region, live, exposed_in)
         failed = self.session.frame is None and self.session.problem is not None and not moving
         if not again and key == self._requested and not failed:
             return
         self._requested = key
         wanted = with_live(key[0], live) if live else key[0]
-        self.session.request(wanted, moving=moving, region=self.region)
+        self.session.request(wanted, moving=moving, region=self.region, exposed_in=exposed_in)
 
     def tick(self) -> None:
         """Asks for the first picture, and renders a drag that pauses with the scene's own program; called every turn."""
@@ -297,13 +316,20 @@ class Studio(InFilm):
         scene = self.as_rendered(self.scene).model_copy(update={"image": Image(width=width, height=height)})
         if samples is not None:
             scene = edited(scene, {"renderer.samples": samples})
-        still = Still(scene, paths)
+        still = Still(scene, paths, exposed_in=self.exposed_in)
         self.stills.append(still)
         self.session.add(still)
         return still
 
     def tell(self, text: str, *, wrong: bool = False) -> None:
-        """A line for the user."""
+        """A line for the user; one that was told just now is not told twice."""
+        last = self.messages[-1] if self.messages else None
+        if (
+            last is not None
+            and last.text == " ".join(text.split())
+            and last.time > time.perf_counter() - _AGAIN
+        ):
+            return
         self.messages.append(Message(" ".join(text.split()), wrong, time.perf_counter()))
         del self.messages[:-MOST_MESSAGES]
         self.woken()

@@ -15,8 +15,8 @@ from clfractal.viewer import timeline
 from clfractal.viewer.filming import InFilm
 from clfractal.viewer.timeline import NONE, Selection
 
-_MARGIN = 0.02
-"""Part of a film that is shown before its first and after its last frame."""
+_MARGINS = 0.05, 0.02
+"""Parts of a film that are shown before its first frame, where curves have the words of their lines, and after its last."""
 _NARROWEST = 4.0
 _SAMPLES = 400
 Edit: TypeAlias = Callable[[Animation], tuple[Animation, Selection]]
@@ -58,7 +58,7 @@ class TimelineView:
     def show_all(self) -> None:
         """Shows the whole film."""
         end = max(self.count - 1, 1)
-        self.first, self.last = -_MARGIN * end, (1 + _MARGIN) * end
+        self.first, self.last = -_MARGINS[0] * end, (1 + _MARGINS[1]) * end
 
     def x_of(self, frame: float, left: float, width: float) -> float:
         """Where a frame is between two ends, points."""
@@ -109,15 +109,22 @@ class TimelineView:
 
     def change(self, studio: InFilm, edit: Callable[[Animation], Animation]) -> bool:
         """One edit of the animation, as a step; whether it was possible."""
+        return self.edit(studio, lambda animation: (edit(animation), self.selection))
+
+    def edit(self, studio: InFilm, edit: Edit) -> bool:
+        """The same of an edit that says which keys are chosen afterwards."""
         animation = studio.scene.animation
         if animation is None:
             return False
         try:
-            new = edit(animation)
+            new, selection = edit(animation)
         except ClfractalError as error:
             studio.tell(str(error), wrong=True)
             return False
-        return studio.set_animation(new)
+        if not studio.set_animation(new):
+            return False
+        self.selection = selection
+        return True
 
     def delete(self, studio: InFilm) -> None:
         """Deletes the chosen keys."""

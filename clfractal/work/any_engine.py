@@ -66,7 +66,6 @@ class AnyEngine(ABC):
     def settled(self, scene: SceneLike) -> Scene:
         """See `Engine.settled`."""
 
-    @abstractmethod
     def prepare(
         self,
         scene: SceneLike,
@@ -77,7 +76,18 @@ class AnyEngine(ABC):
         channels: Sequence[str] | None = None,
         quality: str | None = None,
     ) -> Job:
-        """The job of a scene's picture; see `Engine.prepare`."""
+        """The job of a scene's picture: see `prepare.prepare`; what it leaves to be measured is measured first.
+
+        Raises:
+            SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
+            DeviceError, KernelBuildError: the quick look that this takes failed.
+        """
+        asked = {"precision": precision, "samples": samples, "region": region, "channels": channels}
+        return self._prepared(scene, asked, quality)
+
+    @abstractmethod
+    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
+        """See `prepare`; `asked` are arguments of `prepare.prepare`."""
 
     def in_order(
         self, scenes: Iterable[Scene], wanted: Callable[[Job], bool], **settings: Any

@@ -82,8 +82,10 @@ class Engine(AnyEngine):
             return
         with self._alone():
             self.executor.close()
-            for looking in self._looking.values():
-                looking.close()
+            own = self.executor
+            for executor in [own] if isinstance(own, LocalExecutor) else own.answering:
+                if id(executor) in self._looking:
+                    self._looking[id(executor)].close()
             self._closed = True
 
     @property
@@ -124,28 +126,12 @@ class Engine(AnyEngine):
             loaded = as_scene(scene)
             return self._by_any_device(lambda: settled(loaded, self.look))
 
-    def prepare(
-        self,
-        scene: SceneLike,
-        *,
-        precision: str | None = None,
-        samples: int | None = None,
-        region: tuple[int, int, int, int] | None = None,
-        channels: Sequence[str] | None = None,
-        quality: str | None = None,
-    ) -> Job:
-        """The job of a scene's picture: see `prepare.prepare`; what it leaves to be measured is measured first.
-
-        Raises:
-            SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
-            DeviceError, KernelBuildError: the quick look that this takes failed.
-        """
+    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
         loaded = as_scene(scene)
         if quality is not None:
             from clfractal.work.quality import with_quality
 
             loaded = with_quality(loaded, quality)
-        asked = {"precision": precision, "samples": samples, "region": region, "channels": channels}
         return self._by_any_device(lambda: self._decided(loaded, asked))
 
     def _decided(self, scene: Scene, asked: Mapping[str, Any]) -> Job:

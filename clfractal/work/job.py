@@ -26,6 +26,7 @@ from clfractal.pictures.tiles import Region, TileGrid
 from clfractal.renderers.plan import PlannedView
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
+from clfractal.scene.standing import standing_alone
 from clfractal.scene.stereo import Stereo
 
 # Settings for showing a pair, which do not change either eye's picture.
@@ -171,6 +172,8 @@ class Job:
                 own = plain["layout"]["views"][view.number]
                 own["renderer"] = _decided(view.scene.renderer.model_dump(mode="json"), view)
         plain["output"]["channels"] = list(self.channels)
+        alone = standing_alone(self.scene)
+        plain["animation"] = None if alone is None else alone.model_dump(mode="json")
         return plain
 
     def header(self) -> dict[str, Any]:

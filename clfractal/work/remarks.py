@@ -21,6 +21,7 @@ from clfractal.pictures.tiles import Region
 from clfractal.renderers.plan import PlannedView
 from clfractal.scene.checks import inside_solid, used_boxes
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
@@ -136,7 +137,7 @@ def _of_view(seen: _Seen) -> list[str]:
         )
         clear = ", so alpha is 0 everywhere" if seen.scene.background == "transparent" else ""
         return [why.replace(";", f"{clear};", 1)] if why else []
-    found = [*_of_solid(seen), *_of_motion(seen)]
+    found = [*_of_solid(seen), *_of_motion(seen), *_of_lighting(seen.scene)]
     if isinstance(renderer, SurfaceRenderer) and seen.bad > BAD_SHARE * seen.steps:
         scale = renderer.step_scale if renderer.step_scale is not None else seen.scene.chain.step_scale
         found.append(
@@ -144,6 +145,29 @@ def _of_view(seen: _Seen) -> list[str]:
             f" below {scale:.3g}, such as {scale / 2:.2g}, helps"
         )
     return found
+
+
+def _of_lighting(scene: Scene) -> list[str]:
+    """Keys that the scene's way of lighting ignores, where they would have changed the picture."""
+    material = scene.material
+    if not isinstance(scene.lighting, PathLighting):
+        if material.name is None:
+            return []
+        return [f"material.name {material.name} is for lighting.mode path; Phong's keys are shown"]
+    unused = []
+    if material.name is None:
+        unused += [f"material.{key}" for key in ("ambient", "reflection") if key in material.model_fields_set]
+    else:
+        keys = ("ambient", "diffuse", "specular", "shininess", "reflection")
+        unused += [f"material.{key}" for key in keys if key in material.model_fields_set]
+    if isinstance(scene.renderer, SurfaceRenderer) and scene.surface.ambient_occlusion is not None:
+        unused.append("renderer.ambient_occlusion")
+    lines = [f"lighting.mode path does not use {' and '.join(unused)}"] if unused else []
+    if scene.lighting.clamp is not None:
+        lines.append(
+            "lighting.clamp takes light away where a sample is brighter: the picture is darker than it should be"
+        )
+    return lines
 
 
 def _of_motion(seen: _Seen) -> list[str]:

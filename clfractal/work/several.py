@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
-from contextlib import closing, suppress
-from dataclasses import dataclass, replace
-from functools import partial
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,37 +14,27 @@ from clfractal.device import cache
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import SPEEDS, Device, DeviceInfo, has_float64
-from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError, Stopped
+from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
 from clfractal.pictures.makers import Maker
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.lanes import best_lanes, rule_of
+from clfractal.work.hands import Hands
 from clfractal.work.job import Job, Kind
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import Result, Tally, WorkItem
 from clfractal.work.sharing import Offer, Shared
 
-# How soon an interrupt, or a token that was set, is seen.
-_POLL_SECONDS = 0.02
-# Results that wait to be stored: beyond that devices wait, so that memory stays bounded.
-_WAITING = 4
+# For so long a finished picture waits for programs that are being compiled for the next one, seconds.
+_LONGEST_BUILD = 600.0
 _NO_TILES = np.zeros(0, np.int32)
 _NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
-
-
-@dataclass(frozen=True, slots=True)
-class _Told:
-    """What a device's thread tells: a result; or that it has ended, perhaps by an error."""
-
-    device: int
-    result: Result | None = None
-    error: BaseException | None = None
 
 
 class SeveralExecutor:
     """Executes work items on several devices, each with an executor of its own. See `Executor`.
 
-    A device that fails is left out from then on, and the others do its tiles. All ranges of samples of a tile are made by
-    one device; if that is lost, another begins the tile again.
+    A device that fails, or does not answer for long, is left out from then on, and the others do its tiles. All ranges of
+    samples of a tile are made by one device; if that is lost, another begins the tile again.
 
     Args:
         executors: of each device.
@@ -61,6 +48,8 @@ class SeveralExecutor:
         self.tell = tell
         self.failures: dict[int, DeviceError | KernelBuildError] = {}
         """Why devices are left out, by their places in `executors`."""
+        # Never touched again, not even to free their memory: that may wait for the device, too.
+        self._hung: set[int] = set()
         self._told: set[str] = set()
         self._gave_up = False
         self._speeds = [1.0] * len(self.executors)
@@ -85,6 +74,11 @@ class SeveralExecutor:
     def working(self) -> list[LocalExecutor]:
         """Executors of the devices that are not left out."""
         return [each for number, each in enumerate(self.executors) if number not in self.failures]
+
+    @property
+    def answering(self) -> list[LocalExecutor]:
+        """Executors whose memory can be freed: those of devices that do not hang."""
+        return [each for each in self.executors if id(each) not in self._hung]
 
     def leave_out(self, device: Device, error: DeviceError | KernelBuildError) -> str:
         """Uses a device no more, and gives the line that tells so.
@@ -118,24 +112,17 @@ class SeveralExecutor:
         numbers = list(jobs)
         all_items = list(items)
         shared = Shared(self._offers(job, all_items, numbers), self._known_speeds(numbers))
-        inbox: queue.Queue[_Told] = queue.Queue(_WAITING * len(numbers))
-        own_token, tiles = CancelToken(), shared.count
-        threads = [
-            threading.Thread(
-                target=_Hand(self.executors[number], jobs[number], shared, place, inbox, own_token),
-                name=f"clfractal-{self.executors[number].device.info.index}",
-                daemon=True,
-            )
-            for place, number in enumerate(numbers)
-        ]
+        hands = Hands([self.executors[number] for number in numbers], list(jobs.values()), shared)
+        tiles = shared.count
         try:
-            for thread in threads:
-                thread.start()
-            yield from self._results(job, numbers, shared, inbox, tiles, token)
+            hands.start()
+            yield from self._results(job, numbers, hands, tiles, token)
         finally:
-            own_token.cancel()
-            shared.stop()
-            _empty(inbox, threads)
+            for place, seconds in hands.end():
+                executor = self.executors[numbers[place]]
+                self._hung.add(id(executor))
+                with suppress(DeviceError):  # if it was the last one, the next job will tell
+                    self.leave_out(executor.device, _silent(executor.device, seconds))
         for number, speed in zip(numbers, shared.speeds(), strict=True):
             self._speeds[number] = speed
         self._measured = True
@@ -180,67 +167,67 @@ class SeveralExecutor:
     def forget(self) -> None:
         """Frees the data kept between the passes of a picture."""
         self._owners.clear()
-        for executor in self.executors:
+        for executor in self.answering:
             executor.forget()
 
     def close(self) -> None:
         """Frees all memory; the executor can be used again."""
         self._owners.clear()
-        for executor in self.executors:
+        for executor in self.answering:
             executor.close()
 
     def _results(
-        self,
-        job: Job,
-        numbers: Sequence[int],
-        shared: Shared,
-        inbox: queue.Queue[_Told],
-        missing: int,
-        token: CancelToken | None,
+        self, job: Job, numbers: Sequence[int], hands: Hands, missing: int, token: CancelToken | None
     ) -> Generator[Result]:
         """What the devices tell, until all of so many missing tiles are there."""
-        running = set(range(len(numbers)))
+        shared = hands.shared
         built = [0.0] * len(numbers)
-        while running:
-            if not missing and not self._waits_for(shared, running):
+        # A result of a device that was lost meanwhile may still be on its way.
+        while hands.running or (missing and shared.finished):
+            if not missing and not self._waits_for(hands):
                 return
             if token is not None:
                 token.check()
-            try:
-                told = inbox.get(timeout=_POLL_SECONDS)
-            except queue.Empty:
+            told = hands.next()
+            for place, seconds in hands.silent():
+                hands.abandon(place)
+                executor = self.executors[numbers[place]]
+                self._hung.add(id(executor))
+                yield _remark(self.leave_out(executor.device, _silent(executor.device, seconds)))
+            if told is None:
                 continue
-            executor = self.executors[numbers[told.device]]
+            executor = self.executors[numbers[told.place]]
             if told.result is not None:
                 # Devices build side by side.
                 before = max(built)
-                built[told.device] += told.result.tally.build_ms
+                built[told.place] += told.result.tally.build_ms
                 tally = replace(told.result.tally, build_ms=max(built) - before)
-                self._own(told.result, numbers[told.device])
+                self._own(told.result, numbers[told.place])
                 missing -= len(told.result.tiles)
                 yield replace(told.result, tally=tally, maker=maker_of(executor.device.info))
                 continue
-            running.discard(told.device)
+            if told.place not in hands.running:  # it hung, and its end is no news
+                continue
+            hands.running.discard(told.place)
             if told.error is None:
                 continue
-            error = told.error
-            if not isinstance(error, (DeviceError, KernelBuildError)) or _is_of_text(error):
-                raise error
-            remark = self.leave_out(executor.device, error)
-            yield Result(0, _NO_TILES, _NO_FILM, Tally(), remark=remark)
+            failed = told.error
+            if not isinstance(failed, (DeviceError, KernelBuildError)) or _is_of_text(failed):
+                raise failed
+            yield _remark(self.leave_out(executor.device, failed))
         if not shared.finished:  # the devices that are left have no part in this job
             raise self._nothing_left()
 
-    def _waits_for(self, shared: Shared, running: Iterable[int]) -> bool:
+    def _waits_for(self, hands: Hands) -> bool:
         """Whether programs that are still being built are waited for, when all is done without them.
 
         Once they are given up, so that a picture is there as soon as it can be. A second picture tells that there will be
-        more, and that their devices are worth waiting for.
+        more, and that their devices are worth waiting for; but not for ever.
         """
-        if not any(shared.prepares(device) for device in running):
+        if not any(hands.shared.prepares(place) for place in hands.running):
             return False
         waits, self._gave_up = self._gave_up, True
-        return waits
+        return waits and hands.idle < _LONGEST_BUILD
 
     def _offers(self, job: Job, items: Sequence[WorkItem], numbers: Sequence[int]) -> list[Offer]:
         """What is to be done, and which tiles belong to a device."""
@@ -304,62 +291,17 @@ class SeveralExecutor:
         )
 
 
-class _Hand:
-    """What a device's thread does: tiles as long as there are any for it."""
+def _silent(device: Device, seconds: float) -> DeviceError:
+    return DeviceError(f"{device.info.name}: the device has not answered for {seconds:.0f} s")
 
-    def __init__(
-        self,
-        executor: LocalExecutor,
-        job: Job,
-        shared: Shared,
-        place: int,
-        inbox: queue.Queue[_Told],
-        token: CancelToken,
-    ) -> None:
-        self.executor, self.job, self.shared, self.place = executor, job, shared, place
-        self.inbox, self.token = inbox, token
 
-    def __call__(self) -> None:
-        error: BaseException | None = None
-        self.executor.supply = partial(self.shared.take, self.place)
-        try:
-            items = self.shared.items(self.place)
-            with closing(self.executor.execute(self.job, items, self.token)) as results:
-                for result in results:
-                    if len(result.tiles):
-                        self.shared.done(self.place, result.tiles)
-                    self._tell(_Told(self.place, result))
-        except Stopped:
-            pass
-        except BaseException as caught:
-            error = caught
-            self.shared.lose(self.place)
-        finally:
-            self.executor.supply = None
-        with suppress(Stopped):
-            self._tell(_Told(self.place, error=error))
-
-    def _tell(self, told: _Told) -> None:
-        while True:
-            self.token.check()
-            with suppress(queue.Full):
-                self.inbox.put(told, timeout=_POLL_SECONDS)
-                return
+def _remark(line: str) -> Result:
+    return Result(0, _NO_TILES, _NO_FILM, Tally(), remark=line)
 
 
 def _is_of_text(error: DeviceError | KernelBuildError) -> bool:
     """Whether the user's formula does not compile: it would not on any device."""
     return isinstance(error, KernelBuildError) and error.status == STATUS_BAD_INPUT
-
-
-def _empty(inbox: queue.Queue[_Told], threads: Sequence[threading.Thread]) -> None:
-    """Waits until the devices are idle."""
-    for thread in threads:
-        if thread.ident is not None:
-            thread.join()
-    with suppress(queue.Empty):
-        while True:
-            inbox.get_nowait()
 
 
 def maker_of(device: DeviceInfo) -> Maker:

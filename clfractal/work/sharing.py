@@ -27,6 +27,9 @@ _LOOK_SECONDS = 0.02
 _PART = 0.5
 # The smallest launch, as a part of the largest that its device would make now.
 _SMALLEST = 0.125
+# A device is taken for hung after so many times the seconds that its launches should take, and never earlier than this.
+_TIMES_LATE = 20.0
+_SHORTEST_PATIENCE = 30.0
 _NO_TILES = np.zeros(0, np.int32)
 
 
@@ -70,6 +73,7 @@ class _Hand:
     began: float | None = None
     last: float = 0.0
     lost: bool = False
+    signs: int = 0
 
 
 class Shared:
@@ -113,7 +117,7 @@ class Shared:
         while True:
             with self._changed:
                 while (offer := self._next(device)) is None:
-                    if self._stopped or self._all_done():
+                    if self._stopped or self._hands[device].lost or self._all_done():
                         return
                     self._changed.wait(_LOOK_SECONDS)
                 self._hands[device].offer = offer
@@ -123,9 +127,10 @@ class Shared:
         """Tiles for a device's next launch, of the item that it has got: at most so many; none if it should take none."""
         with self._changed:
             hand, now = self._hands[device], time.perf_counter()
+            hand.signs += 1
             if hand.began is None:
                 hand.began = hand.last = now
-            if self._stopped or hand.offer is None:
+            if self._stopped or hand.lost or hand.offer is None:
                 return _NO_TILES
             tiles = hand.offer.take(self._allowed(device, hand.offer, most, now))
             if len(tiles):
@@ -135,21 +140,49 @@ class Shared:
                 hand.flown += len(tiles)
             return tiles
 
-    def done(self, device: int, tiles: Tiles) -> None:
-        """Tiles of a device are done; they are in the order in which they were taken, but perhaps fewer at a time."""
+    def done(self, device: int, tiles: Tiles) -> bool:
+        """A device tells of tiles that are done, perhaps none; in the order in which they were taken, but perhaps fewer.
+
+        Returns:
+            Whether they count: those of a lost device are others' work by now.
+        """
         with self._changed:
             hand = self._hands[device]
-            offer, taken = hand.flying.popleft()
-            assert np.array_equal(taken[: len(tiles)], tiles)
-            if len(taken) > len(tiles):
-                hand.flying.appendleft((offer, taken[len(tiles) :]))
-            hand.flown -= len(tiles)
-            hand.done += len(tiles)
-            hand.last = time.perf_counter()
-            self._changed.notify_all()
+            if hand.lost:
+                return False
+            hand.signs += 1
+            if len(tiles):
+                offer, taken = hand.flying.popleft()
+                assert np.array_equal(taken[: len(tiles)], tiles)
+                if len(taken) > len(tiles):
+                    hand.flying.appendleft((offer, taken[len(tiles) :]))
+                hand.flown -= len(tiles)
+                hand.done += len(tiles)
+                hand.last = time.perf_counter()
+                self._changed.notify_all()
+            return True
+
+    def owes(self, device: int) -> bool:
+        """Whether tiles wait for a device that has begun: those that it has taken, and those that only it may take."""
+        with self._changed:
+            hand = self._hands[device]
+            own = any(offer.device == device and offer.left for offer in self._offers)
+            return hand.began is not None and not hand.lost and (bool(hand.flying) or own)
+
+    def signs(self, device: int) -> int:
+        """How often a device has taken tiles or told of its work: if that grows, it lives."""
+        with self._changed:
+            return self._hands[device].signs
+
+    def patience(self, device: int) -> float:
+        """For how many seconds a device may give no sign before it is taken for hung."""
+        with self._changed:
+            measured = any(each.done for each in self._hands)
+            expected = self._hands[device].flown / self._speeds()[device] if measured else 0.0
+            return max(_TIMES_LATE * expected, _SHORTEST_PATIENCE)
 
     def lose(self, device: int) -> None:
-        """A device has failed: the others do what it has taken, from the first sample on."""
+        """A device has failed, or hangs: the others do what it has taken, from the first sample on."""
         with self._changed:
             hand = self._hands[device]
             hand.lost = True
@@ -178,7 +211,7 @@ class Shared:
 
     def _next(self, device: int) -> Offer | None:
         """The first offer of which a device should take some tiles now."""
-        if self._stopped:
+        if self._stopped or self._hands[device].lost:
             return None
         now = time.perf_counter()
         for offer in self._offers:

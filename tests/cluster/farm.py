@@ -100,13 +100,21 @@ class Farm:
             time.sleep(0.05)
         raise AssertionError("the scheduler does not start")
 
-    def add(self, extra: Mapping[str, str] | None = None) -> str:
-        """Starts a worker of one thread, without a nanny that would replace it; gives its name."""
+    def add(self, extra: Mapping[str, str] | None = None, preload: str = "") -> str:
+        """Starts a worker of one thread, without a nanny that would replace it; gives its name.
+
+        Args:
+            extra: variables of its environment.
+            preload: Python that it runs first.
+        """
         name = f"w{self._made}"
         self._made += 1
         options = [self.address, "--name", name, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
         options += ["--local-directory", str(self.folder), "--memory-limit", "0"]
         options += self._options
+        if preload:
+            (self.folder / f"{name}.py").write_text(preload)
+            options += ["--preload", str(self.folder / f"{name}.py")]
         # Two workers share the cores of a small machine.
         shared = {"POCL_MAX_PTHREAD_COUNT": "1", **(extra or {})}
         self.workers[name] = self._start("distributed.cli.dask_worker", options, shared, name)

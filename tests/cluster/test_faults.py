@@ -124,10 +124,10 @@ def test_interrupts_end_the_work_of_the_workers(folder: Path, farm: Farm) -> Non
         assert _at_work(farm)
         start = time.monotonic()
         client.process.send_signal(signal.SIGINT)
-        status, told = client.ended(10)
-        assert time.monotonic() - start < 1.5  # half a second, and what a busy machine adds
-        assert status == 130
-        assert told.splitlines()[-1] == "out.exr: interrupted before a tile was done"
+        lines = iter(client.process.stderr or [])
+        assert any(line.endswith("out.exr: interrupted before a tile was done\n") for line in lines)
+        assert time.monotonic() - start < 0.5  # the answer; a busy system may take longer to end the process
+        assert client.ended(10)[0] == 130
     # The same workers are free at once.
     with clfractal.Cluster(farm.address) as cluster:
         start = time.monotonic()
@@ -205,6 +205,58 @@ def _other_program(where: Path) -> None:
             shutil.copytree(home / name, where / name, ignore=shutil.ignore_patterns("__pycache__", "*.exr"))
     init = where / "clfractal/__init__.py"
     init.write_text(init.read_text().replace(f'"{clfractal.__version__}"', '"9.9.9"'))
+
+
+WITHOUT_FLOAT64 = """
+from dataclasses import replace
+from clfractal.cluster import tasks
+
+def choose(wanted, *, usual=tasks.choose):
+    device = usual(wanted)
+    device.info = replace(device.info, has_float64=False, driver="without float64")
+    return device
+
+tasks.choose = choose
+"""
+
+
+def test_the_last_worker_with_float64_is_lost(folder: Path, farm: Farm) -> None:
+    """One line while another one is waited for, and one at the end, status 3; the journal is kept. Or it goes on."""
+    farm.add(preload=WITHOUT_FLOAT64)
+    order = ["render", "heavy.yaml", "--precision", "float64", "--samples", "100", "-o", "out.exr"]
+    order += ["--cluster", farm.address]
+    shorter = "from clfractal.cluster import dispatch; dispatch.RETURN_SECONDS = 3.0"
+    program = f"{shorter}; from clfractal.cli import main; main()"
+    whole = command(*order)
+    running = subprocess.Popen(
+        [whole[0], "-c", program, *whole[whole.index("render") :]],
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    journal_grows(folder)
+    for name in ("w0", "w1"):
+        farm.kill(name)
+    _, told = running.communicate(timeout=60)
+    assert running.returncode == 3
+    lines = [line for line in told.splitlines() if line.startswith(farm.address)]
+    assert lines == [
+        f"{farm.address}: no worker with float64 is left; waiting 3 s for one",
+        f"{farm.address}: there has been no worker with float64 for 3 s",
+    ]
+    assert (folder / "out.exr.partial").exists()
+    first = farm.add()
+    with Client(folder, *order, "--resume", "--stats", "s.json") as client:
+        journal_grows(folder, least=10)
+        farm.kill(first)
+        farm.add()
+        status, told = client.ended()
+    assert status == 0, told
+    assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
+    own = ["render", "heavy.yaml", "--precision", "float64", "--samples", "100", "-o", "own.exr"]
+    assert process(own, folder).status == 0
+    assert planes(folder / "out.exr") == planes(folder / "own.exr")
 
 
 def test_nobody_answers(folder: Path) -> None:

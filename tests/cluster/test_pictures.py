@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 import clfractal
+from clfractal.files.exr import read_exr
 from clfractal.scene import environment
-from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, planes
+from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, journal_grows, planes
 from tests.shell import process
 
 TILES = 8 * 6
@@ -88,6 +89,53 @@ def test_what_is_measured_first(farm: Farm) -> None:
     assert all(np.array_equal(found[name], own[name], equal_nan=True) for name in own.channels)
 
 
+# A worker whose device tells another name and driver, by which kinds are told apart. (Dask may run this twice.)
+ANOTHER_KIND = """
+from dataclasses import replace
+from types import SimpleNamespace
+from clfractal.cluster import tasks
+
+def renamed(info):
+    return replace(info, name="another", driver="another")
+
+tasks.choose = lambda wanted, usual=tasks.choose: SimpleNamespace(info=renamed(usual(wanted).info))
+tasks.maker_of = lambda info, usual=tasks.maker_of: usual(renamed(info))
+"""
+
+
+def test_makers_are_those_that_made_the_tiles(folder: Path) -> None:
+    """Of workers of two kinds; in the header, the journal of what was left by a kill, and the statistics."""
+    with Farm(folder, workers=1) as farm:
+        farm.add(preload=ANOTHER_KIND)
+        order = ["render", "heavy.yaml", "--samples", "200", "-o", "out.exr", "--cluster", farm.address]
+        with Client(folder, *order, "--quiet") as client:
+            journal_grows(folder, least=8)
+            assert client.running
+        ended = process([*order, "--resume", "--stats", "stats.json"], folder)
+        film = process(["animate", "film.yaml", "-o", "f_##.exr", "--cluster", farm.address], folder)
+    assert ended.status == 0, ended
+    _, header = read_exr(folder / "out.exr")
+    stats = json.loads((folder / "stats.json").read_text())
+    names = [line.split(": ")[1] for line in header["clfractalDevices"].splitlines()]
+    assert sorted(names) == sorted({worker["device"] for worker in stats["workers"]})
+    assert len(names) == 2
+    assert "another" in names
+    runs = [run.split("*") for run in header["clfractalTileDevices"].split()]
+    counts = {
+        name: sum(int(length) for length, number in runs if int(number) == place)
+        for place, name in enumerate(names, 1)
+    }
+    assert sum(counts.values()) == TILES
+    assert all(f"{name}: {count} tile" in header["clfractalDevices"] for name, count in counts.items())
+    # What was resumed is in the header, and not in the statistics of the second run.
+    made = {worker["device"]: worker["tiles"] for worker in stats["workers"]}
+    assert all(0 < made[name] <= counts[name] for name in names)
+    assert sum(made.values()) == TILES - stats["tiles_resumed"] < TILES
+    assert {each["device"]: each["tiles"] for each in stats["devices"]} == made
+    told = "devices of 2 kinds, which differ where last digits decide"
+    assert (ended.err.count(told), film.status, film.err.count(told)) == (1, 0, 1)
+
+
 def test_mistakes_keep_their_places(farm: Farm) -> None:
     with clfractal.Cluster(farm.address) as cluster:
         with pytest.raises(clfractal.SceneError, match=r"^region: must lie inside the picture"):
@@ -127,8 +175,19 @@ def test_tls(folder: Path) -> None:
         assert (ended.status, ended.err) == (0, "")
         stranger = process([*order, farm.address], folder)
         assert stranger.is_one_line(2, f"--cluster: {farm.address} needs certificates")
-        other = process([*order, farm.address], folder, {**known, f"{PREFIX}CA_FILE": "nowhere.pem"})
-        assert other.is_one_line(2, "nowhere.pem: is not there")
+        for name, option in (
+            ("CA_FILE", "ca-file"),
+            ("CLIENT__CERT", "client.cert"),
+            ("CLIENT__KEY", "client.key"),
+        ):
+            other = process([*order, farm.address], folder, {**known, f"{PREFIX}{name}": "nowhere.pem"})
+            assert other.is_one_line(2, f"nowhere.pem: is not there; it is distributed.comm.tls.{option}")
+        swapped = process([*order, farm.address], folder, {**known, f"{PREFIX}CLIENT__KEY": "ca.key"})
+        assert swapped.is_one_line(2, "farm.pem: does not go with its key")
+        scene = process([*order, farm.address], folder, {**known, f"{PREFIX}CA_FILE": "heavy.yaml"})
+        assert scene.is_one_line(2, "heavy.yaml: holds no certificate of an authority")
+        lone = {name: file for name, file in known.items() if not name.endswith("KEY")}
+        assert process([*order, farm.address], folder, lone).is_one_line(2, "farm.pem: has no key")
         unsafe = process([*order, farm.address.replace("tls", "tcp")], folder)
         assert unsafe.is_one_line(3, "does not answer within 10 s")
     assert process([*order[:8], "own.exr"], folder).status == 0

@@ -40,6 +40,11 @@ _OFTEN: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "motion": {"": {}, "motion": {"animation": {"frames": 2, "shutter": 0.5, "frame": 0}}},
 }
 # What a scene says for each value of a feature: sections that are put together.
+_SHAPES = [
+    {"type": "sphere", "position": [9, 0, 9], "radius": 1},
+    {"type": "rectangle", "position": [-9, 0, 9], "direction": [1, 0, -1], "width": 2, "height": 1},
+    {"type": "spot", "position": [0, -9, 9], "direction": [0, 1, -1]},
+]
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
@@ -60,14 +65,20 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
+    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}},
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
     "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
     "light": {
         "": {},
         "soft": {"lights": [{"type": "directional", "direction": [1, 1, -1], "angular_size": 5}]},
+        "shapes": {"lights": _SHAPES},
     },
-    "fog": {"": {}, "fog": {"fog": {"density": 0.05}}},
+    "fog": {
+        "": {},
+        "fog": {"fog": {"density": 0.05}},
+        "shafts": {"fog": {"density": 0.05, "height": 2, "scattering": {}}},
+    },
     **_OFTEN,
 }
 _STOPS = [{"at": 0.05, "opacity": 0}, {"at": 1, "opacity": 0.6}]
@@ -92,7 +103,13 @@ _CUT_PLANE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "noise": _OFTEN["noise"],
     "motion": _OFTEN["motion"],
 }
-_APART = {frozenset({("coloring", "residual"), ("points", "")})}  # a plane needs points
+_APART = {
+    frozenset({("coloring", "residual"), ("points", "")}),  # a plane needs points
+    # Each sample of a path finds a spot of its own.
+    *(frozenset({("lighting", "path"), ("points", name)}) for name in _SURFACE["points"] if name),
+    frozenset({("lighting", "path"), ("coloring", "residual")}),
+    frozenset({("lighting", "path"), ("planes", "planes")}),
+}
 _FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
 
 

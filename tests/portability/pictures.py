@@ -45,6 +45,7 @@ _SCENES: dict[str, str] = {
     "quaternion": "{name: quaternion_julia, iterations: 12}",
     "kaleidoscope": "{name: kaleidoscopic_ifs, iterations: 10}",
     "still": "{name: hast, iterations: 8}",
+    "paths": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "steps": "{name: mandelbulb, iterations: 5}",
     "cloud": "{name: mandelbulb, iterations: 5}",
     "plane": "{name: hast, iterations: 60}",
@@ -52,6 +53,7 @@ _SCENES: dict[str, str] = {
     "coverage": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
 }
 _RENDERERS = {
+    "paths": "{samples: 3, filter: tent}",
     "still": "{samples: 2, points: {}, normal: least_squares, ambient_occlusion: {rays: 2}, bounces: 1,"
     " filter: tent}",
     "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
@@ -63,14 +65,18 @@ _RENDERERS = {
     "plane": "{type: cut_plane, plane: {normal: [0.2, 0.3, 1], width: 3, height: 3}, samples: 2}",
 }
 _MORE = {
-    "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\nfog: {density: 0.05}\n",
+    "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\n"
+    "fog: {density: 0.05, height: 3, scattering: {anisotropy: 0.3}}\n",
     "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n",
+    "paths": "lighting: {mode: path, bounces: 3, roulette: 1}\nenvironment: {name: studio}\n"
+    "materials: {clay: {base: {color: [0.8, 0.5, 0.3], diffuse_roughness: 0.5, metalness: 0.2}, coat: {weight: 0.3},"
+    " fuzz: {weight: 0.2}, emission: {luminance: 0.05}}}\nmaterial: {name: clay}\n",
     "quaternion": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]\n",
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
 _LENSES = {"still": ", f_number: 0.5"}
 # Each adds something that the others do not have; the rest are more formulas.
-_BRIEF = ("trigonometric", "mandelbox", "still", "steps", "cloud", "inside", "coverage", "plane")
+_BRIEF = ("trigonometric", "mandelbox", "still", "paths", "steps", "cloud", "inside", "coverage", "plane")
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)

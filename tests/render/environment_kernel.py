@@ -16,6 +16,7 @@ from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers import records
 from clfractal.renderers.environment import PackedEnvironment, material_fields
+from clfractal.renderers.records import LIGHT_DEFINES
 from clfractal.scene.lighting import Environment
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -60,7 +61,7 @@ __kernel void environment(__global const scalar *in, __global scalar *out, __glo
 }
 """
 
-_DEFINES = {"LIGHT_DIRECTIONAL": 0, "PALETTE_SIZE": 256, "COLORING_NORMAL": 1, "COLORING_ITERATIONS": 2}
+_DEFINES = {**LIGHT_DEFINES, "PALETTE_SIZE": 256, "COLORING_NORMAL": 1, "COLORING_ITERATIONS": 2}
 
 
 def settings_of(**values: Any) -> Environment:

@@ -100,7 +100,7 @@ class Answers:
 def turned(local: Floats) -> Floats:
     """Directions given around z, shape (n, 3), around the surface's normal."""
     side = np.array([1.0, 0.0, 0.0])
-    return local @ np.stack([side, np.cross(NORMAL, side), NORMAL])
+    return np.asarray(local @ np.stack([side, np.cross(NORMAL, side), NORMAL]))
 
 
 def ask(

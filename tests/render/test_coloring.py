@@ -17,6 +17,7 @@ from clfractal.formulas import reference
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.lanes import best_lanes
+from clfractal.renderers.records import LIGHT_DEFINES
 from clfractal.renderers.surface import TRAPS, coloring_defines
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of
@@ -101,7 +102,7 @@ def compiled(text: str, precision: Precision, lanes: int) -> Any:
 
 def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> Any:
     """A kernel behind the scene's formula and the headers. What changes only numbers builds nothing anew."""
-    defines = {**coloring_defines(scene.coloring), "PALETTE_SIZE": 256, "LIGHT_DIRECTIONAL": 0}
+    defines = {**coloring_defines(scene.coloring), "PALETTE_SIZE": 256, **LIGHT_DEFINES}
     head = "".join(f"#define {name} {value}\n" for name, value in defines.items())
     headers = "".join(kernel_file(name) for name in ("orbit.h", "coloring.h", "shade.h"))
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)

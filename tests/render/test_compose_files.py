@@ -89,9 +89,12 @@ def test_both_views_in_one_file(tmp_path: Path) -> None:
             "scene": "version: 1\n",
             "worldToCamera": np.eye(4) + number,
             "worldToNDC": np.eye(4) - number,
+            "devices": f"1: 0:{number} device: 4 tiles",
+            "tileDevices": f"4*{number + 1}",
+            "seconds": 0.5 + number,
         }
         stores.append(filled(Film(CHANNELS, (70, 60), Region(20, 10, 50, 40), header), shifted(of)))
-    save_views(stores[0], stores[1], tmp_path / "a.exr", header={"seconds": 2.0})
+    save_views(stores[0], stores[1], tmp_path / "a.exr")
     found, told = read_exr(tmp_path / "a.exr")
     expected = "R G B A Z N.left.X right.R right.G right.B right.A right.Z N.right.X"
     assert sorted(found) == sorted(expected.split())
@@ -109,6 +112,10 @@ def test_both_views_in_one_file(tmp_path: Path) -> None:
         for view in views:
             assert np.array_equal(told[view + "worldToCamera"], np.eye(4) + number)
             assert np.array_equal(told[view + "worldToNDC"], np.eye(4) - number)
+    for number, view in enumerate(("left.", "right.")):
+        assert told[view + "clfractalDevices"] == f"1: 0:{number} device: 4 tiles"
+        assert told[view + "clfractalTileDevices"] == f"4*{number + 1}"
+    assert not {"clfractalDevices", "clfractalTileDevices"} & set(told)  # they would speak of one view
     assert read_scene_text(tmp_path / "a.exr") == "version: 1\n"
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.pictures.film import Film
+from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,
@@ -214,7 +215,8 @@ def eq5(scene: Scene, points: Floats, normals: Floats, directions: Floats, *, li
     total = np.zeros(points.shape)
     for light in scene.lights:
         strength = np.full(points.shape[:-1], light.intensity)
-        if light.type == "point":
+        if not isinstance(light, DirectionalLight):
+            assert isinstance(light, PointLight)
             offset = np.array(light.position) - points
             distance = np.linalg.norm(offset, axis=-1)
             toward = offset / distance[..., None]

@@ -191,11 +191,12 @@ def look_up(pixels: Floats, direction: Floats, rotation: float) -> Floats:
 
 
 @pytest.mark.parametrize("rotation", [0.0, 70.0])
+@pytest.mark.parametrize("count", [0, 1])
 def test_what_is_mirrored_and_seen_is_the_environment(
-    device: Device, tmp_path: Path, rotation: float
+    device: Device, tmp_path: Path, rotation: float, count: int
 ) -> None:
     """The whole picture: past the ball the map itself, on the ball the map in the mirrored direction, right side up."""
-    environment = {"name": "dusk", "rotation": rotation, "rays": 1}
+    environment = {"name": "dusk", "rotation": rotation, "rays": count}
     scene = environment_scene(tmp_path, environment, 1.0, bounces=1, detail=0.05)
     film = shoot(scene, device)
     direction = rays(scene)[1]

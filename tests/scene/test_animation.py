@@ -296,7 +296,7 @@ REFUSED = {
     "renderer.type: {expression: '1'}": "cannot move: it is a word, 'surface'",
     "lights.0.shadow: {expression: '1'}": "cannot move: it is true or false",
     "lights.2.intensity: {expression: '1'}": "cannot move: lights has entries 0 to 0",
-    "fog.density: {expression: '1'}": "cannot move: fog is null; give it a value first",
+    "fog.density: {expression: '1'}": "cannot move: fog is null; give it a value, or leave this track out",
     "camera.fov.x: {expression: '1'}": "cannot move: camera.fov is a single value, so it has no key 'x'",
     "formula.parameters.powr: {expression: '1'}": "unknown parameter 'powr'; did you mean 'power'?",
     "camera.fov: {}": "needs one of keys, expression and file",

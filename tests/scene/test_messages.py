@@ -190,6 +190,23 @@ CASES = [
         "renderer.ambient_occlusion.distance: must be above 0, got 0",
     ),
     ("lights: [{angular_size: §180}]", "lights.0.angular_size: must be at most 170, got 180"),
+    ("lights: [{type: sphere, position: [0, 0, 3], radius: §0}]", "lights.0.radius: must be above 0, got 0"),
+    (
+        "lights: [{type: rectangle, position: [0, 0, 3], direction: §[0, 0, 0]}]",
+        "lights.0.direction: must not be zero",
+    ),
+    (
+        "lights: [{type: rectangle, position: [0, 0, 3], direction: [0, 0, 1], up: §[0, 0, 2]}]",
+        "lights.0.up: must not be along direction",
+    ),
+    ("lights: [{temperature: §900}]", "lights.0.temperature: must be at least 1000, got 900"),
+    (
+        "lights: [{type: spot, position: [0, 0, 3], angle: §200}]",
+        "lights.0.angle: must be at most 180, got 200",
+    ),
+    ("lights: [{type: §sfere}]", "lights.0.type: unknown type 'sfere'; did you mean 'sphere'?"),
+    ("fog: {height: 1, up: §[0, 0, 0]}", "fog.up: must not be zero"),
+    ("fog: {scattering: {anisotropy: §1}}", "fog.scattering.anisotropy: must be at most 0.95, got 1"),
     ("lights: [{rays: §0}]", "lights.0.rays: must be at least 1, got 0"),
     (
         "lights: [{}, {type: point, position: §[0, 0.1, 0]}]",

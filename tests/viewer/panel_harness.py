@@ -68,7 +68,9 @@ class _Session:
     def add(self, task: Any) -> None:
         pass
 
-    def request(self, scene: Scene, *, moving: bool, region: Any = None) -> None:
+    def request(
+        self, scene: Scene, *, moving: bool, region: Any = None, exposed_in: Scene | None = None
+    ) -> None:
         self.requests.append((scene, moving))
 
 

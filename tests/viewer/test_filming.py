@@ -11,10 +11,16 @@ from hypothesis import strategies as st
 
 import clfractal
 from clfractal.scene.load import load_scene
+from clfractal.scene.parts import OrthographicCamera
 from clfractal.viewer import film_place, timeline
+from clfractal.viewer.controls import Controls
+from clfractal.viewer.motion import Motion
 from clfractal.viewer.navigation import dolly
 from clfractal.viewer.saving import save_scene
+from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
+from clfractal.viewer.settings import Settings
 from clfractal.viewer.sources import open_source
+from clfractal.viewer.standard_views import to_orthographic
 from clfractal.viewer.studio import Studio
 from tests.viewer.films import MOVING
 from tests.viewer.panel_harness import make_ui
@@ -45,6 +51,49 @@ def test_a_frame_is_the_films(frame: int) -> None:
     shown, wanted = studio.shown_scene, clfractal.at_frame(load_scene(MOVING), frame)
     assert shown.model_copy(update={"image": wanted.image}) == wanted
     assert studio.value("camera.fov") == pytest.approx(30 * 2 ** min(frame / 10, 1))
+
+
+def test_a_frame_has_the_films_motion_blur_until_something_has_no_key() -> None:
+    blurred = MOVING.replace("frames: 41", "frames: 41\n  shutter: 180 deg")
+    studio = studio_of(blurred, 20)
+    shown, wanted = studio.shown_scene, clfractal.at_frame(load_scene(blurred), 20)
+    assert shown.model_copy(update={"image": wanted.image}) == wanted
+    assert shown.animation is not None
+    assert (shown.animation.frame, shown.animation.shutter) == (20, 0.5)
+    assert studio.edit({"material.ambient": 0.5})
+    assert studio.shown_scene.animation == shown.animation, "what no track moves goes along"
+    assert studio.edit({"camera.fov": 33})
+    assert studio.shown_scene.animation is None, "how it moves is not known yet"
+    assert studio.set_keys() is not None
+    assert studio.shown_scene.animation is not None
+
+
+def test_the_scene_as_it_stands_has_no_motion_blur() -> None:
+    still = MOVING.replace("frames: 41", "frames: 41\n  shutter: 0.5\n  frame: 20")
+    scene = load_scene(still, posed=False)
+    studio = make_ui(scene)[0].studio
+    assert studio.frame_number is None
+    found = studio.shown_scene.animation
+    assert found is None or found.frame is None
+    assert studio.document == scene
+
+
+def test_an_exposure_is_measured_in_the_films_first_frame() -> None:
+    auto = MOVING + "output: {exposure: auto}\n"
+    studio = studio_of(auto, 20)
+    first = studio.exposed_in
+    assert first == clfractal.at_frame(load_scene(auto), 0)
+    studio.go_to_frame(30)
+    assert studio.exposed_in is first, "it is not measured anew"
+    studio.edit({"material.ambient": 0.5})
+    changed = studio.exposed_in
+    assert changed is not None
+    assert changed.material.ambient == 0.5
+    assert changed.camera == first.camera
+    studio.edit({"output.exposure": 1.0})
+    assert studio.exposed_in is None
+    studio.go_to_frame(None)
+    assert studio.exposed_in is None
 
 
 def test_looking_at_frames_changes_nothing() -> None:
@@ -190,6 +239,91 @@ def test_what_has_no_key_stays_behind() -> None:
     studio.go_to_frame(6)
     studio.go_to_frame(5)
     assert studio.value("camera.fov") == pytest.approx(30 * 2**0.5)
+
+
+# What tracks move stays
+
+LIT = MOVING.replace(
+    "    camera.fov:",
+    """    stereo.screen_distance: {keys: [{frame: 0, value: 0.5}, {frame: 40, value: 0.9}]}
+    lights.1.intensity: {keys: [{frame: 0, value: 2}]}
+    camera.fov:""",
+).replace(
+    "renderer:",
+    """stereo: {mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}
+lights: [{direction: [0, 1, -1]}, {direction: [1, 1, -1], intensity: 3}, {direction: [1, 0, -1]}]
+renderer:""",
+)
+FIRST, SECOND, THIRD = (each.model_dump(mode="json") for each in load_scene(LIT).lights)
+TAKEN_AWAY: dict[str, tuple[dict[str, Any], str]] = {
+    "stereo is switched off": ({"stereo": None}, "stereo.screen_distance"),
+    "the light is removed": ({"lights": [FIRST]}, "lights.1.intensity"),
+    "a light before it is removed": ({"lights": [SECOND, THIRD]}, "lights.1.intensity"),
+    "lights are reordered": ({"lights": [SECOND, FIRST, THIRD]}, "lights.1.intensity"),
+    "a light is put before it": ({"lights": [THIRD, FIRST, SECOND, THIRD]}, "lights.1.intensity"),
+}
+
+
+@pytest.mark.parametrize("frame", [None, 0, 20])
+@pytest.mark.parametrize("case", TAKEN_AWAY)
+def test_what_a_track_moves_is_not_taken_away(case: str, frame: float | None) -> None:
+    studio = studio_of(LIT, frame)
+    values, name = TAKEN_AWAY[case]
+    if "lights" in values:  # as they are at this frame
+        now = {1: studio.value("lights.1")}
+        values = {"lights": [now[1] if each is SECOND else each for each in values["lights"]]}
+    before, document = studio.scene, studio.document
+    assert not studio.edit(values)
+    assert studio.scene is before
+    assert studio.document == document
+    assert [message.text for message in studio.messages] == [
+        f"a track of the film moves {name}"
+        + (", which would be another one's" if len(values.get("lights") or [1]) > 1 else "")
+        + ": remove that track in the timeline first"
+    ]
+    # Without the track it goes, and comes back with undo.
+    assert document.animation is not None
+    assert studio.set_animation(timeline.without_track(document.animation, name))
+    assert studio.edit(values)
+    assert studio.undo("scene")
+    assert studio.undo("scene")
+    assert studio.document == document
+
+
+def test_what_no_track_moves_may_go_and_be_edited() -> None:
+    studio = studio_of(LIT, 20)
+    lights = studio.value("lights")
+    assert studio.edit({"lights": lights[:2]})
+    assert studio.edit({"lights.1.color": [1, 0.5, 0.2]})
+    assert studio.edit({"lights": [*studio.value("lights"), lights[0]]})
+    assert studio.edit({"stereo.mode": "split"})
+    assert studio.messages == []
+
+
+def test_a_camera_of_another_kind_is_refused_where_its_field_of_view_moves() -> None:
+    studio = studio_of(frame=10)
+    before = studio.scene
+    studio.set_camera(to_orthographic(before.camera, before.bounds))
+    assert studio.scene is before
+    assert "a track of the film moves camera.fov" in studio.messages[-1].text
+    assert before.animation is not None
+    studio.set_animation(timeline.without_track(before.animation, "camera.fov"))
+    studio.set_camera(to_orthographic(studio.scene.camera, before.bounds))
+    assert isinstance(studio.scene.camera, OrthographicCamera)
+
+
+def test_the_ways_of_stereo_go_round_past_off() -> None:
+    studio = studio_of(LIT, 0)
+    motion = Motion(studio)
+    controls = Controls(studio, Settings(), motion)
+    deeds = SceneDeeds(studio, controls, motion, Settings(), lambda: None, lambda: 0.0)
+    modes = set()
+    for _ in STEREO_MODES:
+        deeds.stereo_mode(1)
+        assert studio.scene.stereo is not None
+        modes.add(studio.scene.stereo.mode)
+    assert len(modes) >= len(STEREO_MODES) - 3
+    assert sum("moves stereo.screen_distance" in message.text for message in studio.messages) == 1
 
 
 # Undo of the film

@@ -11,10 +11,12 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
+from clfractal.viewer.frame import Frame
 from clfractal.viewer.live import with_live
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.studio import Studio
 from clfractal.work.canvas import CHANNELS
+from tests.pictures import read_picture
 from tests.viewer.sessions import BALL, BULB, STEREO, equal_pictures, films_of, scene_of, wait_for
 
 VIEW = (96, 64)
@@ -261,3 +263,78 @@ def test_stereo_that_is_fitted(studio: Studio) -> None:
     studio.set_camera(studio.scene.camera.model_copy(update={"position": (0.4, -2.8, 0.5)}), "orbit")
     studio.end_gesture()
     converged(studio)
+
+
+# Films
+
+FILM = """
+version: 1
+formula: {name: mandelbulb, iterations: 6}
+image: {width: 96, height: 64}
+camera: {position: [0, -2.6, 0.5], fov: 40}
+renderer: {samples: 4}
+output: {exposure: auto}
+animation:
+  fps: 20
+  frames: 21
+  shutter: 0.8
+  tracks:
+    camera.position: {keys: [{frame: 0, value: [0, -2.6, 0.5]}, {frame: 20, value: [2, -1.8, 0.5]}]}
+    MORE
+"""
+OTHERS = {
+    "the camera moves": "camera.fov: {keys: [{frame: 0, value: 40}, {frame: 20, value: 50}]}",
+    "light and form move": "formula.parameters.power: {expression: 8 + 2*u}\n"
+    "    lights.0.intensity: {keys: [{frame: 0, value: 0.2}, {frame: 20, value: 3}]}",
+}
+
+
+@pytest.mark.parametrize("case", OTHERS)
+def test_a_frame_at_rest_has_the_films_blur_and_exposure(case: str, device: Device, tmp_path: Path) -> None:
+    scene = scene_of(FILM.replace("MORE", OTHERS[case]))
+    rough = Pacing()
+    rough.learn(VIEW[0] * VIEW[1], 2000.0, 2.0)  # so that coarse pictures come first
+    studio = Studio(scene, device, rough, lambda: None)
+    shown: list[Frame] = []
+    studio.session.woken = lambda: shown.extend([studio.frame] if studio.frame is not None else [])
+    try:
+        studio.resize(*VIEW)
+        assert studio.go_to_frame(12, moving=True)
+        wait_for(lambda: studio.frame is not None)
+        studio.end_gesture()
+        rest(studio)
+        assert studio.session.problem is None, studio.session.problem
+        frame = studio.frame
+        assert frame is not None
+        ((_, film),) = clfractal.frames(scene, numbers=[12], channels=CHANNELS)
+        equal_pictures(films_of(frame).picture(), film)
+        assert studio.exposure == film.header["exposure"]
+        assert frame.job.views[0].shutter is not None
+        coarse = [each for each in shown if each.divider > 1]
+        assert coarse
+        assert all(view.shutter is None for each in coarse for view in each.views), "noise would hide them"
+        # A still that is written beside it is the film's, too.
+        still = studio.render_still((tmp_path / "still.png",), VIEW)
+        wait_for(lambda: still.finished)
+        film.save(tmp_path / "film.png")
+        assert (read_picture(tmp_path / "still.png") == read_picture(tmp_path / "film.png")).all()
+    finally:
+        studio.close()
+
+
+def test_a_film_that_plays_keeps_its_exposure(device: Device) -> None:
+    scene = scene_of(FILM.replace("MORE", OTHERS["light and form move"]))
+    studio = Studio(scene, device, Pacing(), lambda: None)
+    try:
+        studio.resize(*VIEW)
+        found = []
+        for frame in (20, 0, 10):
+            studio.go_to_frame(frame)
+            rest(studio)
+            found.append(studio.exposure)
+        assert found == [found[0]] * 3
+        studio.go_to_frame(None)
+        rest(studio)
+        assert studio.exposure != found[0], "the scene as it stands has its own light"
+    finally:
+        studio.close()

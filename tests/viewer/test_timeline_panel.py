@@ -57,7 +57,7 @@ class Film:
     @property
     def width(self) -> float:
         whole = self.ui.size[0] - timeline_area.left_of(self.ui) - theme.MARGIN
-        return whole - 16 - panel._INSPECTOR - 8 - timeline_area.LEFT
+        return whole - 16 - panel._INSPECTOR - 8 - timeline_area.LEFT - timeline_area.BAR
 
     def x(self, frame: float) -> float:
         return self.view.x_of(frame, self.left, self.width)
@@ -136,7 +136,8 @@ def test_the_wheel_on_the_ruler_shows_fewer_frames() -> None:
     film.stage.frame()
     film.stage.frame()
     assert film.view.last - film.view.first < 35
-    assert film.x(20) == pytest.approx(imgui.get_mouse_pos().x, abs=0.5)
+    # (Pointers are at whole points.)
+    assert film.x(20) == pytest.approx(imgui.get_mouse_pos().x, abs=1)
 
 
 # Keys in rows
@@ -232,6 +233,46 @@ def test_a_key_of_a_curve_is_dragged_in_time_and_value() -> None:
     assert list(film.keys()) == [0, 1]
 
 
+def test_several_keys_of_a_curve_are_dragged_together() -> None:
+    film = curved("camera.fov")
+    assert film.view.change(film.ui.studio, lambda a: t.with_key(a, "camera.fov", 20.0, 45.0))
+    film.stage.frame()
+    # A box around the second and the third.
+    film.stage.drag((film.x(7), place(film, 0, 62)[1]), (film.x(22), place(film, 0, 43)[1]))
+    assert film.view.selection == {("camera.fov", 1), ("camera.fov", 2)}
+    before = film.ui.studio.document
+    film.stage.drag(place(film, 10, 60), place(film, 16, 50))
+    assert list(film.keys()) == [0, 16, 26]
+    assert film.keys()[16] == pytest.approx(50, abs=0.7)
+    assert film.keys()[26] == pytest.approx(film.keys()[16] - 15)
+    assert film.view.selection == {("camera.fov", 1), ("camera.fov", 2)}
+    # They go no farther than the first of them may: to the end of the film, and beside the key that stays.
+    film.stage.drag(place(film, 16, film.keys()[16]), place(film, 39, film.keys()[16]))
+    assert list(film.keys()) == [0, 30, 40]
+    film.stage.drag(place(film, 40, film.keys()[40]), place(film, 3, film.keys()[40]))
+    assert list(film.keys()) == [0, 1, 11]
+    for _ in range(3):
+        assert film.ui.studio.undo("scene")
+    assert film.ui.studio.document == before
+
+
+def test_shift_chooses_keys_of_a_curve_and_drags_values_alone() -> None:
+    film = curved("camera.fov")
+    film.stage.click(*place(film, 0, 30))
+    film.stage.hold(imgui.Key.mod_shift, True)
+    film.stage.click(*place(film, 10, 60))
+    assert film.view.selection == {("camera.fov", 0), ("camera.fov", 1)}
+    film.stage.drag(place(film, 10, 60), place(film, 14, 50))
+    assert list(film.keys()) == [0, 10]
+    assert film.keys()[10] == pytest.approx(50, abs=0.7)
+    assert film.keys()[0] == pytest.approx(film.keys()[10] - 30)
+    film.stage.click(*place(film, 10, film.keys()[10]))
+    assert film.view.selection == {("camera.fov", 0)}
+    film.stage.hold(imgui.Key.mod_shift, False)
+    film.stage.click(film.x(30), place(film, 0, film.keys()[0])[1])
+    assert film.view.selection == t.NONE
+
+
 def test_handles_are_dragged() -> None:
     film = curved("camera.fov")
     film.view.selection = frozenset({("camera.fov", 0)})
@@ -280,6 +321,25 @@ def test_numbers_of_a_key_are_typed() -> None:
         film.stage.type(text)
         film.stage.press(imgui.Key.enter)
     assert film.keys() == {0: 30, 15: 42}
+
+
+def test_a_key_that_is_dragged_by_its_box_passes_its_neighbour() -> None:
+    film = Film()
+    film.stage.click(film.x(0), film.y("camera.fov"))
+    x, y = film.ui.size[0] - theme.MARGIN - 60, film.ruler - 9 + 36
+    film.stage.drag((x, y), (x + 60, y), steps=20)
+    (passed,) = film.keys().keys() - {10}
+    assert passed > 10, "the drag has to be long enough"
+    assert film.keys() == {10: 60, passed: 30}
+    assert film.view.selection == {("camera.fov", 1)}
+    assert film.ui.studio.history.depth("scene") == (1, 0)
+    # The same box goes on with the key that is chosen now.
+    film.stage.drag((x, y), (x + 15, y))
+    (later,) = film.keys().keys() - {10}
+    assert later > passed
+    assert film.ui.studio.undo("scene")
+    assert film.ui.studio.undo("scene")
+    assert film.ui.studio.document == load_scene(MOVING)
 
 
 def test_the_films_settings_and_new_tracks_open(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,7 +17,7 @@ from imgui_bundle import imgui
 from clfractal.scene.animation import Animation, Track
 from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
-from clfractal.viewer.panels import color_button, metadata, timeline_inspector
+from clfractal.viewer.panels import color_button, material, metadata, timeline_inspector
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Scale, bar_part, moved_by, text_of, typed_number
 from clfractal.viewer.panels.ui import Ui
@@ -57,6 +57,7 @@ def test_every_field_of_every_section_is_understood() -> None:
         "background",
         "cut_planes",
         "bookmarks",
+        "materials",
         "inline",
         "parameters",
         "live",
@@ -355,6 +356,23 @@ def test_flags_and_choices_are_set() -> None:
     stage = stage_of("renderer.search", segmented=True)
     stage.click(BOX[0] + 50, BOX[1])
     assert stage.ui.studio.scene.surface.search == "steps"
+
+
+def test_light_bounces_at_a_click() -> None:
+    """The kind of light is a switch, also where a material by OpenPBR is shown."""
+    ui, _ = make_ui(SCENE)
+    stage = Stage(ui, material.draw)
+
+    def click(across: float) -> str:
+        stage.click(BOX[0] + across, BOX[1])
+        return str(ui.studio.scene.lighting.mode)
+
+    assert click(50) == "path"
+    ui.studio.edit({"materials.gold": {"base": {"metalness": 1}}, "material.name": "gold"})
+    stage.frame()
+    assert ui.studio.scene.material.name == "gold"
+    assert click(-50) == "direct"
+    assert click(50) == "path"
 
 
 def test_first_values_are_valid() -> None:

@@ -72,6 +72,21 @@ def test_the_picture_of_a_frame_is_the_shells(display: Display, folder: Path) ->
         window.shows(film(folder, folder / "last.yaml", (360, 240)))
 
 
+def test_a_frame_that_rests_has_motion_blur(display: Display, folder: Path) -> None:
+    # (Noise that is new in each frame is the film's, and not that of a still of the shell.)
+    text = FILM.replace("frames: 76", "frames: 76\n  shutter: 1\n  noise: fixed")
+    text = text.replace("samples: 1", "samples: 8").replace("[2.9, 0, 0.5]", "[2.9, 0, 40]")
+    (folder / "film.yaml").write_text(text)
+    with Window(display, folder, "film.yaml", "--size", "180x120", "--no-panels") as window:
+        window.still()
+        window.keys("alt+period")
+        window.shows(film(folder, "film.yaml", (180, 120), "--set", "animation.frame=1"))
+        blurred = window.pixels().copy()
+        moment = ("--set", "animation.frame=1", "--set", "animation.shutter=0")
+        sharp = film(folder, "film.yaml", (180, 120), *moment)
+        assert (blurred[:, :, :3] != sharp).mean() > 0.02
+
+
 def test_keys_that_are_set_are_saved_with_the_text(display: Display, folder: Path) -> None:
     (folder / "film.yaml").write_text(FILM)
     with Window(display, folder, "film.yaml", "--size", "360x240", "--no-panels") as window:

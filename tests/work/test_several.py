@@ -104,7 +104,27 @@ def test_one_device_tells_of_no_others(whole: Film) -> None:
     assert "devices" not in whole.stats
 
 
-def test_a_stereo_pair_and_a_layout(device: Device) -> None:
+def test_a_layout_of_every_renderer_for_two_eyes(device: Device) -> None:
+    """The bits of one device, in the first picture (a device may still compile) and when both have all programs."""
+    scene = SCENE.replace("width: 300, height: 200", "width: 240, height: 100").replace(
+        "samples: 5", "samples: 2"
+    )
+    scene = scene.replace("output: {channels: [R, G, B, A, Z, N.X, P.Y, iterations, steps]}\n", "")
+    scene += """stereo: {mode: split, separation: 0.1}
+layout:
+  views:
+  - {}
+  - renderer: {type: volume, resolution: 24}
+  - renderer: {type: cut_plane, plane: {width: 2.5, height: 2.5}, samples: 2}
+"""
+    with Engine(device) as one, Engine(halves_of(device), budget_seconds=0.01) as two:
+        alone, first, second = one.render(scene), two.render(scene), two.render(scene)
+    assert same(first, alone)
+    assert same(second, alone)
+    assert len(second.stats["devices"]) == 2
+
+
+def test_a_stereo_pair(device: Device) -> None:
     stereo = SCENE.replace("width: 300, height: 200", "width: 130, height: 100")
     stereo += "stereo: {mode: anaglyph, separation: 0.1}\n"
     with Engine(device) as one, Engine(halves_of(device), budget_seconds=0.01) as two:

@@ -133,6 +133,11 @@ def row(
     return float(whole - GUTTER - wide)
 
 
+def in_labels() -> None:
+    """The next item begins where the labels of rows do."""
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + GUTTER)
+
+
 def columns(count: int, spacing: float = 4.0) -> float:
     """Goes to a new line for several widgets side by side over the whole width; the width of each, points."""
     imgui.new_line()

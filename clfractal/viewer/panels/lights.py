@@ -6,12 +6,15 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight
+from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight, SmallLight
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
+
+# What only some kinds have.
+_OWN = ("falloff", "direction", "angle", "softness", "up", "radius", "width", "height", "visible")
 
 
 def summary(ui: Ui) -> str:
@@ -49,12 +52,12 @@ def _line(index: int, light: Any, chosen: bool) -> bool:
         back = theme.ACCENT_FAINT if chosen else theme.FRAME
         far = imgui.ImVec2(corner.x + wide, corner.y + height)
         draw.add_rect_filled(corner, far, theme.packed(back), 5.0)
-    codes, _ = shown(light.color)
+    codes, _ = shown(light.used_color)
     middle = imgui.ImVec2(corner.x + 17, corner.y + height / 2)
     draw.add_circle_filled(middle, 6.0, theme.packed((*codes, 1.0)))
     draw.add_circle(middle, 6.0, theme.packed((1, 1, 1, 0.25)))
     y = corner.y + (height - imgui.get_font_size()) / 2
-    name = "Directional" if isinstance(light, DirectionalLight) else "Point"
+    name = light.type.capitalize()
     draw.add_text(imgui.ImVec2(corner.x + 31, y), theme.packed(theme.TEXT), f"{name} {index + 1}")
     text = f"{light.intensity:.3g}"
     place = imgui.ImVec2(corner.x + wide - imgui.calc_text_size(text).x - 8, y)
@@ -102,24 +105,39 @@ def _free_place(ui: Ui) -> list[float]:
 
 def _light(ui: Ui, index: int) -> None:
     path, light = f"lights.{index}", ui.studio.scene.lights[index]
-    width = w.row(ui, "Type", path=f"{path}.type", tip="from infinitely far away, or from a point")
+    width = w.row(
+        ui,
+        "Type",
+        path=f"{path}.type",
+        tip="from infinitely far away, a point, a cone, a ball, or a rectangle",
+    )
     if width is not None:
-        words = {"directional": "Directional", "point": "Point"}
+        words = {
+            "directional": "Sun",
+            "point": "Point",
+            "spot": "Spot",
+            "sphere": "Ball",
+            "rectangle": "Area",
+        }
         found = w.segments(f"{path}.type", words, light.type, width)
         if found is not None:
-            common = {name: plain(getattr(light, name)) for name in ("color", "intensity", "shadow")}
-            more = {"position": _free_place(ui)} if found == "point" else {}
+            common = {
+                name: plain(getattr(light, name)) for name in ("color", "temperature", "intensity", "shadow")
+            }
+            old = getattr(light, "position", None)
+            more = {} if found == "directional" else {"position": plain(old) if old else _free_place(ui)}
             ui.studio.edit({path: {"type": found, **common, **more}})
             return
-    w.fields(ui, path, ("color", "intensity"))
+    w.fields(ui, path, ("color", "temperature", "intensity"))
     if isinstance(light, DirectionalLight):
         w.field(ui, f"{path}.direction", step=0.01)
     else:
         radius = ui.studio.scene.bounds[1]
         w.field(ui, f"{path}.position", step=0.01 * radius)
-        w.field(ui, f"{path}.falloff")
+        w.fields(ui, path, tuple(name for name in _OWN if hasattr(light, name)))
     w.field(ui, f"{path}.shadow")
     if light.shadow:
-        w.field(ui, f"{path}.angular_size", "Softness", unit="°")
-        if light.angular_size > 0:
+        if isinstance(light, SmallLight):
+            w.field(ui, f"{path}.angular_size", "Softness", unit="°")
+        if light.has_size:
             w.field(ui, f"{path}.rays", start=8, auto="8")

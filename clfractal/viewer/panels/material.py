@@ -5,19 +5,70 @@ from __future__ import annotations
 from typing import Any
 
 from clfractal.scene.environment import names
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import Environment
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas
 from clfractal.viewer.panels.ui import Ui
 
+# No name that a material may have.
+PHONG, NEW = "", " "
+
 
 def draw(ui: Ui) -> None:
-    """Draws the material."""
+    """Draws how light reaches the eye, and the material."""
+    _lighting(ui)
+    name = ui.studio.scene.material.name
+    if name is not None and ui.studio.scene.lighting.mode == "path":
+        w.section(ui, f"materials.{name}")
+        return
     if ui.studio.scene.coloring.by == "solid":
         w.field(ui, "material.color")
     elif not w.filtering(ui):
         w.hint(ui, f"The colour comes from the colouring by {w.word(ui.studio.scene.coloring.by).lower()}.")
     w.fields(ui, "material", ("ambient", "diffuse", "specular", "shininess", "reflection"))
+
+
+def _lighting(ui: Ui) -> None:
+    scene = ui.studio.scene
+    paths = isinstance(scene.lighting, PathLighting)
+    width = w.row(
+        ui,
+        "Light",
+        path="lighting",
+        tip="straight from the lights, or bouncing from surface to surface",
+        differs=paths,
+        reset=lambda: _put(ui, "lighting", {}),
+    )
+    if width is not None:
+        found = w.segments("lighting", {False: "Direct", True: "Bounces"}, paths, width)
+        if found is not None:
+            kept = ui.memory.setdefault("lighting.kept", {"mode": "path"})
+            if paths:
+                kept.update(ui.studio.value("lighting"))
+            _put(ui, "lighting", dict(kept) if found else {})
+    w.problem(ui, "lighting.mode")
+    if not paths:
+        return
+    w.fields(ui, "lighting", ("bounces", "roulette", "clamp"), clamp={"auto": "no limit"})
+    _choice(ui)
+
+
+def _choice(ui: Ui) -> None:
+    """Which of the scene's materials is shown; one more can be made."""
+    scene = ui.studio.scene
+    width = w.row(ui, "Material", path="material.name", tip=w.value_tip(ui, "material.name"))
+    if width is None:
+        return
+    words = {PHONG: "Phong's", **{name: name for name in scene.materials}, NEW: "New material"}
+    found = w.choose("material.name", words, scene.material.name or PHONG, width)
+    if found == NEW:
+        made = next(name for name in (f"material {n}" for n in range(1, 1000)) if name not in scene.materials)
+        color = None if scene.coloring.by != "solid" else list(scene.material.color)
+        ui.studio.edit({f"materials.{made}": {"base": {"color": color}}, "material.name": made})
+    elif found is not None:
+        _put(ui, "material.name", None if found == PHONG else found)
+    w.problem(ui, "material.name")
 
 
 def summary(ui: Ui) -> str:
@@ -38,7 +89,15 @@ def draw_surroundings(ui: Ui) -> None:
     w.group(ui, "Fog")
     radius = ui.studio.scene.bounds[1]
     if _switch(ui, "fog", "Fog", {"density": float(f"{0.25 / radius:.2g}")}):
-        w.fields(ui, "fog", ("color", "density", "background"), background={"label": "On background"})
+        w.fields(
+            ui,
+            "fog",
+            ("color", "density", "height", "base", "up", "background"),
+            height={"auto": "everywhere", "start": float(f"{0.25 * radius:.2g}")},
+            background={"label": "On background"},
+        )
+        if _switch(ui, "fog.scattering", "Shafts", {}):
+            w.fields(ui, "fog.scattering", ("color", "anisotropy"))
     w.group(ui, "Environment")
     if _switch(ui, "environment", "Environment", {"name": names()[0]}):
         _map(ui)
@@ -77,7 +136,7 @@ def _background(ui: Ui) -> None:
 
 def _switch(ui: Ui, key: str, label: str, first: dict[str, Any]) -> bool:
     """The switch of a section that may be null; whether it is there. Its values come back when it is switched on again."""
-    given = getattr(ui.studio.scene, key) is not None
+    given = w.value(ui, key) is not None
     width = w.row(
         ui, label, path=key, tip=w.value_tip(ui, key), differs=given, reset=lambda: _put(ui, key, None)
     )
@@ -87,7 +146,7 @@ def _switch(ui: Ui, key: str, label: str, first: dict[str, Any]) -> bool:
             kept[key] = ui.studio.value(key)
         _put(ui, key, None if given else kept.get(key, first))
     w.problem(ui, key)
-    return getattr(ui.studio.scene, key) is not None
+    return w.value(ui, key) is not None
 
 
 def _map(ui: Ui) -> None:

@@ -59,12 +59,23 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Material.diffuse": (0, 1),
     "Material.specular": (0, 1),
     "Material.shininess": (1, 1000),
+    **{
+        f"{kind}Light.temperature": (1500, 12_000)
+        for kind in ("Directional", "Point", "Spot", "Sphere", "Rectangle")
+    },
+    **{f"{kind}Light.intensity": (0, 4) for kind in ("Spot", "Sphere", "Rectangle")},
     "DirectionalLight.intensity": (0, 4),
     "PointLight.intensity": (0, 4),
     "DirectionalLight.angular_size": (0, 45),
     "PointLight.angular_size": (0, 45),
     "DirectionalLight.rays": (1, 64),
     "PointLight.rays": (1, 64),
+    "PathLighting.bounces": (0, 16),
+    "PathLighting.roulette": (0, 16),
+    "PathLighting.clamp": (0.5, 100),
+    "Specular.ior": (1, 3),
+    "Coat.ior": (1, 3),
+    "Emission.luminance": (0, 4),
     "Environment.intensity": (0, 4),
     "Environment.rotation": (-180, 180),
     "Environment.rays": (0, 64),

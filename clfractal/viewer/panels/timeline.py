@@ -9,7 +9,7 @@ from clfractal.viewer import timeline, timeline_view
 from clfractal.viewer.panels import theme, timeline_curves, timeline_inspector, timeline_rows
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import clipped
-from clfractal.viewer.panels.timeline_area import HEIGHT, LEFT, Area, left_of
+from clfractal.viewer.panels.timeline_area import BAR, HEIGHT, LEFT, Area, left_of
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.playing import Player
 from clfractal.viewer.timeline_view import TimelineView
@@ -49,7 +49,7 @@ def draw(ui: Ui) -> None:
     inspected = width >= _ROOM
     inner = width - 16 - (_INSPECTOR + 8 if inspected else 0)
     corner = imgui.get_cursor_screen_pos()
-    area = Area(corner.x + LEFT, max(inner - LEFT, 40.0), corner.y + _RULER)
+    area = Area(corner.x + LEFT, max(inner - LEFT - BAR, 40.0), corner.y + _RULER)
     _ruler(ui, player, view, animation, area, corner.y)
     imgui.begin_child("##tracks", imgui.ImVec2(inner, 0), 0, imgui.WindowFlags_.no_nav)
     if not animation.tracks:
@@ -131,10 +131,8 @@ def _right_buttons(ui: Ui, player: Player, view: TimelineView, left: float) -> N
         imgui.open_popup("##timeline.add")
     timeline_inspector.add_popup(ui, view)
     w.in_row(6)
-    about = "Rows of keys" if view.curves else "Curves"
-    if w.icon_button(
-        theme.LIST if view.curves else theme.CURVE, about, name="timeline.curves", on=view.curves
-    ):
+    about = "Curves; off: rows of keys"
+    if w.icon_button(theme.CURVE, about, name="timeline.curves", on=view.curves):
         view.curves = not view.curves
     w.in_row(2)
     _button(ui, "delete_keys", theme.TRASH, "Delete the chosen keys", enabled=bool(view.selection))

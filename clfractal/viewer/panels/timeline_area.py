@@ -14,6 +14,8 @@ HEIGHT = 218.0
 """Points that the timeline is high."""
 LEFT = 158.0
 """Points for the names of tracks."""
+BAR = 10.0
+"""Points at the right that are left to the bar by which many tracks are scrolled."""
 _WHEEL = 0.85
 
 
@@ -68,3 +70,13 @@ def diamond(x: float, y: float, *, chosen: bool, hovered: bool = False, size: fl
     fill = theme.ACCENT if chosen else theme.TEXT if hovered else theme.DIM
     draw.add_quad_filled(*corners, theme.packed(fill))
     draw.add_quad(*corners, theme.packed(theme.PANEL_SOLID), 1.2)
+
+
+def box(view: TimelineView) -> None:
+    """Draws the box in which keys are chosen while it is dragged."""
+    if "box" not in view.held or not imgui.is_mouse_dragging(0, 2.0):
+        return
+    x, y, _ = view.held["box"]
+    mouse, draw = imgui.get_mouse_pos(), imgui.get_window_draw_list()
+    draw.add_rect_filled(imgui.ImVec2(x, y), mouse, theme.packed(theme.ACCENT_FAINT))
+    draw.add_rect(imgui.ImVec2(x, y), mouse, theme.packed(theme.ACCENT_DIM))

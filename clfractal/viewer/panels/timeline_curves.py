@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from imgui_bundle import imgui
@@ -11,7 +12,7 @@ from clfractal.scene.curves import Values
 from clfractal.viewer import timeline, timeline_view
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.timeline_area import Area, diamond
+from clfractal.viewer.panels.timeline_area import Area, box, diamond
 from clfractal.viewer.panels.timeline_inspector import way_menu
 from clfractal.viewer.panels.timeline_rows import ROW, label
 from clfractal.viewer.panels.ui import Ui
@@ -19,6 +20,10 @@ from clfractal.viewer.timeline_view import TimelineView
 
 _REACH = 8.0
 _LINES = 5
+_HINT = (
+    "Drag keys in time and value, with Shift in value alone, with Ctrl between frames; a box or Shift and clicks choose"
+    " several"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +73,7 @@ def draw(ui: Ui, view: TimelineView, animation: Animation, area: Area) -> None:
     grips = _grips(view, animation, name, area, frame)
     over = _pointer(ui, view, animation, area, frame, grips, top)
     _keys(view, grips, name, over)
+    box(view)
 
 
 def _grid(area: Area, frame: _Frame) -> None:
@@ -79,7 +85,7 @@ def _grid(area: Area, frame: _Frame) -> None:
             y = frame.y(value)
             draw.add_line(imgui.ImVec2(area.left, y), imgui.ImVec2(area.right, y), theme.packed(theme.LINE))
             text = f"{value:.4g}".replace("-", "\u2212")
-            draw.add_text(imgui.ImVec2(area.left + 4, y - 12), theme.packed(theme.FAINT), text)
+            draw.add_text(imgui.ImVec2(area.left + 4, y - 12), theme.packed(theme.DIM), text)
 
 
 def _color(component: int, count: int) -> theme.Rgba:
@@ -178,28 +184,55 @@ def _pointer(
     if near is not None and abs(near.x - mouse.x) + abs(near.y - mouse.y) > _REACH:
         near = None
     if imgui.is_item_activated():
-        view.held.clear()
-        if near is None:
-            view.selection = timeline.NONE
-        else:
-            view.selection = frozenset({(name, near.index)})
-            view.held |= {"grip": near, "bounds": (frame.low, frame.high)}
-            view.begin(ui.studio)
-    if imgui.is_item_active() and imgui.is_mouse_dragging(0, 2.0) and "grip" in view.held:
-        _drag(ui, view, area, frame)
+        _press(ui, view, near, frame)
+    if imgui.is_item_active() and imgui.is_mouse_dragging(0, 2.0):
+        if "grip" in view.held:
+            view.held.pop("leaves", None)
+            _drag(ui, view, area, frame)
+        elif "box" in view.held:
+            _choose(view, grips)
     if imgui.is_item_deactivated():
+        view.selection -= view.held.get("leaves", timeline.NONE)
         view.held.clear()
         view.end(ui.studio)
     if over and imgui.is_mouse_clicked(imgui.MouseButton_.right) and near is not None:
-        view.selection = frozenset({(name, near.index)})
+        if (name, near.index) not in view.selection:
+            view.selection = frozenset({(name, near.index)})
         imgui.open_popup("##key.menu")
     way_menu(ui, view, "##key.menu")
     if over:
         area.wheel(view)
         fixed = timeline_view.why_fixed(animation, name)
         if near is None:
-            w.tip(fixed or "Drag keys in time and value; with Shift in value alone, with Ctrl between frames")
+            w.tip(fixed or _HINT)
     return near if over else None
+
+
+def _press(ui: Ui, view: TimelineView, near: _Grip | None, frame: _Frame) -> None:
+    """A click chooses a key, with Shift one more or one less; beside keys it begins a box."""
+    more, mouse = imgui.get_io().key_shift, imgui.get_mouse_pos()
+    view.held.clear()
+    if near is None:
+        before = view.selection if more else timeline.NONE
+        view.held["box"] = (mouse.x, mouse.y, before)
+        view.selection = before
+        return
+    place = (view.track, near.index)
+    if place not in view.selection:
+        view.selection = view.selection | {place} if more else frozenset({place})
+    elif more and not near.handle:
+        view.held["leaves"] = frozenset({place})  # unless it is dragged
+    view.held |= {"grip": near, "bounds": (frame.low, frame.high)}
+    view.begin(ui.studio)
+
+
+def _choose(view: TimelineView, grips: list[_Grip]) -> None:
+    """The keys in the box, and those that were chosen before."""
+    x, y, before = view.held["box"]
+    mouse = imgui.get_mouse_pos()
+    (left, right), (top, bottom) = sorted((x, mouse.x)), sorted((y, mouse.y))
+    inside = [each for each in grips if left <= each.x <= right and top <= each.y <= bottom]
+    view.selection = before | {(view.track, each.index) for each in inside if not each.handle}
 
 
 def _drag(ui: Ui, view: TimelineView, area: Area, frame: _Frame) -> None:
@@ -209,24 +242,39 @@ def _drag(ui: Ui, view: TimelineView, area: Area, frame: _Frame) -> None:
     value = float(f"{value:.6g}")
 
     def moved(old: Animation) -> tuple[Animation, timeline.Selection]:
-        place = (name, grip.index)
+        place, chosen = (name, grip.index), view.before[1] if view.before is not None else timeline.NONE
         if grip.handle:
-            return _with_handle(old, place, grip, at, value), frozenset({place})
-        new = timeline.with_number(old, place, grip.component, value)
-        here = new.frame_of(timeline.key_of(new, place))
+            return _with_handle(old, place, grip, at, value), chosen
+        new, was = old, timeline.key_of(old, place).values[grip.component]
+        for each in chosen:
+            if each[0] == name:
+                number = timeline.key_of(old, each).values[grip.component] + value - was
+                new = timeline.with_number(new, each, grip.component, float(f"{number:.6g}"))
         if io.key_shift:
-            return new, frozenset({place})
-        # A key of a curve stays between its neighbours.
-        keys = new.tracks[name].keys or ()
-        gap = timeline.NEAR * 2 if io.key_ctrl else 1.0
-        low = new.frame_of(keys[grip.index - 1]) + gap if grip.index else 0.0
-        high = (
-            new.frame_of(keys[grip.index + 1]) - gap if grip.index + 1 < len(keys) else float(new.count - 1)
-        )
-        to = max(min(at if io.key_ctrl else round(at), max(high, here)), min(low, here))
-        return timeline.moved(new, frozenset({place}), lambda _: to)
+            return new, chosen
+        low, high = _room(new, chosen, timeline.NEAR * 2 if io.key_ctrl else 1.0)
+        wanted = (at if io.key_ctrl else round(at)) - new.frame_of(timeline.key_of(new, place))
+        step = max(min(wanted, max(high, 0.0)), min(low, 0.0))
+        return timeline.moved(new, chosen, lambda time: time + step)
 
     view.drag(ui.studio, moved)
+
+
+def _room(animation: Animation, chosen: timeline.Selection, gap: float) -> tuple[float, float]:
+    """How many frames keys may go back and on, so that each stays between its neighbours and in the film."""
+    low, high = -math.inf, math.inf
+    for name, index in chosen:
+        keys = animation.tracks[name].keys or ()
+        here = animation.frame_of(keys[index])
+        if index == 0:
+            low = max(low, -here)
+        elif (name, index - 1) not in chosen:
+            low = max(low, animation.frame_of(keys[index - 1]) + gap - here)
+        if index + 1 == len(keys):
+            high = min(high, animation.count - 1 - here)
+        elif (name, index + 1) not in chosen:
+            high = min(high, animation.frame_of(keys[index + 1]) - gap - here)
+    return low, high
 
 
 def _with_handle(old: Animation, place: timeline.KeyAt, grip: _Grip, at: float, value: float) -> Animation:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, get_args
+from typing import Any, TypeAlias, get_args
 
 from imgui_bundle import imgui
 
@@ -14,7 +14,7 @@ from clfractal.viewer.panels import metadata, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Change, Scale
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.timeline import KeyAt
+from clfractal.viewer.timeline import NONE, KeyAt, Selection
 from clfractal.viewer.timeline_view import TimelineView
 
 EDITED = {
@@ -36,6 +36,8 @@ EDITED = {
 }
 """The settings of films that the timeline edits."""
 
+KeyEdit: TypeAlias = Callable[[Animation, KeyAt, float], tuple[Animation, Selection]]
+"""Makes of an animation, a key of it and a number another animation, and the keys that are chosen in it."""
 WAYS: tuple[Interpolation, ...] = get_args(Interpolation)
 _AXES = ("x1", "y1", "x2", "y2")
 _LISTED = 14
@@ -77,7 +79,9 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
     name, index = at
     key = timeline.key_of(animation, at)
     w.group(ui, f"Key {index + 1} of {len(animation.tracks[name].keys or ())}")
-    path = f"animation.tracks.{name}.keys.{index}"
+    # A key that passes another one has another number then; its boxes stay those in which the drag began.
+    first = _dragged(view) or at
+    path = f"animation.tracks.{name}.keys.{first[1]}"
     in_seconds = key.frame is None
     width = _row(ui, "Time" if in_seconds else "Frame", path, Key, "time" if in_seconds else "frame")
     if width is not None:
@@ -85,12 +89,11 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
         given = key.time if in_seconds else key.frame
         assert given is not None
 
-        def moved(old: Animation, number: float) -> Animation:
+        def moved(old: Animation, at: KeyAt, number: float) -> tuple[Animation, Selection]:
             frame = number * old.fps if in_seconds else round(number, 3)
-            new, view.selection = timeline.moved(old, frozenset({at}), lambda _: frame)
-            return new
+            return timeline.moved(old, frozenset({at}), lambda _: frame)
 
-        _number(ui, view, f"{path}.time", given, width, scale, moved)
+        _of_key(ui, view, at, w.number_box(w.boxes(ui), f"{path}.time", given, width, scale), moved)
     wide = _row(ui, "Value", path, Key, "value")
     if wide is None:
         return
@@ -103,7 +106,7 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
         found = w.number_box(
             w.boxes(ui), f"{path}.value.{component}", number, wide, Scale(step=None), mark=mark
         )
-        _apply(ui, view, found, lambda old, new, at=at, n=component: timeline.with_number(old, at, n, new))  # type: ignore[misc]
+        _of_key(ui, view, at, found, _in_place(timeline.with_number, component))
     _ways(ui, view)
     way = key.interpolation or animation.tracks[name].interpolation
     if way == "bezier" and key.handles is not None and index + 1 < len(animation.tracks[name].keys or ()):
@@ -114,7 +117,12 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
                 w.in_row(3)
             found = w.number_box(w.boxes(ui), f"{path}.handles.{place}", number, wide, Scale(step=0.01))
             w.tip(f"{_AXES[place]}: {metadata.metas(Key)['handles'].description}")
-            _apply(ui, view, found, lambda old, new, at=at, n=place: _handled(old, at, n, new))  # type: ignore[misc]
+            _of_key(ui, view, at, found, _in_place(_handled, place))
+
+
+def _in_place(change: Callable[[Animation, KeyAt, int, float], Animation], number: int) -> KeyEdit:
+    """An edit of one number of a key, which stays where it is."""
+    return lambda old, at, new: (change(old, at, number, new), frozenset({at}))
 
 
 def _handled(old: Animation, at: KeyAt, place: int, number: float) -> Animation:
@@ -122,6 +130,26 @@ def _handled(old: Animation, at: KeyAt, place: int, number: float) -> Animation:
     handles[place] = number
     x1, y1, x2, y2 = handles
     return timeline.with_handles(old, at, (x1, y1, x2, y2))
+
+
+def _dragged(view: TimelineView) -> KeyAt | None:
+    """The key that is dragged, as it was when the drag began; None if that is none, or several."""
+    chosen = view.before[1] if view.before is not None else NONE
+    return next(iter(chosen)) if len(chosen) == 1 else None
+
+
+def _of_key(ui: Ui, view: TimelineView, at: KeyAt, found: Change, change: KeyEdit) -> None:
+    """Does what a number box of a key returned; a drag is one step, and changes the key that it began with."""
+    new = found.value
+    if new is not None and found.dragging:
+        if view.before is None:
+            view.begin(ui.studio)
+        first = _dragged(view) or at
+        view.drag(ui.studio, lambda old: change(old, first, new))
+    elif new is not None:
+        view.edit(ui.studio, lambda old: change(old, at, new))
+    if found.ended:
+        view.end(ui.studio)
 
 
 def _apply(
@@ -214,6 +242,7 @@ def _track(ui: Ui, view: TimelineView, animation: Animation, name: str) -> None:
                     lambda old, number, key=key: timeline.with_track(old, name, {key: number}),
                 )
     imgui.dummy(imgui.ImVec2(0, 1))
+    w.in_labels()
     if w.button("Remove track", icon=theme.TRASH, about="The value stays what the scene as it stands has"):
         view.selection = timeline.NONE
         view.change(ui.studio, lambda old: timeline.without_track(old, name))
@@ -282,12 +311,13 @@ def film_popup(ui: Ui, view: TimelineView) -> None:
     if width is not None:
         found = w.number_box(w.boxes(ui), "film.shutter", animation.shutter, width, Scale(0, 1, step=0.01))
         _apply(ui, view, found, lambda old, new: old.model_copy(update={"shutter": new}))
-    width = _row(ui, "Stills show this frame", "animation.frame", Animation, "frame")
+    width = _row(ui, "Frame of stills", "animation.frame", Animation, "frame")
     place = ui.studio.place
     if width is not None and w.toggle("film.still", animation.frame is not None):
         still = place.frame if animation.frame is None and place is not None else None
         view.change(ui.studio, lambda old: old.model_copy(update={"frame": still}))
     imgui.dummy(imgui.ImVec2(0, 1))
+    w.in_labels()
     if w.button("Remove the film", icon=theme.TRASH, about="The scene as it stands is kept"):
         ui.studio.set_animation(None)
         imgui.close_current_popup()

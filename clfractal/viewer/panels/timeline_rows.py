@@ -10,7 +10,7 @@ from clfractal.viewer.film_place import value_of
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import clipped
-from clfractal.viewer.panels.timeline_area import LEFT, Area, diamond
+from clfractal.viewer.panels.timeline_area import LEFT, Area, box, diamond
 from clfractal.viewer.panels.timeline_inspector import way_menu
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.timeline import KeyAt
@@ -32,7 +32,7 @@ def draw(ui: Ui, view: TimelineView, animation: Animation, area: Area) -> None:
         top = corner.y + ROW * number
         label(view, animation, name, corner.x, top)
         _row(view, animation, area, name, top, hovered)
-    _box(view, corner.y)
+    box(view)
     imgui.set_cursor_screen_pos(imgui.ImVec2(corner.x, corner.y + high))
     imgui.dummy(imgui.ImVec2(1, 0))
 
@@ -179,15 +179,6 @@ def _drag(ui: Ui, view: TimelineView, animation: Animation, area: Area, names: l
 def _within(y: float, first: float, second: float) -> bool:
     # A box that is thinner than a row chooses in the row that it is in.
     return min(first, second) - ROW / 2 <= y <= max(first, second) + ROW / 2
-
-
-def _box(view: TimelineView, top: float) -> None:
-    if "box" not in view.held or not imgui.is_mouse_dragging(0, 2.0):
-        return
-    x, y, _ = view.held["box"]
-    mouse, draw = imgui.get_mouse_pos(), imgui.get_window_draw_list()
-    draw.add_rect_filled(imgui.ImVec2(x, y), mouse, theme.packed(theme.ACCENT_FAINT))
-    draw.add_rect(imgui.ImVec2(x, y), mouse, theme.packed(theme.ACCENT_DIM))
 
 
 def _add(ui: Ui, view: TimelineView, animation: Animation, name: str, frame: float) -> None:

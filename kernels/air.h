@@ -1,0 +1,117 @@
+// Light that fog scatters towards the eye: for each light and sample one place of the ray, and from there a ray to the light. Where
+// the set is in the way, the fog is dark: shafts of light stand between the shadows.
+
+// The part of light that is scattered into a direction, per steradian (Henyey and Greenstein 1941); `cosine`: between the ways before
+// and after.
+INLINE real phase_of(real cosine, scalar g) {
+    const real base = fmax((real)(S(1.0) + g * g) - (real)(S(2.0) * g) * cosine, R(1e-6));
+    return (real)((S(1.0) - g * g) * S(0.07957747154594767)) / (base * sqrt(base));
+}
+
+// The fog's density at a distance along a ray.
+INLINE real fog_density_at(vec origin, vec direction, real t, __constant const struct Material *m) {
+    if (m->fog_height <= S(0.0)) return (real)(m->fog_density);
+    const real level = fog_level(origin, m) + t * fog_level(direction, m) - (real)(m->fog_base);
+    return (real)(m->fog_density) * exp(fmin(-level / (real)(m->fog_height), FOG_THICKEST));
+}
+
+// How far along a ray the optical depth is reached.
+INLINE real fog_way(vec origin, vec direction, real depth, __constant const struct Material *m) {
+    const real even = depth / fog_density_at(origin, direction, R(0.0), m);
+    if (m->fog_height <= S(0.0)) return even;
+    const real bend = fog_level(direction, m) / (real)(m->fog_height), c = even * bend;
+    const mask level = less(fabs(c), R(0.03));
+    const real curved = -log(fmax(R(1.0) - c, R(1e-30))) / pick(level, R(1.0), bend);
+    return pick(level, even * (R(1.0) + c * (R(0.5) + c * (R(0.33333333) + c * R(0.25)))), curved);
+}
+
+// A place that scatters light, the ray from there to the light, and what it brings to the eye.
+typedef struct {
+    real t;
+    incidence in;
+    color light;
+} scattering;
+
+// The place of a light's sample on the way of a ray of length `far`: by what comes through where the light is as strong everywhere, and
+// by the angle at a lamp (Kulla and Fajardo 2012). `weight`: density of fog times what comes through, over the probability of the place.
+INLINE real scattering_place(ray r, real far, real u, __constant const struct Light *light, __constant const struct Material *m,
+                             real *weight) {
+    if (light->kind == LIGHT_DIRECTIONAL || (!light_is_seen(light) && !light->inverse_square)) {
+        const real depth = pick(less(far, R(1e30)), fog_depth(r.origin, r.direction, fmin(far, R(1e30)), m),
+                                -log(fmax(fog_passes_all(r.origin, r.direction, m), R(1e-30))));
+        *weight = R(1.0) - exp(-depth);
+        return fog_way(r.origin, r.direction, -log(fmax(R(1.0) - u * *weight, R(1e-30))), m);
+    }
+    const vec toward = vec_sub(vec_splat(light->vector), r.origin);
+    const real nearest = vec_dot(toward, r.direction);
+    const vec beside = vec_along(toward, -nearest, r.direction);
+    const real distance = fmax(sqrt(vec_dot(beside, beside)), R(1e-6));
+    const real first = real_atan2(-nearest, distance), last = real_atan2(fmin(far, R(1e30)) - nearest, distance);
+    const real angle = first + u * (last - first);
+    const real along = distance * sin(angle) / fmax(cos(angle), R(1e-7));
+    const real t = clamp(nearest + along, R(0.0), far);
+    const real passes = exp(-fog_depth(r.origin, r.direction, t, m));
+    *weight = fog_density_at(r.origin, r.direction, t, m) * passes * (last - first) * (distance * distance + along * along) / distance;
+    return t;
+}
+
+// What the fog sends to the eye of a light, if nothing is between.
+INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, int light_index, world w) {
+    __constant const struct Light *light = w.lights + light_index;
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, (uint)(PURPOSE_AIR + 16 * (1 + light_index)));
+    real u, v, weight;
+    unit_square((bits)((uint)s.sample), seed, &u, &v);
+    scattering found;
+    found.t = scattering_place(r, far, u, light, w.material, &weight);
+    found.in = light_at(light, vec_along(r.origin, found.t, r.direction));
+    if (light->spread > S(0.0)) {
+        real other;
+        unit_square((bits)((uint)s.sample), seed + 1u, &u, &other);
+        found.in.toward = cone_direction(found.in.toward, (real)(light->spread), other, v);
+    }
+    // A light of intensity 1 is an irradiance of pi.
+    const real share = R(3.141592653589793) * found.in.strength * weight
+                       * phase_of(vec_dot(found.in.toward, r.direction), w.material->fog_anisotropy);
+    found.light = color_mul(color_splat(w.material->fog_scattering), color_scale(color_splat(light->color), share));
+    return found;
+}
+
+// How far a ray from the eye goes through the fog.
+INLINE real way_in_fog(stage s, ray r, const spot *here, world w) {
+    real far = pick(mask_of(here->found), vec_dot(vec_sub(here->seen, r.origin), r.direction), (real)(REAL_LARGEST));
+#if PLANES > 0
+    plane_face face;
+    STATE_RECALL(s, face, STATE_FACE);
+    far = pick(mask_of(face.bare), fmin(far, face.t), far);
+#endif
+    color shows = color_of(R(0.0), R(0.0), R(0.0));
+    real density = R(0.0), weight = R(0.0);
+    nearest_light(r.origin, r.direction, 1, &far, &shows, &density, &weight, w);
+    return far;
+}
+
+// Sends a ray for each light, in the turns from `first` on.
+INLINE void air_send(stage s, const packet_pixels *at, aim a, const spot *here, int first, world w) {
+    const ray r = eye_ray(&a, w.view);
+    const real far = way_in_fog(s, r, here, w);
+    for (int i = 0; i < w.settings->light_count; ++i) {
+        const scattering from = scattered(s, at, r, far, i, w);
+        ray asks = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
+                    (r.footprint + r.spread * from.t) * (real)(w.settings->shadow_detail), R(0.0), RAY_NOTHING_KNOWN};
+        const mask wanted = mask_of(a.wanted) & less(from.t, R(1e15)) & (w.lights[i].shadow ? less(R(0.0), R(1.0)) : less(R(1.0), R(0.0)));
+        send_clipped(s, first + i, asks, R(0.0), wanted, w);
+    }
+}
+
+// Adds what these rays bring, and keeps it to the end of the shot.
+INLINE void air_gather(stage s, const packet_pixels *at, aim a, const spot *here, int first, tally *cost, world w) {
+    const ray r = eye_ray(&a, w.view);
+    const real far = way_in_fog(s, r, here, w);
+    color air = color_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < w.settings->light_count; ++i) {
+        const encounter met = queue_met(s.q, first + i, s.slot);
+        tally_met(cost, met, 0);
+        air = color_pick(mask_of(met.hit), air, color_add(air, scattered(s, at, r, far, i, w).light));
+    }
+    STATE_KEEP(s, air, STATE_AIR);
+}

@@ -1,0 +1,104 @@
+// Places of lights that have a size: balls by the cone that they fill, rectangles by their area.
+#define LIGHT_PI R(3.141592653589793)
+
+// 1 - cos of half the angle that a light fills; for all but rectangles.
+INLINE real light_spread(__constant const struct Light *light, vec point) {
+    if (light->kind != LIGHT_SPHERE) return (real)(light->spread);
+    const vec offset = vec_sub(vec_splat(light->vector), point);
+    const real square = most(vec_dot(offset, offset), (real)(REAL_SMALLEST));
+    const real share = least((real)(light->radius * light->radius) / square, R(1.0));
+    return share / (R(1.0) + sqrt(R(1.0) - share));
+}
+
+// The direction to a place of the light; `middle` is the one to its middle.
+INLINE vec light_direction(__constant const struct Light *light, vec point, vec middle, real u, real v) {
+    if (light->kind != LIGHT_RECTANGLE) return cone_direction(middle, light_spread(light, point), u, v);
+    vec place = vec_along(vec_splat(light->vector), R(2.0) * u - R(1.0), vec_splat(light->side));
+    place = vec_along(place, R(2.0) * v - R(1.0), vec_splat(light->upward));
+    return vec_normalize(vec_sub(place, point));
+}
+
+// How far a rectangle's plane is.
+INLINE real plane_distance(__constant const struct Light *light, vec point, vec direction) {
+    const vec axis = vec_splat(light->axis);
+    return vec_dot(vec_sub(vec_splat(light->vector), point), axis) / vec_dot(direction, axis);
+}
+
+// Per steradian, with which `light_direction` chooses a direction that meets the light, for a uniform place.
+INLINE real light_density(__constant const struct Light *light, vec point, vec direction) {
+    if (light->kind != LIGHT_RECTANGLE) return R(1.0) / (R(2.0) * LIGHT_PI * light_spread(light, point));
+    const real distance = plane_distance(light, point, direction);
+    const real facing = most(-vec_dot(direction, vec_splat(light->axis)), (real)(REAL_EPSILON));
+    return distance * distance / ((real)(light->area) * facing);
+}
+
+INLINE int light_is_seen(__constant const struct Light *light) {
+    return light->kind == LIGHT_SPHERE || light->kind == LIGHT_RECTANGLE;
+}
+
+// Light from one of the directions that `light_direction` finds: the mean over these is the light's.
+INLINE incidence light_along(__constant const struct Light *light, vec point, vec direction) {
+    incidence in = light_at(light, point);
+    in.toward = direction;
+    if (light_is_seen(light)) {
+        in.strength = pick(less(R(0.0), in.strength), (real)(light->intensity) / (LIGHT_PI * light_density(light, point, direction)), R(0.0));
+    }
+    if (light->kind == LIGHT_SPHERE) in.distance = most(in.distance - (real)(light->radius), R(0.0));
+    if (light->kind == LIGHT_RECTANGLE) in.distance = plane_distance(light, point, direction);
+    return in;
+}
+
+// Where a ray meets a ball from outside, or a rectangle's shining side.
+INLINE mask light_met_at(__constant const struct Light *light, vec origin, vec direction, real *distance) {
+    const vec offset = vec_sub(vec_splat(light->vector), origin);
+    if (light->kind == LIGHT_SPHERE) {
+        const real along = vec_dot(offset, direction);
+        const vec across = vec_along(offset, -along, direction);
+        const real inside = (real)(light->radius * light->radius) - vec_dot(across, across);
+        *distance = along - sqrt(most(inside, R(0.0)));
+        return less_equal(R(0.0), inside) & less(R(0.0), *distance);
+    }
+    *distance = plane_distance(light, origin, direction);
+    const vec place = vec_sub(vec_scale(direction, *distance), offset), side = vec_splat(light->side), upward = vec_splat(light->upward);
+    const mask front = less(vec_dot(direction, vec_splat(light->axis)), R(0.0)) & less(R(0.0), *distance);
+    return front & less_equal(fabs(vec_dot(place, side)), vec_dot(side, side)) &
+           less_equal(fabs(vec_dot(place, upward)), vec_dot(upward, upward));
+}
+
+// About the irradiance that a light can bring to a point.
+INLINE real light_weight(__constant const struct Light *light, vec point) {
+    const color c = color_splat(light->color);
+    return LIGHT_PI * light_at(light, point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
+}
+
+// The nearest light that a ray meets before `far`, its number, or -1; the eye's own rays see only visible ones.
+INLINE mask nearest_light(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
+    mask met = less(R(1.0), R(0.0));
+    for (int i = 0; i < w.settings->light_count; ++i) {
+        __constant const struct Light *light = w.lights + i;
+        if (!light_is_seen(light) || (of_eye && !light->visible)) continue;
+        real distance;
+        const mask here = light_met_at(light, origin, direction, &distance) & less(distance, *far);
+        if (!any_lane(here)) continue;
+        met |= here;
+        *far = pick(here, distance, *far);
+        *shows = color_pick(here, color_scale(color_splat(light->color), (real)(light->intensity)), *shows);
+        *density = pick(here, light_density(light, origin, direction), *density);
+        *weight = pick(here, light_weight(light, origin), *weight);
+    }
+    return met;
+}
+
+// The first thing that the eye sees here is a light: a spot for depth and coverage, without light of others.
+INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real far, mask met) {
+    if (!any_lane(met) || s.bounce > 0) return;
+    sighting first;
+    STATE_RECALL(s, first, STATE_SIGHTING);
+    first.coverage = pick(met, R(1.0), first.coverage);
+    STATE_KEEP(s, first, STATE_SIGHTING);
+    found->found = pick(met, R(1.0), found->found);
+    found->point = vec_pick(met, vec_along(origin, far, direction), found->point);
+    found->seen = vec_pick(met, found->point, found->seen);
+    found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
+    spot_keep(found, s.state, 0, s.stride);
+}

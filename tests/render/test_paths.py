@@ -1,0 +1,261 @@
+"""Light along paths against what is known of it: Eq. 5 without bounces, white rooms, and closed forms of lamps."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+import pytest
+import yaml
+
+import clfractal
+from clfractal.errors import SceneError
+from clfractal.scene.model import Scene
+
+Floats = npt.NDArray[np.float64]
+
+BALL = {"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]}
+BLACK = {"top": [0, 0, 0], "bottom": [0, 0, 0]}
+GREY = {"top": [1, 1, 1], "bottom": [1, 1, 1]}
+
+
+def scene_of(**sections: Any) -> Scene:
+    """A ball of radius 1 in 48 x 48 pixels, unless the sections say otherwise."""
+    values: dict[str, Any] = {
+        "version": 1,
+        "formula": BALL,
+        "camera": {"position": [0, -4, 0], "fov": 40},
+        "image": {"width": 48, "height": 48},
+        "lights": [],
+        "background": BLACK,
+        **sections,
+    }
+    return clfractal.Scene(**values)
+
+
+def seen(scene: Scene, samples: int) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """Colours, shape (n, 3), and normals of the pixels that see the set wholly; and which pixels these are."""
+    renderer = scene.surface.model_copy(update={"samples": samples})
+    channels = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z")
+    film = clfractal.render(scene.model_copy(update={"renderer": renderer}), channels=channels)
+    whole = np.asarray(film["A"]) == 1
+    colors = np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64)
+    normals = np.stack([film[f"N.{axis}"] for axis in "XYZ"], axis=-1).astype(np.float64)
+    return colors[whole], normals[whole], whole
+
+
+def save_map(path: Path, pixels: npt.NDArray[np.float32]) -> None:
+    """A grey environment map."""
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, dict.fromkeys("RGB", pixels)).write(str(path))
+
+
+def path(bounces: int = 0, **values: Any) -> dict[str, Any]:
+    return {"mode": "path", "bounces": bounces, **values}
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        {"direction": [-1, 1, -1], "color": [1, 0.5, 0.25]},
+        {"type": "point", "position": [1.5, -2, 1], "falloff": "inverse_square", "intensity": 3},
+        {"type": "point", "position": [1.5, -2, 1]},
+    ],
+)
+def test_without_bounces_lambert_is_eq_5(light: dict[str, Any]) -> None:
+    """A light is as bright in both modes: a white surface that faces it sends back its intensity."""
+    material = {"color": [0.8, 0.5, 0.2], "ambient": 0, "specular": 0, "diffuse": 1}
+    direct = seen(scene_of(lights=[light], material=material), 4)[0]
+    paths = seen(scene_of(lights=[light], material=material, lighting=path()), 4)[0]
+    assert len(paths) > 200
+    assert paths.max() > 0.1
+    assert np.allclose(direct, paths, atol=2e-6)
+
+
+def test_two_lights_are_their_sum() -> None:
+    """One of them is chosen for each sample; the mean is that of both."""
+    lights = [{"direction": [-1, 1, -1]}, {"direction": [1, 1, -0.2], "intensity": 0.3}]
+    both = seen(scene_of(lights=lights, lighting=path(), material={"specular": 0}), 256)[0]
+    each = [
+        seen(scene_of(lights=[light], lighting=path(), material={"specular": 0}), 256)[0] for light in lights
+    ]
+    assert abs(both.mean() - (each[0] + each[1]).mean()) < 0.001
+    assert np.abs(both - each[0] - each[1]).max() < 0.25
+
+
+def test_a_disc_of_light_has_its_closed_form() -> None:
+    """Wholly over the horizon a disc lights as its middle: intensity times the cosine."""
+    light = {"direction": [0, 1, -0.5], "angular_size": 20}
+    colors, normals, _ = seen(
+        scene_of(lights=[light], lighting=path(), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}),
+        64,
+    )
+    toward = np.array([0, -1, 0.5]) / math.hypot(1, 0.5)
+    cosine = normals @ toward
+    lit = cosine > math.sin(math.radians(12))
+    assert lit.sum() > 300
+    assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < 0.005
+
+
+def test_a_point_light_with_a_size_is_as_bright() -> None:
+    """Its directions spread about its place; no ray of a path can meet it, so all of it is asked for."""
+    lamp = {"type": "point", "position": [0, -3000, 1500], "angular_size": 20}
+    colors, normals, _ = seen(
+        scene_of(lights=[lamp], lighting=path(2), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}),
+        64,
+    )
+    cosine = normals @ (np.array([0, -1, 0.5]) / math.hypot(1, 0.5))
+    lit = cosine > math.sin(math.radians(16))
+    assert lit.sum() > 250
+    assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < 0.01
+
+
+def test_a_disc_is_found_by_mirrors() -> None:
+    """In a mirror the disc shows its own radiance, intensity / sin^2 of half its size: samples of the surface find it."""
+    light = {"direction": [0, 1, 0], "angular_size": 40}
+    material = {"name": "mirror"}
+    mirror = {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0.02}}
+    scene = scene_of(lights=[light], lighting=path(1), materials={"mirror": mirror}, material=material)
+    colors, normals, _ = seen(scene, 64)
+    middle = normals @ np.array([0, -1, 0]) > math.cos(math.radians(6))
+    assert middle.sum() > 4
+    assert abs(colors[middle].mean() * math.sin(math.radians(20)) ** 2 - 1) < 0.02
+
+
+WHITE_ROOMS: dict[str, dict[str, Any]] = {
+    "clay": {"base": {"color": [1, 1, 1], "diffuse_roughness": 0.7}, "specular": {"weight": 0}},
+    "gloss": {"base": {"color": [1, 1, 1]}, "specular": {"roughness": 0.4}},
+    "metal": {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0.6}},
+    "coat": {"base": {"color": [1, 1, 1]}, "coat": {"weight": 1, "roughness": 0.3}},
+}
+
+
+@pytest.mark.parametrize("name", WHITE_ROOMS)
+def test_white_before_white_is_not_seen(name: str) -> None:
+    """A convex body that reflects all light, under a white sky: every pixel is white."""
+    scene = scene_of(
+        background=GREY,
+        materials={"m": WHITE_ROOMS[name]},
+        material={"name": "m"},
+        lighting=path(2),
+    )
+    colors = seen(scene, 64)[0]
+    assert abs(colors.mean() - 1) < 0.01
+
+
+@pytest.mark.parametrize("roulette", [0, 64])
+@pytest.mark.parametrize("surroundings", ["background", "environment"])
+def test_light_that_bounces_adds_up(roulette: int, surroundings: str, tmp_path: Path) -> None:
+    """Surfaces that reflect half and shine with half are as bright as a white sky, in all hollows: L = 1/2 + 1/2 L."""
+    shining = {"base": {"color": [0.5, 0.5, 0.5]}, "specular": {"weight": 0}, "emission": {"luminance": 0.5}}
+    sections: dict[str, Any] = {"background": GREY}
+    if surroundings == "environment":
+        save_map(tmp_path / "white.exr", np.ones((8, 16), np.float32))
+        sections = {"environment": {"file": "white.exr"}}
+    values = scene_of(
+        formula={"name": "menger_sponge", "iterations": 3},
+        camera={"position": [1.4, -2.6, 1.1], "fov": 40},
+        materials={"m": shining},
+        material={"name": "m"},
+        lighting=path(32, roulette=roulette),
+        **({"background": GREY} if surroundings == "background" else {}),
+    )
+    scene = values.placed(tmp_path).model_copy(update=sections)
+    colors = seen(scene, 32)[0]
+    assert abs(colors.mean() - 1) < 0.005
+
+
+def test_roulette_does_not_change_the_mean() -> None:
+    def bright(roulette: int) -> float:
+        scene = scene_of(
+            formula={"name": "menger_sponge", "iterations": 2},
+            camera={"position": [1.4, -2.6, 1.1], "fov": 40},
+            lights=[{"direction": [-1, 1, -1]}],
+            background={"top": [0.5, 0.6, 0.8], "bottom": [0.2, 0.2, 0.2]},
+            lighting=path(12, roulette=roulette),
+            material={"color": [0.8, 0.8, 0.8]},
+        )
+        return float(seen(scene, 64)[0].mean())
+
+    assert abs(bright(0) / bright(64) - 1) < 0.01
+
+
+def test_environments_are_asked_and_met(tmp_path: Path) -> None:
+    """A small bright spot in a map lights a Lambert ball with its irradiance, whether it is asked or met."""
+    pixels = np.full((64, 128), 0.05, np.float32)
+    pixels[16:20, 30:34] = 60.0
+    save_map(tmp_path / "spot.exr", pixels)
+    scene = scene_of(lighting=path(0), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}).placed(
+        tmp_path
+    )
+    scene = scene.model_copy(update={"environment": {"file": "spot.exr", "background": False}})
+    colors, normals, _ = seen(scene, 64)
+    latitude = math.pi * (np.arange(64) + 0.5) / 64
+    longitude = 2 * math.pi * ((np.arange(128) + 0.5) / 128 - 0.5)
+    z, level = np.cos(latitude)[:, None], np.sin(latitude)[:, None]
+    toward = np.stack(np.broadcast_arrays(level * np.sin(longitude), level * np.cos(longitude), z), axis=-1)
+    areas = np.broadcast_to(level * (math.pi / 64) * (2 * math.pi / 128), pixels.shape)
+    cosine = np.maximum(normals @ toward.reshape(-1, 3).T, 0)
+    expected = cosine @ (pixels * areas).reshape(-1) / math.pi
+    usable = expected > 0.2
+    assert usable.sum() > 100
+    assert abs((colors[usable, 0] / expected[usable]).mean() - 1) < 0.02
+
+
+def test_the_light_of_a_part_is_limited_and_told() -> None:
+    scene = scene_of(
+        lights=[{"direction": [-1, 1, -1], "intensity": 5}],
+        formula={"name": "menger_sponge", "iterations": 2},
+        lighting=path(3, clamp=0.02),
+        background=GREY,
+    )
+    free = scene.model_copy(update={"lighting": path(3)})
+    dark, bright = clfractal.render(scene), clfractal.render(free)
+    assert dark["R"].sum() < bright["R"].sum()
+    assert any("lighting.clamp" in line for line in dark.remarks)
+    assert not any("lighting.clamp" in line for line in bright.remarks)
+
+
+@pytest.mark.parametrize(
+    ("sections", "message"),
+    [
+        ({"material": {"name": "gold"}}, "material.name: names 'gold', but the scene has no materials"),
+        (
+            {"material": {"name": "gold"}, "materials": {"gould": {}}},
+            "material.name: unknown material 'gold'; did you mean 'gould'?",
+        ),
+        (
+            {"renderer": {"points": {}}, "lighting": path()},
+            "renderer.points: cannot be combined with lighting.mode path",
+        ),
+        (
+            {"renderer": {"normal": "least_squares"}, "lighting": path()},
+            "renderer.normal: cannot be combined with lighting.mode path",
+        ),
+        (
+            {"renderer": {"type": "volume"}, "lighting": path()},
+            "lighting.mode: must be direct for a volume, got path",
+        ),
+        (
+            {"materials": {"m": {"specular": {"ior": 0.9}}}},
+            "materials.m.specular.ior: must be at least 1, got 0.9",
+        ),
+        ({"lighting": {"mode": "path", "bounces": 65}}, "lighting.bounces: must be at most 64, got 65"),
+        ({"lighting": {"mode": "direct", "bounces": 3}}, "lighting"),
+    ],
+)
+def test_what_cannot_be_is_told(sections: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        clfractal.load_scene(yaml.safe_dump({"version": 1, "formula": BALL, "camera": {}, **sections}))
+    assert message in str(caught.value)
+
+
+def test_ignored_keys_are_told() -> None:
+    film = clfractal.render(scene_of(lighting=path(), material={"reflection": 0.4}, lights=[{}]))
+    assert "lighting.mode path does not use material.reflection" in film.remarks
+    film = clfractal.render(scene_of(materials={"m": {}}, material={"name": "m"}, lights=[{}]))
+    assert "material.name m is for lighting.mode path; Phong's keys are shown" in film.remarks

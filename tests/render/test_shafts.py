@@ -1,0 +1,149 @@
+"""Light that fog scatters once, against sums along the rays, and its shadows."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.scene.model import Scene
+from tests.render.shots import (
+    BALL_RADIUS,
+    PERSPECTIVE,
+    QUICK_BALL,
+    Floats,
+    rays,
+    scene_of,
+    shoot,
+    stacked,
+    to_sphere,
+)
+
+SIDE = 32
+ALBEDO = np.array([1.0, 0.5, 0.25])
+
+
+def scene_with(light: dict[str, Any], samples: int, *, paths: bool = False, **fog: Any) -> Scene:
+    """A black ball in black fog: all light that is seen was scattered by the fog."""
+    sections: dict[str, Any] = {"lighting": {"mode": "path", "bounces": 1}} if paths else {}
+    scattering = {"color": ALBEDO.tolist(), "anisotropy": fog.pop("anisotropy", 0.0)}
+    return scene_of(
+        QUICK_BALL,
+        PERSPECTIVE,
+        (SIDE, SIDE),
+        lights=[light],
+        material={"color": [0, 0, 0], "ambient": 0, "diffuse": 0, "specular": 0},
+        background={"top": [0, 0, 0], "bottom": [0, 0, 0]},
+        fog={"color": [0, 0, 0], "background": False, "scattering": scattering, **fog},
+        renderer={"samples": samples},
+        **sections,
+    )
+
+
+def phase(cosine: Floats, g: float) -> Floats:
+    return np.asarray((1 - g * g) / (4 * math.pi * (1 + g * g - 2 * g * cosine) ** 1.5))
+
+
+def expected(scene: Scene, far: Floats, parts: int = 20_000) -> Floats:
+    """Of each pixel's middle ray by the middles of many parts; rays to the light are free."""
+    fog: Any = scene.fog
+    light: Any = scene.lights[0]
+    origin, way, _ = rays(scene)
+    origin = np.broadcast_to(origin, way.shape)
+    found = np.zeros(way.shape[:2])
+    for place in np.ndindex(found.shape):
+        # Parts that grow with the distance: the near ones count most.
+        edge = np.concatenate([[0.0], np.geomspace(1e-4, far[place], parts)])
+        t, step = (edge[1:] + edge[:-1]) / 2, np.diff(edge)
+        points = origin[place] + t[:, None] * way[place]
+        density = np.full(len(t), fog.density)
+        if fog.height is not None:
+            density = fog.density * np.exp(np.minimum(-(points[:, 2] - fog.base) / fog.height, 80))
+        passes = np.exp(-(np.cumsum(density * step) - density * step / 2))
+        if light.type == "point":
+            toward = np.array(light.position) - points
+            square = (toward**2).sum(axis=1)
+            toward /= np.sqrt(square)[:, None]
+            strength = light.intensity / (square if light.falloff == "inverse_square" else 1.0)
+        else:
+            toward = np.broadcast_to(
+                -np.array(light.direction) / np.linalg.norm(light.direction), points.shape
+            )
+            strength = np.full(len(t), light.intensity)
+        part = phase(toward @ way[place], fog.scattering.anisotropy)
+        found[place] = (density * passes * math.pi * strength * part * step).sum()
+    return np.asarray(found[..., None] * ALBEDO)
+
+
+LIGHTS: list[dict[str, Any]] = [
+    {"direction": [-1, 1, -1], "shadow": False, "intensity": 2.0},
+    {"type": "point", "position": [2.5, -1.0, 1.5], "shadow": False, "falloff": "inverse_square"},
+    {"type": "point", "position": [-2.0, 1.0, 0.5], "shadow": False},
+]
+FOGS: list[dict[str, Any]] = [
+    {"density": 0.3},
+    {"density": 1.0, "anisotropy": 0.6},
+    {"density": 0.5, "height": 0.5, "anisotropy": -0.3},
+]
+
+
+@pytest.mark.parametrize("paths", [False, True])
+@pytest.mark.parametrize("fog", FOGS)
+@pytest.mark.parametrize("light", LIGHTS)
+def test_scattered_light_is_the_integral(
+    device: Device, light: dict[str, Any], fog: dict[str, Any], paths: bool
+) -> None:
+    scene = scene_with(light, 256, paths=paths, **fog)
+    film = shoot(scene, device)
+    seen = stacked(film, ("R", "G", "B")).astype(float)
+    origin, way, _ = rays(scene)
+    distance, nearest = to_sphere(np.broadcast_to(origin, way.shape), way, [0, 0, 0], BALL_RADIUS)
+    sure = (nearest < 0.9 * BALL_RADIUS) | (nearest > 1.1 * BALL_RADIUS)
+    far = np.where(nearest < BALL_RADIUS, distance, 300.0)
+    wanted = expected(scene, far)
+    assert wanted[sure].max() > 0.01
+    assert abs(seen[sure].mean() / wanted[sure].mean() - 1) < 0.01
+    np.testing.assert_allclose(seen[sure], wanted[sure], rtol=0.1, atol=0.03 * wanted[sure].max())
+
+
+def test_fog_behind_a_ball_is_dark(device: Device) -> None:
+    """Light along x: the ball's shadow is the cylinder behind it, and only rays through that are darker."""
+    light = {"direction": [1, 0, 0]}
+    lit, shaded = (
+        scene_with({**light, "shadow": False}, 64, density=0.05),
+        scene_with(light, 64, density=0.05),
+    )
+    ratio = shoot(shaded, device)["R"] / shoot(lit, device)["R"]
+    origin, way, _ = rays(lit)
+    t = np.linspace(0, 40, 4000)
+    points = np.broadcast_to(origin, way.shape)[..., None, :] + way[..., None, :] * t[:, None]
+    beside = np.hypot(points[..., 1], points[..., 2]) / BALL_RADIUS
+    behind = points[..., 0] > -BALL_RADIUS
+    in_shadow = ((beside < 0.9) & behind).sum(axis=-1) * (t[1] - t[0])
+    free = ~((beside < 1.2) & behind).any(axis=-1)
+    _, nearest = to_sphere(np.broadcast_to(origin, way.shape), way, [0, 0, 0], BALL_RADIUS)
+    past = nearest > 1.1 * BALL_RADIUS
+    assert (past & free).sum() > 50
+    assert (past & (in_shadow > BALL_RADIUS)).sum() > 20
+    assert ratio[past & free].min() > 0.999
+    assert ratio[past & (in_shadow > BALL_RADIUS)].max() < 0.99
+
+
+def test_noise_fades(device: Device) -> None:
+    light = {"type": "point", "position": [2.5, -1.0, 1.5], "falloff": "inverse_square"}
+    few, more, most = (
+        shoot(scene_with(light, n, density=0.3), device)["R"].astype(float) for n in (4, 64, 1024)
+    )
+    assert np.abs(more - most).mean() < 0.4 * np.abs(few - most).mean()
+
+
+def test_a_soft_light_has_soft_shafts(device: Device) -> None:
+    """Scattered alike to all sides, its size does not change how bright fog without shadows is."""
+    light = {"direction": [-1, 1, -1], "shadow": False}
+    hard, soft = (
+        shoot(scene_with({**light, "angular_size": size}, 16, density=0.3), device)["R"] for size in (0, 30)
+    )
+    np.testing.assert_allclose(hard, soft, rtol=1e-4)
