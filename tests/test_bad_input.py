@@ -130,7 +130,7 @@ def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts:
             "lights:\n- type: point\n  position: [0.1, 0, 0]",
             "7:13: lights.0.position: must be outside the object, where its light reaches something",
         ),
-        ("environment:\n  intensity: 1", "6:3: environment: needs one of name or file"),
+        ("environment:\n  intensity: 1", "6:3: environment: needs one of name, file or sky"),
         ("environment:\n  name: nowhere", "6:9: environment.name: unknown environment 'nowhere'; "),
         ("environment:\n  file: none.exr", "6:9: environment.file: none.exr "),
         (

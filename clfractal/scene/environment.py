@@ -1,4 +1,4 @@
-"""Finds a scene's environment map, in the program or beside the scene, and keeps its pixels with the scene."""
+"""Finds a scene's environment map, in the program or beside the scene, or makes a sky; its pixels stay with the scene."""
 
 from __future__ import annotations
 
@@ -59,6 +59,12 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
         FileError: at environment.file, for a file out of the folder, or whatever is wrong with it.
     """
     check_name(environment)
+    if environment.sky is not None:
+        # Loaded for skies only.
+        from clfractal.scene.sky import bake
+
+        with doing("making the sky"):
+            return EnvironmentMap(bake(environment.sky))
     if environment.file is None:
         return _shipped(environment.name or "")
     from clfractal.files.environment import read_environment

@@ -182,6 +182,23 @@ Lights = Annotated[tuple[Light, ...], Field(strict=False, max_length=MAX_LIGHTS)
 MapName = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
 
 
+class Sky(Section):
+    """A clear sky over level ground by its physics: molecules, aerosol and ozone scatter the sun's light.
+
+    Its azimuths are those of maps: 0 is +y, 90 is +x.
+    """
+
+    sun_elevation: float = Field(45.0, ge=-6, le=90, description="of the sun over the horizon, degrees")
+    sun_azimuth: float = Field(
+        0.0, ge=-36_000, le=36_000, description="of the sun, from +y towards +x, degrees"
+    )
+    turbidity: float = Field(
+        3.0, ge=1, le=10, description="haze: 1 is air without dust, 2 is clear, 8 is hazy"
+    )
+    ground_color: Reflectance = Field((0.25, 0.24, 0.22), description="linear Rec. 709")
+    sun: bool = Field(True, description="whether the sun's disc is there; false: the sky's own light only")
+
+
 class Environment(Section):
     """A picture of everything around, infinitely far away; it lights the set, and is seen in mirrors and behind the set."""
 
@@ -189,6 +206,7 @@ class Environment(Section):
     file: MapName | None = Field(
         None, description="a latitude-longitude EXR picture, in the scene's folder or below"
     )
+    sky: Sky | None = Field(None, description="a physical sky")
     intensity: Amount = Field(1.0, description="factor on the environment's light")
     rotation: float = Field(
         0.0, ge=-360, le=360, description="rotation of the environment about the z axis, degrees"
@@ -202,10 +220,11 @@ class Environment(Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> Self:
-        if self.name is None and self.file is None:
-            raise problem("needs one of name or file")
-        if self.name is not None and self.file is not None:
-            raise problem("cannot be combined with name: give one of name or file", "file")
+        given = [key for key in ("name", "file", "sky") if getattr(self, key) is not None]
+        if not given:
+            raise problem("needs one of name, file or sky")
+        if len(given) > 1:
+            raise problem(f"cannot be combined with {given[0]}: give one of name, file or sky", given[1])
         return self
 
 

@@ -213,10 +213,22 @@ CASES = [
         "lights.1.position: must be outside the object, where its light reaches something, got [0, 0.1, 0]",
     ),
     ("material: {reflection: §1.5}", "material.reflection: must be at most 1, got 1.5"),
-    ("environment: §{intensity: 2}", "environment: needs one of name or file"),
+    ("environment: §{intensity: 2}", "environment: needs one of name, file or sky"),
     (
         "environment: {name: a, file: §b.exr}",
-        "environment.file: cannot be combined with name: give one of name or file",
+        "environment.file: cannot be combined with name: give one of name, file or sky",
+    ),
+    (
+        "environment: {file: b.exr, sky: §{}}",
+        "environment.sky: cannot be combined with file: give one of name, file or sky",
+    ),
+    (
+        "environment: {sky: {turbidity: §0.5}}",
+        "environment.sky.turbidity: must be at least 1, got 0.5",
+    ),
+    (
+        "environment: {sky: {§sun_azimut: 3}}",
+        "environment.sky: unknown key 'sun_azimut'; did you mean 'sun_azimuth'?",
     ),
     ("environment: §sky", "environment: must be a mapping, got 'sky'"),
     (

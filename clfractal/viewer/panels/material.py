@@ -6,6 +6,7 @@ from typing import Any
 
 from clfractal.scene.environment import names
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import Environment
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas
 from clfractal.viewer.panels.ui import Ui
@@ -73,8 +74,12 @@ def _choice(ui: Ui) -> None:
 def summary(ui: Ui) -> str:
     """For the heading of the surroundings."""
     scene = ui.studio.scene
-    parts = [scene.environment.name or "map"] if scene.environment is not None else []
+    parts = [_source(scene.environment)] if scene.environment is not None else []
     return ", ".join([*parts, *(["fog"] if scene.fog is not None else [])])
+
+
+def _source(environment: Environment) -> str:
+    return environment.name or ("sky" if environment.sky is not None else "map")
 
 
 def draw_surroundings(ui: Ui) -> None:
@@ -147,6 +152,17 @@ def _switch(ui: Ui, key: str, label: str, first: dict[str, Any]) -> bool:
 def _map(ui: Ui) -> None:
     environment = ui.studio.scene.environment
     assert environment is not None
+    if environment.sky is not None:
+        degrees = {"unit": "°"}
+        w.fields(
+            ui,
+            "environment.sky",
+            tuple(type(environment.sky).model_fields),
+            sun_elevation=degrees,
+            sun_azimuth={**degrees, "usual": (-180.0, 180.0)},
+            sun={"label": "Sun's disc"},
+        )
+        return
     if environment.file is not None:
         w.field(ui, "environment.file")
         return

@@ -1,0 +1,178 @@
+"""A physical sky as a latitude-longitude map: the light of the air, the sun's disc, and the ground below.
+
+`atmosphere.py` gives light by wavelength. It becomes CIE XYZ by the fits of Wyman, Sloan and Shirley (Simple
+Analytic Approximations to the CIE XYZ Color Matching Functions, JCGT 2 (2), 2013), the sun being a black body of
+5778 K, and then linear Rec. 709; colours outside it are cut at 0.
+
+The scale is fixed: the sun above the air gives `SUNLIGHT`, so that a white ground under a sun at 45 degrees and
+turbidity 3 has a luminance of 1, and middle grey comes out at 0.18.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.scene.atmosphere import (
+    EARTH,
+    SUN_RADIUS,
+    WAVELENGTHS,
+    Atmosphere,
+    Doubles,
+    aerosol_phase,
+    rayleigh_phase,
+    sun_visible,
+)
+
+if TYPE_CHECKING:
+    from clfractal.scene.lighting import Sky
+
+WIDTH, HEIGHT = 2048, 1024
+"""Of the map: the sun is three pixels wide."""
+SUNLIGHT = 4.973
+"""Luminance times pi that a white surface facing the sun would have above the air: see the scale."""
+
+_EYE = EARTH + 0.05  # 50 m above the ground: the horizon lies 0.2 degrees below the level
+_ROWS, _AZIMUTHS = 96, 49
+_FINER = 16  # points across a pixel where the sun's disc is drawn
+
+Floats = npt.NDArray[np.float32]
+_Parts = tuple[Doubles, Doubles, Doubles]
+
+
+@lru_cache(maxsize=4)
+def bake(sky: Sky) -> Floats:
+    """The map of a sky, shape (HEIGHT, WIDTH, 3): linear Rec. 709, finite, none below 0; not to be written to."""
+    air = Atmosphere(sky.turbidity)
+    elevation = np.radians(sky.sun_elevation)
+    sun = np.array(np.sin(elevation))
+    dip = -np.arccos(EARTH / _EYE)
+    rows: Doubles = pi / 2 - (np.arange(HEIGHT, dtype=np.float64) + 0.5) * (pi / HEIGHT)
+    above = int((rows > dip).sum())
+    azimuth: Doubles = np.radians(((np.arange(WIDTH) + 0.5) / WIDTH - 0.5) * 360 - sky.sun_azimuth)
+    pixels = np.empty((HEIGHT, WIDTH, 3))
+    pixels[:above] = _light(air, sun, rows[:above], azimuth, (dip + 1e-6, pi / 2))
+    pixels[above:] = _light(air, sun, rows[above:], azimuth, (dip - 1e-6, -pi / 2))
+    radius = np.array(EARTH)
+    direct = to_rgb(air.transmittance(radius, sun)) * sun_visible(radius, sun) * max(float(sun), 0.0)
+    irradiance = np.maximum(direct + _irradiance(pixels[:above], rows[:above]), 0)
+    end = np.linspace(0, 1, _ROWS) ** 2 * (-pi / 2 - dip) + dip - 1e-6
+    through = to_rgb(air.scattered(_EYE, np.sin(end), np.zeros(1), sun).through) / to_rgb(
+        np.ones_like(WAVELENGTHS)
+    )
+    seen = _between(through, np.sqrt((rows[above:] - dip) / (-pi / 2 - dip)) * (_ROWS - 1))
+    pixels[above:] += (seen * irradiance * sky.ground_color / pi)[:, None]
+    if sky.sun:
+        _draw_sun(pixels, air, rows, azimuth, float(elevation), float(dip))
+    np.maximum(pixels, 0.0, out=pixels)
+    found = pixels.astype(np.float32)
+    found.flags.writeable = False
+    return found
+
+
+def to_rgb(spectrum: Doubles) -> Doubles:
+    """Linear Rec. 709 of what is left of sunlight, shape (..., wavelengths); all of it has the luminance `SUNLIGHT`."""
+    found: Doubles = spectrum @ _spectrum_to_rgb()
+    return found
+
+
+def pixel_areas() -> Doubles:
+    """Of the pixels of each row, steradians, shape (HEIGHT,)."""
+    borders = np.cos(np.linspace(0, pi, HEIGHT + 1))
+    found: Doubles = (borders[:-1] - borders[1:]) * (2 * pi / WIDTH)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _spectrum_to_rgb() -> Doubles:
+    def lobe(middle: float, left: float, right: float) -> Doubles:
+        offset = WAVELENGTHS - middle
+        found: Doubles = np.exp(-0.5 * (offset * np.where(offset < 0, left, right)) ** 2)
+        return found
+
+    x = 0.362 * lobe(442.0, 0.0624, 0.0374) + 1.056 * lobe(599.8, 0.0264, 0.0323)
+    x -= 0.065 * lobe(501.1, 0.0490, 0.0382)
+    y = 0.821 * lobe(568.8, 0.0213, 0.0247) + 0.286 * lobe(530.9, 0.0613, 0.0322)
+    z = 1.217 * lobe(437.0, 0.0845, 0.0278) + 0.681 * lobe(459.0, 0.0385, 0.0725)
+    planck = WAVELENGTHS**-5 / np.expm1(1.438777e7 / (WAVELENGTHS * 5778))
+    xyz = np.stack([x, y, z], axis=-1) * planck[:, None]
+    to_709 = np.linalg.inv(
+        np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    )
+    found: Doubles = SUNLIGHT / xyz[:, 1].sum() * xyz @ to_709.T
+    return found
+
+
+def _light(
+    air: Atmosphere, sun: Doubles, rows: Doubles, azimuth: Doubles, ends: tuple[float, float]
+) -> Doubles:
+    """Scattered light at elevations `rows` between `ends`, the first of which is the horizon: (rows, azimuths, 3).
+
+    The integrals change slowly and are blended from a grid that is fine near the horizon; the phase functions, which
+    do not, are exact at each pixel.
+    """
+    around = np.linspace(0, pi, _AZIMUTHS)
+    grid = ends[0] + np.linspace(0, 1, _ROWS) ** 2 * (ends[1] - ends[0])
+    found = [air.scattered(_EYE, np.sin(row)[None], around, sun) for row in grid]
+    parts: _Parts = (
+        to_rgb(np.stack([row.molecules for row in found])),
+        to_rgb(np.stack([row.aerosol for row in found])),
+        to_rgb(np.stack([row.many for row in found])),
+    )
+    place = np.sqrt(np.clip((rows - ends[0]) / (ends[1] - ends[0]), 0, 1)) * (_ROWS - 1)
+    from_sun = np.arccos(np.clip(np.cos(azimuth), -1, 1)) / pi * (_AZIMUTHS - 1)
+    cosine = np.sin(rows)[:, None] * sun + np.cos(rows)[:, None] * np.sqrt(1 - sun**2) * np.cos(azimuth)
+    light = np.zeros((len(rows), len(azimuth), 3))
+    phases = (rayleigh_phase(cosine), aerosol_phase(cosine), np.ones_like(cosine))
+    for part, phase in zip(parts, phases, strict=True):
+        at_rows = _between(part, place)
+        light += _between(at_rows.swapaxes(0, 1), from_sun).swapaxes(0, 1) * phase[..., None]
+    return light
+
+
+def _between(values: Doubles, place: Doubles) -> Doubles:
+    """Values of the first axis, blended linearly."""
+    first = np.minimum(place.astype(int), len(values) - 2)
+    part = (place - first).reshape(-1, *[1] * (values.ndim - 1))
+    found: Doubles = values[first] * (1 - part) + values[first + 1] * part
+    return found
+
+
+def _irradiance(pixels: Doubles, rows: Doubles) -> Doubles:
+    """Of a level surface under the rows from the top, shape (3,)."""
+    weights = pixel_areas()[: len(rows)] * np.maximum(np.sin(rows), 0)
+    found: Doubles = np.einsum("r,rck->k", weights, np.maximum(pixels, 0))
+    return found
+
+
+def _draw_sun(
+    pixels: Doubles, air: Atmosphere, rows: Doubles, azimuth: Doubles, elevation: float, dip: float
+) -> None:
+    """Adds the disc: each pixel gets its part of it, all parts together are the disc's solid angle."""
+    reach = SUN_RADIUS + pi / HEIGHT
+    near = np.flatnonzero(np.abs(rows - elevation) < reach)
+    if not len(near):
+        return
+    inner = (np.arange(_FINER) + 0.5) / _FINER - 0.5
+    fine = rows[near][:, None] - inner * (pi / HEIGHT)
+    around = azimuth[:, None] + inner * (2 * pi / WIDTH)
+    toward = np.cos(around).reshape(-1)
+    covered = np.zeros((len(near), _FINER, WIDTH))
+    for row, elevations in enumerate(fine):
+        for line, height in enumerate(elevations):
+            # By chords: the cosine of so small an angle has lost its digits.
+            square = (np.sin(height) - np.sin(elevation)) ** 2 + np.cos(height) ** 2 + np.cos(elevation) ** 2
+            square = square - 2 * np.cos(height) * np.cos(elevation) * toward
+            inside = square < 4 * np.sin(SUN_RADIUS / 2) ** 2
+            covered[row, line] = inside.reshape(WIDTH, _FINER).mean(axis=1)
+    weights = np.cos(fine) * (2 * pi / WIDTH) * (pi / HEIGHT / _FINER)
+    covered *= 2 * pi * (1 - np.cos(SUN_RADIUS)) / np.einsum("rlc,rl->", covered, weights)
+    mu = np.sin(fine)
+    light = to_rgb(air.transmittance(np.full_like(mu, _EYE), mu)) * (fine > dip)[..., None]
+    light /= 2 * pi * (1 - np.cos(SUN_RADIUS))
+    energy = np.einsum("rlc,rl,rlk->rck", covered, weights, np.maximum(light, 0))
+    pixels[near] += energy / pixel_areas()[near][:, None, None]
