@@ -161,7 +161,7 @@ STAGE(scatter_paths) {
 #if !COLORING_PER_POINT
         found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
 #endif
-        const pbr p = pbr_of(w.materials, found.tint);
+        const pbr p = pbr_at(&found, w);
         so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(p.emission, so_far.through)), so_far.seen);
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
         so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), found.normal);

@@ -30,6 +30,7 @@
 #include "lit.h"
 #if HAS_PATHS
 #include "bsdf.h"
+#include "material_at.h"
 #include "lights.h"
 #include "paths.h"
 #endif
