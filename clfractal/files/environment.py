@@ -1,4 +1,4 @@
-"""Reads environment maps: OpenEXR pictures of everything around, by latitude and longitude.
+"""Reads environment maps: OpenEXR and Radiance pictures of everything around, by latitude and longitude.
 
 The top row looks straight up, the bottom row straight down; from left to right the columns go around once,
 and the picture's middle is straight ahead (kernels/environment.h says how that lies in a scene). Pixels are
@@ -9,16 +9,15 @@ that, and the difference is half a pixel.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import FileError
-from clfractal.files.atomic import file_error
+from clfractal.files.atomic import file_error, open_regular
 from clfractal.files.exr_header import ExrHeader, read_header
+from clfractal.files.radiance import MAGIC, radiance_pixels, read_radiance_header
 
 MAX_WIDTH = 16_384
 BRIGHTEST = 1e9
@@ -37,14 +36,26 @@ Doubles = npt.NDArray[np.float64]
 def read_environment(path: str | Path) -> Floats:
     """The pixels of a latitude-longitude map, shape (height, 2 height, 3): linear Rec. 709, finite, none below 0.
 
-    The channels are R, G and B, or Y alone for grey light; half or float, in any compression, by rows or by
-    tiles. Where the file names other primaries, colours are turned into Rec. 709, adapted to its white.
-    Negative numbers become 0: light cannot be negative, but resampling and colours outside Rec. 709
-    cause negative numbers even in good maps.
+    Of OpenEXR the channels are R, G and B, or Y alone for grey light; half or float, in any compression, by rows or by
+    tiles. Radiance's pictures (`.hdr`) are known by their first bytes. Where the file names other primaries, colours
+    are turned into Rec. 709, adapted to its white. Negative numbers become 0: light cannot be negative, but resampling
+    and colours outside Rec. 709 cause negative numbers even in good maps.
 
     Raises:
-        FileError: it cannot be read, is no OpenEXR file or a damaged one, or no such map.
+        FileError: it cannot be read, is neither kind of file or a damaged one, or no such map.
     """
+    with open_regular(path) as stream:
+        try:
+            begin = stream.read(len(MAGIC[0]))
+            rest = stream.read() if begin.startswith(MAGIC) else b""
+        except OSError as error:
+            raise file_error(path, "cannot be read", error) from error
+    pixels = _of_radiance(path, begin + rest) if rest else _of_exr(path)
+    np.maximum(pixels, 0.0, out=pixels)
+    return pixels
+
+
+def _of_exr(path: str | Path) -> Floats:
     header = read_header(path)
     _check_shape(path, header)
     from clfractal.files.exr import read_exr
@@ -54,10 +65,17 @@ def read_environment(path: str | Path) -> Floats:
     pixels = np.stack([np.asarray(planes[name], np.float32) for name in names], axis=-1)
     del planes
     _check_numbers(path, pixels)
-    if names == "RGB":
-        pixels = _in_rec709(pixels, values)
-    np.maximum(pixels, 0.0, out=pixels)
-    return pixels
+    return _in_rec709(pixels, values.get("chromaticities")) if names == "RGB" else pixels
+
+
+def _of_radiance(path: str | Path, data: bytes) -> Floats:
+    header = read_radiance_header(path, data)
+    _check_size(path, *header.size)
+    pixels = radiance_pixels(path, data, header)
+    if header.is_xyz:
+        pixels = np.ascontiguousarray(pixels @ np.linalg.inv(_to_xyz(_REC709)).T.astype(np.float32))
+    _check_numbers(path, pixels)
+    return pixels if header.is_xyz else _in_rec709(pixels, header.primaries)
 
 
 def _check_shape(path: str | Path, header: ExrHeader) -> None:
@@ -69,13 +87,7 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
     width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
     if envmap is not None and envmap.data == _CUBE:
         raise file_error(path, "is a cube map; an environment is a latitude-longitude map", "")
-    if width < 1 or width != 2 * height:
-        message = (
-            f"must be twice as wide as high, as latitude-longitude maps are, got {width} x {height} pixels"
-        )
-        raise file_error(path, message, "")
-    if width > MAX_WIDTH:
-        raise file_error(path, f"is too large: {width:,} pixels wide, at most {MAX_WIDTH:,}", "")
+    _check_size(path, width, height)
     whole = header.values().get("displayWindow")
     if whole != window and isinstance(whole, tuple) and len(whole) == 4:
         shown = f"{width} x {height} of {whole[2] - whole[0] + 1} x {whole[3] - whole[1] + 1} pixels"
@@ -87,6 +99,16 @@ def _check_shape(path: str | Path, header: ExrHeader) -> None:
         raise file_error(
             path, f"is too large: {len(header.channels)} channels of {width} x {height} pixels", ""
         )
+
+
+def _check_size(path: str | Path, width: int, height: int) -> None:
+    if width < 1 or width != 2 * height:
+        message = (
+            f"must be twice as wide as high, as latitude-longitude maps are, got {width} x {height} pixels"
+        )
+        raise file_error(path, message, "")
+    if width > MAX_WIDTH:
+        raise file_error(path, f"is too large: {width:,} pixels wide, at most {MAX_WIDTH:,}", "")
 
 
 def _check_numbers(path: str | Path, pixels: Floats) -> None:
@@ -109,9 +131,8 @@ def _check_numbers(path: str | Path, pixels: Floats) -> None:
             raise FileError(f"has {count:,} {pixel} {what}, {place}", file_error(path, "", "").where)
 
 
-def _in_rec709(pixels: Floats, values: Mapping[str, Any]) -> Floats:
+def _in_rec709(pixels: Floats, given: object) -> Floats:
     """Colours of the primaries and white that the header names, in those of Rec. 709."""
-    given = values.get("chromaticities")
     if not isinstance(given, tuple) or np.allclose(given, _REC709, atol=2e-3):
         return pixels
     if not np.isfinite(given).all() or given[7] <= 0:

@@ -204,7 +204,7 @@ class Environment(Section):
 
     name: MapName | None = Field(None, description="an environment map that comes with the program")
     file: MapName | None = Field(
-        None, description="a latitude-longitude EXR picture, in the scene's folder or below"
+        None, description="a latitude-longitude EXR or HDR picture, in the scene's folder or below"
     )
     sky: Sky | None = Field(None, description="a physical sky")
     intensity: Amount = Field(1.0, description="factor on the environment's light")
