@@ -1,5 +1,5 @@
-// Places of lights that have a size: balls by the cone that they fill, rectangles by their area.
-#define LIGHT_PI R(3.141592653589793)
+// Places of lights that have a size: balls by the cone that they fill, rectangles by their solid angle.
+#include "rectangles.h"
 
 // 1 - cos of half the angle that a light fills; for all but rectangles.
 INLINE real light_spread(__constant const struct Light *light, vec point) {
@@ -13,9 +13,7 @@ INLINE real light_spread(__constant const struct Light *light, vec point) {
 // The direction to a place of the light; `middle` is the one to its middle.
 INLINE vec light_direction(__constant const struct Light *light, vec point, vec middle, real u, real v) {
     if (light->kind != LIGHT_RECTANGLE) return cone_direction(middle, light_spread(light, point), u, v);
-    vec place = vec_along(vec_splat(light->vector), R(2.0) * u - R(1.0), vec_splat(light->side));
-    place = vec_along(place, R(2.0) * v - R(1.0), vec_splat(light->upward));
-    return vec_normalize(vec_sub(place, point));
+    return rectangle_direction(light, point, u, v);
 }
 
 // How far a rectangle's plane is.
@@ -24,12 +22,10 @@ INLINE real plane_distance(__constant const struct Light *light, vec point, vec 
     return vec_dot(vec_sub(vec_splat(light->vector), point), axis) / vec_dot(direction, axis);
 }
 
-// Per steradian, with which `light_direction` chooses a direction that meets the light, for a uniform place.
+// Per steradian, with which `light_direction` chooses a direction that meets the light.
 INLINE real light_density(__constant const struct Light *light, vec point, vec direction) {
-    if (light->kind != LIGHT_RECTANGLE) return R(1.0) / (R(2.0) * LIGHT_PI * light_spread(light, point));
-    const real distance = plane_distance(light, point, direction);
-    const real facing = most(-vec_dot(direction, vec_splat(light->axis)), (real)(REAL_EPSILON));
-    return distance * distance / ((real)(light->area) * facing);
+    if (light->kind == LIGHT_RECTANGLE) return rectangle_density(light, point, direction);
+    return R(1.0) / (R(2.0) * LIGHT_PI * light_spread(light, point));
 }
 
 INLINE int light_is_seen(__constant const struct Light *light) {

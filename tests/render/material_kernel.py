@@ -29,6 +29,8 @@ _TEXT = """\
 #include "color.h"
 #include "bsdf.h"
 
+"""
+LOADS = """\
 INLINE real load(__global const scalar *from) {
     scalar each[LANES];
     for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
@@ -39,6 +41,8 @@ INLINE void store(__global scalar *to, real value) {
     lanes_store(value, each);
     for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
 }
+"""
+_SCATTER = """\
 #define PUT_COLOR(place, c)               \\
     store(out + (place) * count, c.r);     \\
     store(out + (place + 1) * count, c.g); \\
@@ -82,7 +86,7 @@ def _program(device: Device, precision: Precision, lanes: int) -> Any:
         "PALETTE_SIZE": 256,
         **scattering_defines(),
     }
-    generated = {"scatter.cl": _TEXT, "structs.h": PBR.c_text()}
+    generated = {"scatter.cl": _TEXT + LOADS + _SCATTER, "structs.h": PBR.c_text()}
     flat = flatten("scatter.cl", generated=generated, defines=defines)
     return compiler.compile_source(device, flat.text, program.math_flags(precision))
 
