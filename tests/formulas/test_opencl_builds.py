@@ -27,7 +27,7 @@ from clfractal.pictures.tiles import Region
 from clfractal.renderers import records, surface
 from clfractal.renderers.plan import Plan
 from clfractal.scene.load import load_scene
-from tests.formulas.opencl_batch import numbered
+from tests.formulas.opencl_batch import kernel_file, numbered
 
 SCENE = """\
 version: 1
@@ -63,7 +63,7 @@ def surface_texts(name: str, precision: Precision, lanes: int, coloring: str = "
 
 def whole_text(name: str, precision: Precision, lanes: int) -> str:
     """The march and, behind it, what the program for lists of points has of its own."""
-    own = points_text(name, precision, lanes).rpartition('"kernels/points.cl"\n')[2]
+    own = '#line 1 "kernels/points.cl"\n' + kernel_file("points.cl")
     assert "__kernel void escape_counts" in own
     return surface_texts(name, precision, lanes)[0] + own
 
