@@ -393,7 +393,7 @@ def light_records(scene: Scene, precision: Precision) -> Record:
 def material_record(
     scene: Scene, precision: Precision, environment: PackedEnvironment | None = None
 ) -> Record:
-    """Material, colouring, background, and how the packed environment is laid out; behind it what maps ask the formula for."""
+    """Material, colouring, background, and the packed environment's layout; behind it what maps ask the formula."""
     material, background, fog = scene.material, scene.background, scene.fog
     gradient = background if isinstance(background, Gradient) else None
     shafts = fog.scattering if fog else None

@@ -43,8 +43,8 @@ class Map(Section):
     """What a value follows from place to place: `by` a quantity, or a picture, the `texture`.
 
     The quantities: `iterations`, the smooth escape count; `normal`, the normal's part along `direction`, -1 to 1; `height`,
-    the place along `direction`, `distance`, that from `center`, scene units; `curvature`, the mean curvature over `step`, one over
-    scene units, above 0 on hills; `thickness`, `layer_distance` and `trap` as of `coloring`, along the normal.
+    the place along `direction`, and `distance`, that from `center`, scene units; `curvature`, the mean curvature over `step`,
+    one over scene units, above 0 on hills; `thickness`, `layer_distance` and `trap` as of `coloring`, along the normal.
     """
 
     tag = "map"
