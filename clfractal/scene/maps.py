@@ -43,7 +43,7 @@ class Map(Section):
     """What a value follows from place to place: `by` a quantity, or a picture, the `texture`.
 
     The quantities: `iterations`, the smooth escape count; `normal`, the normal's part along `direction`, -1 to 1; `height`,
-    the place along `direction`, and `distance`, that from `center`, scene units; `curvature`, the mean curvature over `step`,
+    the place along `direction`; `distance`, that from `center`, scene units; `curvature`, the mean curvature over `step`,
     one over scene units, above 0 on hills; `thickness`, `layer_distance` and `trap` as of `coloring`, along the normal.
     """
 
@@ -88,6 +88,26 @@ class Map(Section):
     def used_range(self) -> tuple[float, float]:
         """Quantities at its beginning and end."""
         return self.range if self.range is not None else (-1.0 if self.by == "normal" else 0.0, 1.0)
+
+    @property
+    def told(self) -> str:
+        """What it follows, in words."""
+        return self.texture or f"by {str(self.by).replace('_', ' ')}"
+
+    @property
+    def used_keys(self) -> tuple[str, ...]:
+        """The keys that count for what it follows, and are numbers or words."""
+        if self.texture is not None:
+            return ("texture", "scale", "sharpness")
+        own = {
+            "normal": ("direction",),
+            "height": ("direction",),
+            "distance": ("center",),
+            "curvature": ("step",),
+            "thickness": ("step",),
+            "layer_distance": ("layer", "step"),
+        }
+        return ("by", "range", "repeat", *own.get(str(self.by), ()))
 
     def check(self, high: float, low: float) -> None:
         """Raises a problem if a value of the map may be out of these bounds."""
