@@ -191,6 +191,12 @@ class Scene(Section):
             for name, found in self._read.items()
             if _is_data(name) and _section_of(name) not in (update or ())
         }
+        if "materials" in (update or ()) and "textures" in self._read:
+            from clfractal.scene.textures import texture_files
+
+            # Other values of materials, as of each frame of a film, show the same pictures.
+            if set(texture_files(copied.materials)) <= set(self._read["textures"]):
+                copied._read["textures"] = self._read["textures"]
         return copied
 
     def __getstate__(self) -> dict[Any, Any]:

@@ -19,6 +19,7 @@ from clfractal.files.srgb import decode
 from clfractal.renderers.maps import level_sizes, levels_of
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
+from clfractal.work.prepare import prepare
 from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
 
 Floats = npt.NDArray[np.float64]
@@ -382,3 +383,20 @@ def test_a_scene_with_maps_is_written_and_read(tmp_path: Path, picture: npt.NDAr
     scene = placed(tmp_path, {"luminance": {"texture": "tile.png"}, "color": {"by": "trap", "palette": RAMP}})
     assert clfractal.load_scene(dump_scene(scene), folder=tmp_path) == scene
     assert tmp_path / "tile.png" in scene.files
+
+
+def test_work_on_another_picture_is_other_work(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    """The scene only names its pictures; of a scene that moves they are not read again."""
+    emission = {"luminance": 1, "color": {"texture": "tile.png"}}
+
+    def known_by() -> dict[str, Any]:
+        return prepare(placed(tmp_path, emission), choose(), precision="float32").identity(0)
+
+    before = known_by()
+    assert known_by() == before
+    scene = placed(tmp_path, emission)
+    Image.fromarray(255 - picture).save(tmp_path / "tile.png")
+    after = known_by()
+    assert {key for key in before if before[key] != after[key]} == {"textures"}
+    moved = scene.model_copy(update={"materials": {**scene.materials, "other": {}}})
+    assert moved.textures["tile.png"] is scene.textures["tile.png"]
