@@ -5,40 +5,8 @@
 #include "albedos.h"
 #include "microfacets.h"
 
-// The parameters of a material at a spot, which may differ from lane to lane.
-typedef struct {
-    color base;   // the colour of the body or the metal
-    real base_metalness, base_diffuse_roughness;
-    color specular_color;
-    real specular_weight, specular_roughness, specular_ior;
-    color coat_color;
-    real coat_weight, coat_roughness, coat_ior, coat_darkening;
-    color fuzz_color;
-    real fuzz_weight, fuzz_roughness;
-    color emission;
-} pbr;
-
-// `tint`: the colouring's colour.
-INLINE pbr pbr_of(__constant const struct Pbr *m, color tint) {
-    pbr p;
-    p.base = color_scale(m->base_own ? color_splat(m->base_color) : tint, (real)(m->base_weight));
-    p.base_metalness = (real)(m->base_metalness);
-    p.base_diffuse_roughness = (real)(m->base_diffuse_roughness);
-    p.specular_color = color_splat(m->specular_color);
-    p.specular_weight = (real)(m->specular_weight);
-    p.specular_roughness = (real)(m->specular_roughness);
-    p.specular_ior = (real)(m->specular_ior);
-    p.coat_color = color_splat(m->coat_color);
-    p.coat_weight = (real)(m->coat_weight);
-    p.coat_roughness = (real)(m->coat_roughness);
-    p.coat_ior = (real)(m->coat_ior);
-    p.coat_darkening = (real)(m->coat_darkening);
-    p.fuzz_color = color_splat(m->fuzz_color);
-    p.fuzz_weight = (real)(m->fuzz_weight);
-    p.fuzz_roughness = (real)(m->fuzz_roughness);
-    p.emission = color_splat(m->emission);
-    return p;
-}
+// A material at a spot, `pbr`: generated from clfractal/renderers/materials.py.
+#include "pbr.h"
 
 // Whether any lane has some of it.
 INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }
@@ -77,7 +45,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.out = bsdf_local(&b, to_viewer);
     b.seen = less(R(0.0), b.out.z);
     b.out.z = fmax(b.out.z, R(1e-4));
-    b.metal = b.body = p->base;
+    b.metal = b.body = color_scale(p->base_color, p->base_weight);
     b.metalness = p->base_metalness;
     b.rough_body = p->base_diffuse_roughness;
     b.rough = p->specular_roughness;

@@ -15,7 +15,12 @@
 #include "planes.h"
 #include "stage.h"
 #include "state.h"
+#if ASKED > 0
+#include "asked.h"
+#endif
 #include "eye.h"
+
+#define COLORING_ASKS (COLORING == COLORING_THICKNESS || COLORING == COLORING_LAYER_DISTANCE || COLORING == COLORING_TRAP)
 
 STAGE(color_spots) {
     if (IS_BEYOND) return;
@@ -27,7 +32,16 @@ STAGE(color_spots) {
     path so_far;
     const aim a = aim_kept(s.state, s.stride);
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+#if ASKED > 0
+    for (int i = 0; i < ASKED; ++i) {
+        // After the scene's own record.
+        const real answer = asked_quantity(&here, found, material + 1 + i, orbit, k);
+        numbers_keep(&answer, 1, s.state + STATE_ASKED(i) * s.stride, s.stride);
+    }
+#endif
+#if COLORING_ASKS
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);
     spot_keep(&here, s.state, bounce, s.stride);
+#endif
 }

@@ -161,8 +161,8 @@ STAGE(scatter_paths) {
 #if !COLORING_PER_POINT
         found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
 #endif
-        const pbr p = pbr_at(&found, w);
-        so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(p.emission, so_far.through)), so_far.seen);
+        const pbr p = pbr_at(s, &found, w);
+        so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(color_scale(p.emission_color, p.emission_luminance), so_far.through)), so_far.seen);
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
         so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), found.normal);
         with.total = weight_of_all(so_far.origin, w);

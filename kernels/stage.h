@@ -16,8 +16,10 @@ typedef struct {
     plane_set planes;
     __constant const struct Pbr *materials;
     __global const float *albedos;
+    __global const struct Map *maps;
+    __global const float *tables;
 } world;
-#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos}
+#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, maps, tables}
 
 // A work-item's packet.
 typedef struct {

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import png
 import pytest
+from PIL import Image
 
 import clfractal
 from clfractal.commands import vary
@@ -200,3 +201,12 @@ def test_files_that_the_scene_names_stay_reachable(clf: InProcess) -> None:
     assert read_environment("maps/sky.exr") is not None
     ended = clf("vary", "maps/scene.yaml", *SMALL, "-o", "elsewhere")
     assert ended.is_one_line(2, "maps/scene.yaml: uses 'sky.exr', which must")
+
+
+def test_textures_stay_reachable(clf: InProcess) -> None:
+    Path("maps").mkdir()
+    Image.new("RGB", (4, 4), (200, 100, 50)).save("maps/oak.png")
+    oak = "materials: {oak: {base: {color: {texture: oak.png}}}}\n"
+    Path("maps/scene.yaml").write_text(SCENE + oak)
+    assert clf("vary", "maps/scene.yaml", *SMALL, "--quiet").status == 0
+    assert list(load_scene(Path("scene-01.yaml")).textures) == ["maps/oak.png"]

@@ -21,6 +21,7 @@ from clfractal.files.document import write_document
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.scene.textures import rename_textures
 from clfractal.work.variations import (
     KINDS,
     PREVIEW_SIZE,
@@ -240,6 +241,7 @@ class _Moved:
                 section = part.get(name) or {}
                 if section.get("file") is not None:
                     section["file"] = self._from_there(section["file"])
+        rename_textures(data.get("materials") or {}, self._from_there)
 
     def _from_there(self, file: str) -> str:
         whole = (self.base / file).resolve()

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from clfractal.device.orbit import Record
-from clfractal.device.structs import Field, Precision, Struct
+from clfractal.device.structs import Field, Struct
 from clfractal.renderers.scattering import (
     COSINES,
     REFLECTANCES,
@@ -11,6 +10,7 @@ from clfractal.renderers.scattering import (
     SMOOTHEST_FUZZ_PARTS,
     SMOOTHEST_PARTS,
 )
+from clfractal.scene.maps import Map
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Material
@@ -35,9 +35,52 @@ PBR = Struct(
         Field("fuzz_weight", "real", 0, "0 to 1"),
         Field("fuzz_color", "real", 3, "linear Rec. 709"),
         Field("fuzz_roughness", "real", 0, "SMOOTHEST_FUZZ to 1"),
-        Field("emission", "real", 3, "radiance, linear Rec. 709"),
+        Field(
+            "emission_luminance",
+            "real",
+            0,
+            "factor on the colour, where that differs from place to place; else 1",
+        ),
+        Field("emission_color", "real", 3, "radiance, linear Rec. 709"),
+        Field("first_map", "int", 0, "of the parameters that differ from place to place"),
+        Field("map_count", "int", 0, ""),
+        Field(
+            "blend",
+            "int",
+            2,
+            "the numbers of the materials that this one is made of; -1: it has layers of its own",
+        ),
+        Field("mask", "int", 0, "the map of the second one's share"),
     ],
 )
+PARAMETERS = tuple(field for field in PBR.fields if field.type == "real")
+"""What a material has in each lane, in the order of its numbers there."""
+
+
+def parameter_numbers() -> dict[str, tuple[int, int]]:
+    """Of each parameter by its name in `PBR` the place of its first number in a lane's material, and how many it has."""
+    found, place = {}, 0
+    for field in PARAMETERS:
+        found[field.name] = (place, max(field.count, 1))
+        place += max(field.count, 1)
+    return found
+
+
+def pbr_text() -> str:
+    """The type of a lane's material, and how one begins as a record: the same everywhere (`kernels/bsdf.h`)."""
+    kinds = {0: "real", 3: "color"}
+    lines = [
+        "// The parameters of a material at a spot, which may differ from lane to lane.",
+        "typedef struct {",
+    ]
+    lines += [f"    {kinds[field.count]} {field.name};" for field in PARAMETERS]
+    lines += ["} pbr;", "// `tint`: the colouring's colour."]
+    lines += ["INLINE pbr pbr_of(__constant const struct Pbr *m, color tint) {", "    pbr p;"]
+    for field in PARAMETERS:
+        read = f"color_splat(m->{field.name})" if field.count else f"(real)(m->{field.name})"
+        own = f"m->base_own ? {read} : tint" if field.name == "base_color" else read
+        lines.append(f"    p.{field.name} = {own};")
+    return "\n".join([*lines, "    return p;", "}", ""])
 
 
 def scattering_defines() -> dict[str, object]:
@@ -69,32 +112,23 @@ def used_material(scene: Scene) -> PbrMaterial:
     return scene.materials[name] if name is not None else of_phong(scene.material)
 
 
-def material_records(scene: Scene, precision: Precision) -> Record:
-    """The materials, one record each."""
-    return PBR.array(precision, [material_values(used_material(scene))])
-
-
 def material_values(material: PbrMaterial) -> dict[str, object]:
     """The fields of a record."""
-    base, specular, coat, fuzz = material.base, material.specular, material.coat, material.fuzz
-    shine = material.emission
-    return {
-        "base_weight": base.weight,
-        "base_color": base.color if base.color is not None else (0.0, 0.0, 0.0),
-        "base_own": int(base.color is not None),
-        "base_metalness": base.metalness,
-        "base_diffuse_roughness": base.diffuse_roughness,
-        "specular_weight": specular.weight,
-        "specular_color": specular.color,
-        "specular_roughness": specular.roughness,
-        "specular_ior": specular.ior,
-        "coat_weight": coat.weight,
-        "coat_color": coat.color,
-        "coat_roughness": coat.roughness,
-        "coat_ior": coat.ior,
-        "coat_darkening": coat.darkening,
-        "fuzz_weight": fuzz.weight,
-        "fuzz_color": fuzz.color,
-        "fuzz_roughness": fuzz.roughness,
-        "emission": tuple(shine.luminance * part for part in shine.color),
-    }
+    values: dict[str, object] = {}
+    for part in ("base", "specular", "coat", "fuzz"):
+        section = getattr(material, part)
+        for name in type(section).model_fields:
+            values[f"{part}_{name}"] = getattr(section, name)
+    values["base_own"] = int(material.base.color is not None)
+    luminance, color = material.emission.luminance, material.emission.color
+    if isinstance(luminance, Map) or isinstance(color, Map):
+        values |= {"emission_luminance": luminance, "emission_color": color}
+    else:
+        values |= {"emission_luminance": 1.0, "emission_color": tuple(luminance * part for part in color)}
+    values |= {"first_map": 0, "map_count": 0, "blend": (-1, -1), "mask": -1}
+    # What differs from place to place is put in where it is known.
+    sizes = {field.name: field.count for field in PARAMETERS}
+    for name, value in values.items():
+        if value is None or isinstance(value, Map):
+            values[name] = (0.0,) * sizes[name] if sizes[name] else 0.0
+    return values

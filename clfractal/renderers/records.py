@@ -13,10 +13,12 @@ from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
+from clfractal.renderers.maps import MAP, asked_maps
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
 from clfractal.scene.base import unit
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import (
     Light,
@@ -27,6 +29,7 @@ from clfractal.scene.lighting import (
     SphereLight,
     SpotLight,
 )
+from clfractal.scene.maps import QUANTITIES, Map
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient
 
@@ -144,6 +147,10 @@ MATERIAL = Struct(
         Field("trap_center", "real", 3, "a point of the trap, in z"),
         Field("trap_direction", "real", 3, "its axis' or normal's direction, length 1"),
         Field("trap_radius", "real", 0, "a sphere's radius, in z"),
+        Field(
+            "asks", "int", 0, "of a record behind the scene's own: what a material's map asks the formula for"
+        ),
+        Field("trap_shape", "int", 0, "likewise, one of TRAPS"),
         Field("reflection", "real", 0, "part that is mirrored sharply"),
         Field("fog_color", "real", 3, "linear Rec. 709"),
         Field("fog_density", "real", 0, "per scene unit"),
@@ -166,8 +173,9 @@ MATERIAL = Struct(
     ],
 )
 
-STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR)
+STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR, MAP)
 
+TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
 LIGHT_DEFINES = {f"LIGHT_{kind.upper()}": number for kind, number in LIGHT_KINDS.items()}
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
@@ -385,7 +393,7 @@ def light_records(scene: Scene, precision: Precision) -> Record:
 def material_record(
     scene: Scene, precision: Precision, environment: PackedEnvironment | None = None
 ) -> Record:
-    """Material, colouring, background, and how the packed environment is laid out."""
+    """Material, colouring, background, and the packed environment's layout; behind it what maps ask the formula."""
     material, background, fog = scene.material, scene.background, scene.fog
     gradient = background if isinstance(background, Gradient) else None
     shafts = fog.scattering if fog else None
@@ -399,7 +407,8 @@ def material_record(
         "background_bottom": gradient.bottom if gradient else (0.0, 0.0, 0.0),
         "palette_scale": scene.coloring.scale,
         "palette_offset": scene.coloring.offset,
-        **_way_and_trap(scene),
+        "palette_repeat": int(scene.coloring.repeat),
+        **_way_and_trap(scene, scene.coloring),
         "reflection": material.reflection,
         "fog_color": fog.color if fog else (0.0, 0.0, 0.0),
         "fog_density": fog.density if fog else 0.0,
@@ -413,16 +422,16 @@ def material_record(
         "transparent": int(gradient is None),
         **material_fields(scene.environment, environment),
     }
-    return MATERIAL.value(precision, values)
+    asked = [{**values, **_way_and_trap(scene, each)} for each in asked_maps(scene)]
+    return MATERIAL.array(precision, [values, *asked])
 
 
-def _way_and_trap(scene: Scene) -> dict[str, object]:
+def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
     """The fields of a Material for `kernels/coloring.h`."""
-    coloring, radius = scene.coloring, scene.bounds[1]
+    radius = scene.bounds[1]
     step = coloring.step if coloring.step is not None else radius / 100
     direction = np.array(coloring.trap.direction, float)
     return {
-        "palette_repeat": int(coloring.repeat),
         "coloring_step": step,
         "coloring_limit": 2 * radius,
         "coloring_tests": math.ceil(2 * radius / step) + EXTRA_TESTS,
@@ -430,4 +439,6 @@ def _way_and_trap(scene: Scene) -> dict[str, object]:
         "trap_center": coloring.trap.center,
         "trap_direction": direction / np.linalg.norm(direction),
         "trap_radius": coloring.trap.radius,
+        "asks": QUANTITIES.index(coloring.by) if isinstance(coloring, Map) and coloring.by is not None else 0,
+        "trap_shape": TRAPS[coloring.trap.shape],
     }

@@ -20,7 +20,8 @@ from clfractal.renderers.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.renderers.materials import PBR, material_records, scattering_defines
+from clfractal.renderers.maps import MAP, MappedMaterials, asked_maps, map_defines, mapped_materials
+from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
@@ -53,7 +54,6 @@ COLORINGS = {
     )
 }
 ALONG = {"view": 0, "normal": 1, "reflection": 2}
-TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
@@ -134,6 +134,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "PLANES": plane_count(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
+        **map_defines(scene),
     }
 
 
@@ -146,7 +147,7 @@ def normal_count(scene: Scene) -> int:
 
 def state_numbers(scene: Scene) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    return STATE_NUMBERS + 4 * normal_count(scene)
+    return STATE_NUMBERS + 4 * normal_count(scene) + len(asked_maps(scene))
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
@@ -154,7 +155,7 @@ def coloring_defines(coloring: Coloring) -> dict[str, object]:
     families = (
         ("COLORING", COLORINGS, coloring.by),
         ("ALONG", ALONG, coloring.along),
-        ("TRAP", TRAPS, coloring.trap.shape),
+        ("TRAP", records.TRAPS, coloring.trap.shape),
     )
     result: dict[str, object] = {}
     for family, numbers, chosen in families:
@@ -214,8 +215,17 @@ class SurfaceKernel(TileKernel):
 
     def _materials(self) -> list[KernelArgument]:
         if not isinstance(self.scene.lighting, PathLighting):
-            return [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32)]
-        return [material_records(self.scene, self.precision), albedo_tables()]
+            none = [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32)]
+            return [*none, *self._no_maps()]
+        found = mapped_materials(self.scene)
+        records_of = MappedMaterials(self.scene).records(self.precision)
+        if found is None:
+            return [records_of, albedo_tables(), *self._no_maps()]
+        tables = self.resources.kept.once(f"maps {found.key}", found.tables)
+        return [records_of, albedo_tables(), found.map_records(self.precision), tables]
+
+    def _no_maps(self) -> list[KernelArgument]:
+        return [np.zeros(1, MAP.dtype(self.precision)), np.zeros(4, np.float32)]
 
     def _palette(self) -> Floats:
         coloring = self.scene.coloring
@@ -241,7 +251,11 @@ def light_kernels(scene: Scene) -> tuple[str, ...]:
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     """The texts of the scene's programs: those that know the formula, and the one that knows the scene's features."""
     formula = write_formula(scene.chain)
-    generated = {"formula.h": formula.text, "structs.h": records.struct_text() + CUT_PLANE.c_text()}
+    generated = {
+        "formula.h": formula.text,
+        "structs.h": records.struct_text() + CUT_PLANE.c_text(),
+        "pbr.h": pbr_text(),
+    }
 
     def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
         return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
@@ -260,7 +274,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             *light_kernels(scene),
         ),
     ]
-    if asks_formula(scene.coloring):
+    if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
     if scene.cut_planes:

@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.renderers.kernel import Stage
+from clfractal.renderers.maps import asked_maps
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
-from clfractal.scene.coloring import Coloring
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -46,9 +46,9 @@ def rays_group(lanes: int) -> tuple[int, ...]:
     return (_LANE_GROUP if lanes == 1 else 1,)
 
 
-def asks_formula(coloring: Coloring) -> bool:
-    """Whether the quantity that chooses colours is found by asking the formula."""
-    return coloring.by in ("thickness", "layer_distance", "trap")
+def asks_formula(scene: Scene) -> bool:
+    """Whether a quantity that chooses colours, or a material's, is found by asking the formula."""
+    return scene.coloring.by in ("thickness", "layer_distance", "trap") or bool(asked_maps(scene))
 
 
 def has_cones(scene: Scene, plan: Plan) -> bool:
@@ -113,7 +113,7 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
-        if asks_formula(scene.coloring):
+        if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)
         if scene.cut_planes and bounce == 0:
             yield stage("find_planes")

@@ -182,6 +182,10 @@ def check_lighting(scene: Scene) -> None:
         if not scene.materials:
             raise SceneError(f"names {name!r}, but the scene has no materials", Where(path="material.name"))
         raise SceneError(unknown_name("material", name, tuple(scene.materials)), Where(path="material.name"))
+    if any(material.blend is not None for material in scene.materials.values()):
+        from clfractal.scene.blends import check_blends
+
+        check_blends(scene.materials)
     if not isinstance(scene.lighting, PathLighting):
         return
     renderer = scene.renderer

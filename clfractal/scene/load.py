@@ -24,6 +24,7 @@ from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
+from clfractal.scene.maps import ColorMap, maps_of
 from clfractal.scene.model import Scene
 
 
@@ -230,6 +231,7 @@ def _check_names(scene: Scene) -> None:
         if scene.environment.file is not None:
             _ = scene.surroundings
     _ = scene.given
+    _ = scene.textures
 
 
 def _check_views(scene: Scene) -> None:
@@ -251,6 +253,12 @@ def _check_palettes(scene: Scene) -> None:
         used.append(("renderer.colors.palette", scene.renderer.colors.palette))
     for index, plane in enumerate(scene.cut_planes):
         used.append((f"cut_planes.{index}.colors.palette", plane.colors.palette))
+    for name, material in scene.materials.items():
+        used += [
+            (f"materials.{name}.{key}.palette", each.palette)
+            for key, each in maps_of(material)
+            if isinstance(each, ColorMap)
+        ]
     if used:
         from clfractal.scene.palette import check_palette
 

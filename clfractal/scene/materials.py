@@ -1,69 +1,83 @@
 """Materials by OpenPBR's names: https://academysoftwarefoundation.github.io/OpenPBR, version 1.1."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, Tag, model_validator
 
-from clfractal.scene.base import Amount, Color, Fraction, Reflectance, Section, problem
+from clfractal.scene.base import Color, problem
+from clfractal.scene.maps import FORM, AmountMap, ColorMap, FractionMap, Mapped, NumberMap, ReflectanceMap
 
 Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]
+IorMap = Annotated[Annotated[Ior, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
+Stand = Annotated[float, Field(strict=True, ge=0.25, le=1, allow_inf_nan=False)]
+StandMap = Annotated[Annotated[Stand, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
+ShineMap = Annotated[Annotated[Color, Tag("given")] | Annotated[ColorMap, Tag("map")], FORM]
 WHITE = (1.0, 1.0, 1.0)
 
 
-class Base(Section):
+class Base(Mapped):
     """The body of a material: diffuse, or a metal."""
 
-    weight: Fraction = Field(1.0, description="factor on the colour")
-    color: Reflectance | None = Field(
+    weight: FractionMap = Field(1.0, description="factor on the colour")
+    color: ReflectanceMap | None = Field(
         None, description="linear Rec. 709; null: the colouring's, or `material.color`"
     )
-    metalness: Fraction = Field(0.0, description="0: a dielectric, 1: a metal")
-    diffuse_roughness: Fraction = Field(0.0, description="of the diffuse body; 0: Lambert's")
+    metalness: FractionMap = Field(0.0, description="0: a dielectric, 1: a metal")
+    diffuse_roughness: FractionMap = Field(0.0, description="of the diffuse body; 0: Lambert's")
 
 
-class Specular(Section):
+class Specular(Mapped):
     """What the body's boundary mirrors."""
 
-    weight: Fraction = Field(1.0, description="factor on the reflectance of a dielectric, straight on")
-    color: Reflectance = Field(WHITE, description="a dielectric's tint; a metal's at its edges")
-    roughness: Fraction = Field(0.3, description="0: a mirror, 1: no highlight")
-    ior: Ior = Field(1.5, description="index of refraction of a dielectric")
+    weight: FractionMap = Field(1.0, description="factor on the reflectance of a dielectric, straight on")
+    color: ReflectanceMap = Field(WHITE, description="a dielectric's tint; a metal's at its edges")
+    roughness: FractionMap = Field(0.3, description="0: a mirror, 1: no highlight")
+    ior: IorMap = Field(1.5, description="index of refraction of a dielectric")
 
 
-class Coat(Section):
+class Coat(Mapped):
     """A clear layer over the body."""
 
-    weight: Fraction = Field(0.0, description="part of the surface that has it")
-    color: Reflectance = Field(WHITE, description="what passes through it, there and back")
-    roughness: Fraction = Field(0.0, description="of its highlight")
-    ior: Ior = Field(1.6, description="index of refraction")
-    darkening: Fraction = Field(
+    weight: FractionMap = Field(0.0, description="part of the surface that has it")
+    color: ReflectanceMap = Field(WHITE, description="what passes through it, there and back")
+    roughness: FractionMap = Field(0.0, description="of its highlight")
+    ior: IorMap = Field(1.6, description="index of refraction")
+    darkening: FractionMap = Field(
         1.0, description="how much the body is darkened by light that the coat throws back to it"
     )
 
 
-class Fuzz(Section):
+class Fuzz(Mapped):
     """Short fibres over everything: dust, velvet."""
 
-    weight: Fraction = Field(0.0, description="how dense they are")
-    color: Reflectance = Field(WHITE, description="linear Rec. 709")
-    roughness: Annotated[float, Field(strict=True, ge=0.25, le=1, allow_inf_nan=False)] = Field(
+    weight: FractionMap = Field(0.0, description="how dense they are")
+    color: ReflectanceMap = Field(WHITE, description="linear Rec. 709")
+    roughness: StandMap = Field(
         0.5, description="how far they stand apart: the larger, the less light gathers at the rim"
     )
 
 
-class Emission(Section):
+class Emission(Mapped):
     """Light of the material's own."""
 
-    luminance: Amount = Field(0.0, description="radiance, as of `background`")
-    color: Color = Field(WHITE, description="factor on the luminance, linear Rec. 709")
+    luminance: AmountMap = Field(0.0, description="radiance, as of `background`")
+    color: ShineMap = Field(WHITE, description="factor on the luminance, linear Rec. 709")
 
 
 MAX_MATERIALS, MAX_NAME = 64, 100
 
 
-class PbrMaterial(Section):
-    """A material by OpenPBR's layers, for `lighting: {mode: path}`."""
+def _fitting(name: str) -> str:
+    if not name.isprintable() or name.isspace() or "." in name:
+        raise problem("a material's name must be printable text on one line, without a dot")
+    return name
+
+
+MaterialName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME), AfterValidator(_fitting)]
+
+
+class PbrMaterial(Mapped):
+    """A material by OpenPBR's layers, for `lighting: {mode: path}`; or a blend of two others."""
 
     base: Base = Field(default_factory=dict, validate_default=True, description="the body")
     specular: Specular = Field(
@@ -76,13 +90,25 @@ class PbrMaterial(Section):
     emission: Emission = Field(
         default_factory=dict, validate_default=True, description="light of the material's own"
     )
+    blend: Annotated[tuple[MaterialName, ...], Field(strict=False, min_length=2, max_length=2)] | None = (
+        Field(
+            None,
+            description="names of two materials that this one is made of; it has no layers of its own then",
+        )
+    )
+    mask: FractionMap = Field(0.5, description="of a blend: 0 is the first one, 1 the second")
+
+    @model_validator(mode="after")
+    def _layers_or_blend(self) -> Self:
+        if self.blend is None:
+            if self.mask != 0.5:
+                raise problem("applies to a blend of two materials", "mask")
+            return self
+        for name in ("base", "specular", "coat", "fuzz", "emission"):
+            given = getattr(self, name)
+            if given != type(given)():
+                raise problem("cannot be combined with blend: a blend takes its layers from others", name)
+        return self
 
 
-def _fitting(name: str) -> str:
-    if not name.isprintable() or name.isspace() or "." in name:
-        raise problem("a material's name must be printable text on one line, without a dot")
-    return name
-
-
-MaterialName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME), AfterValidator(_fitting)]
 Materials = Annotated[dict[MaterialName, PbrMaterial], Field(max_length=MAX_MATERIALS)]

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
     from clfractal.scene.environment import EnvironmentMap
     from clfractal.scene.given import GivenGrid
+    from clfractal.scene.textures import Texture
 
 
 T = TypeVar("T")
@@ -42,6 +43,7 @@ _SECTIONS = {
     "chain": "formula",
     "surroundings": "environment",
     "given": "renderer",
+    "textures": "materials",
 }
 
 
@@ -189,6 +191,12 @@ class Scene(Section):
             for name, found in self._read.items()
             if _is_data(name) and _section_of(name) not in (update or ())
         }
+        if "materials" in (update or ()) and "textures" in self._read:
+            from clfractal.scene.textures import texture_files
+
+            # Other values of materials, as of each frame of a film, show the same pictures.
+            if set(texture_files(copied.materials)) <= set(self._read["textures"]):
+                copied._read["textures"] = self._read["textures"]
         return copied
 
     def __getstate__(self) -> dict[Any, Any]:
@@ -241,6 +249,19 @@ class Scene(Section):
         from clfractal.scene.environment import read_map
 
         return self.once("surroundings", lambda: read_map(environment, self.folder))
+
+    @property
+    def textures(self) -> "Mapping[str, Texture]":
+        """The pictures that materials show, by the names of their files; in a loaded scene they have been read and checked.
+
+        Raises:
+            FileError: a file is missing or no picture; the path says where it is named.
+        """
+        if not self.materials:
+            return {}
+        from clfractal.scene.textures import read_textures
+
+        return self.once("textures", lambda: read_textures(self.materials, self.folder))
 
     @property
     def given(self) -> "GivenGrid | None":

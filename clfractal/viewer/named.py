@@ -19,6 +19,7 @@ from clfractal.formulas.catalog import safe_path
 from clfractal.scene.layout import LayoutView
 from clfractal.scene.lighting import Environment
 from clfractal.scene.model import Scene
+from clfractal.scene.textures import texture_files, with_textures
 from clfractal.scene.volume import VolumeRenderer
 
 _DEEPEST = 3
@@ -39,7 +40,7 @@ def formula_files(formula: Any, folder: Path, *, depth: int = 0) -> list[str]:
 
 
 def data_files(scene: Scene) -> list[str]:
-    """Names of the maps and grids of a scene and its views, relative to the scene's folder."""
+    """Names of the maps, grids and textures of a scene and its views, relative to the scene's folder."""
     parts: list[Scene | LayoutView] = [scene, *(scene.layout.views if scene.layout is not None else ())]
     found = []
     for part in parts:
@@ -47,12 +48,15 @@ def data_files(scene: Scene) -> list[str]:
             found.append(part.environment.file)
         if isinstance(part.renderer, VolumeRenderer) and part.renderer.file is not None:
             found.append(part.renderer.file)
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys([*found, *texture_files(scene.materials)]))
 
 
 def renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
-    """The scene with other names of its maps and grids."""
+    """The scene with other names of its maps, grids and textures."""
     changes = _renamed_parts(scene, names)
+    materials = with_textures(scene.materials, names)
+    if materials != scene.materials:
+        changes["materials"] = materials
     if scene.layout is not None:
         views = tuple(
             view.model_copy(update=parts) if (parts := _renamed_parts(view, names)) else view

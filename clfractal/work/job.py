@@ -241,12 +241,15 @@ class Job:
         if self.scene.layout is not None:
             found["view"] = view.number
         surroundings, given = view.scene.surroundings, view.scene.given
+        textures = {file: texture.digest for file, texture in view.scene.textures.items()}
         return {
             **found,
             "scene": scene,
             # The scene only names its map and its grid, and these files may have changed.
             "environment": surroundings.digest if surroundings is not None else None,
             "grid": given.digest if given is not None else None,
+            # Only where there are some: work in progress of older versions stays valid.
+            **({"textures": textures} if textures else {}),
             "version": clfractal.__version__,
             "device": self.device.name,
             "driver": self.device.key,

@@ -14,7 +14,7 @@ from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
-from clfractal.renderers.materials import PBR, material_values, scattering_defines
+from clfractal.renderers.materials import PBR, material_values, pbr_text, scattering_defines
 from clfractal.renderers.scattering import albedo_tables
 from clfractal.scene.materials import PbrMaterial
 
@@ -86,7 +86,8 @@ def _program(device: Device, precision: Precision, lanes: int) -> Any:
         "PALETTE_SIZE": 256,
         **scattering_defines(),
     }
-    generated = {"scatter.cl": _TEXT + LOADS + _SCATTER, "structs.h": PBR.c_text()}
+    text = _TEXT + LOADS + _SCATTER
+    generated = {"scatter.cl": text, "structs.h": PBR.c_text(), "pbr.h": pbr_text()}
     flat = flatten("scatter.cl", generated=generated, defines=defines)
     return compiler.compile_source(device, flat.text, program.math_flags(precision))
 

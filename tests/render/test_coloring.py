@@ -17,8 +17,8 @@ from clfractal.formulas import reference
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.records import LIGHT_DEFINES
-from clfractal.renderers.surface import TRAPS, coloring_defines
+from clfractal.renderers.records import LIGHT_DEFINES, TRAPS
+from clfractal.renderers.surface import coloring_defines
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of
 from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, PERSPECTIVE, SOLIDS, scene_of

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from PIL import Image
 
 from clfractal.device.select import Device
 from clfractal.files.exr import write_exr
@@ -62,9 +63,23 @@ def of_a_file(folder: Path) -> Scene:
     return scene_of(folder, renderer={"type": "volume", "file": "ball.nrrd", "transfer": fog})
 
 
+def with_a_texture(folder: Path) -> Scene:
+    codes = np.random.default_rng(5).integers(0, 256, (5, 8, 3), dtype=np.uint8)
+    Image.fromarray(codes).save(folder / "tile.png")
+    oak = {"base": {"color": {"texture": "tile.png"}, "weight": {"by": "trap"}}}
+    both = {"blend": ["oak", "clay"], "mask": {"by": "normal"}}
+    return scene_of(
+        folder,
+        lighting={"mode": "path", "bounces": 1},
+        materials={"oak": oak, "clay": {}, "both": both},
+        material={"name": "both"},
+    )
+
+
 SCENES: dict[str, Callable[[Path], Scene]] = {
     "surface": lambda folder: scene_of(folder, cut_planes=[{"plane": {"width": 3}, "opacity": 0.5}]),
     "environment": lit_by_a_file,
+    "texture": with_a_texture,
     "volume": of_a_file,
     "cut plane": lambda folder: scene_of(folder, renderer={"type": "cut_plane"}),
     "chain": lambda folder: scene_of(folder, formula={"name": "hast", "iterations": 8}),
@@ -138,7 +153,7 @@ def test_sent_after_it_was_rendered(device: Device, tmp_path: Path) -> None:
     same(rendered(pickle.loads(pickle.dumps(job)), device), expected)
 
 
-@pytest.mark.parametrize("name", ["environment", "volume", "layout"])
+@pytest.mark.parametrize("name", ["environment", "texture", "volume", "layout"])
 def test_another_process_gives_the_same_bits(device: Device, tmp_path: Path, name: str) -> None:
     """In another folder, without the files."""
     source, elsewhere = tmp_path / "source", tmp_path / "elsewhere"

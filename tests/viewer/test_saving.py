@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from clfractal import resources
 from clfractal.errors import FileError
@@ -330,6 +331,28 @@ def test_maps_go_along_also_those_of_views(tmp_path: Path, other: Path) -> None:
         assert old[0].surroundings is not None
         assert new[0].surroundings is not None
         assert old[0].surroundings.digest == new[0].surroundings.digest
+
+
+def test_textures_go_along(tmp_path: Path, other: Path) -> None:
+    (tmp_path / "wood").mkdir()
+    Image.new("RGB", (4, 4), (200, 100, 50)).save(tmp_path / "wood" / "oak.png")
+    Image.new("L", (4, 4), 77).save(tmp_path / "grey.png")
+    (other / "grey.png").write_bytes(b"theirs")
+    text = (
+        "version: 1\nformula: {name: hast}\ncamera: {}\nmaterials:\n  oak:  # old\n    base:\n"
+        "      color: {texture: wood/oak.png, scale: 0.5}\n      weight: {texture: grey.png}  # grey\n"
+    )
+    (tmp_path / "scene.yaml").write_text(text)
+    source = open_source(tmp_path / "scene.yaml")
+    assert source.loaded is not None
+    saved = save_scene(source, source.loaded, other / "copy.yaml")
+    assert saved.text == text.replace("grey.png", "grey-2.png")
+    assert files(other) == ["copy.yaml", "grey-2.png", "grey.png", "wood/oak.png"]
+    again = load_scene(other / "copy.yaml")
+    assert again == saved.loaded
+    assert sorted(again.textures) == ["grey-2.png", "wood/oak.png"]
+    old = [each.digest for each in source.loaded.textures.values()]
+    assert [each.digest for each in again.textures.values()] == old
 
 
 @pytest.mark.parametrize("kind", ["nrrd", "nhdr", "npy"])

@@ -58,6 +58,8 @@ def test_every_field_of_every_section_is_understood() -> None:
         "cut_planes",
         "bookmarks",
         "materials",
+        "blend",
+        "curve",
         "inline",
         "parameters",
         "live",
@@ -375,6 +377,32 @@ def test_light_bounces_at_a_click() -> None:
     assert click(50) == "path"
 
 
+def test_a_material_that_differs_from_place_to_place_is_shown() -> None:
+    """A map stands in the place of its value, with what it follows; other values of the material are edited as ever."""
+    ui, _ = make_ui(SCENE)
+    stage = Stage(ui, material.draw)
+    maps = {
+        "base": {"color": {"by": "trap", "palette": "viridis"}, "weight": {"by": "height", "range": [-1, 1]}},
+        "emission": {"luminance": {"by": "normal", "curve": [[0, 0], [1, 3]]}},
+    }
+    ui.studio.edit({"lighting": {"mode": "path"}, "materials.rock": maps, "material.name": "rock"})
+    stage.frame()
+    found = ui.studio.scene.materials["rock"]
+    assert found.emission.luminance.curve[1] == (1, 3)  # type: ignore[union-attr]
+    assert ui.studio.edit(
+        {"materials.rock.base.weight.range": [-2, 2], "materials.rock.specular.roughness": 0.7}
+    )
+    stage.frame()
+    found = ui.studio.scene.materials["rock"]
+    assert found.base.weight.range == (-2, 2)  # type: ignore[union-attr]
+    assert found.specular.roughness == 0.7
+    ui.studio.edit(
+        {"materials.moss": {}, "materials.both": {"blend": ["rock", "moss"]}, "material.name": "both"}
+    )
+    stage.frame()
+    assert ui.studio.scene.materials["both"].blend == ("rock", "moss")
+
+
 def test_first_values_are_valid() -> None:
     """Whatever may be null gets a value that the schema accepts when it is switched on."""
     for section in metadata.all_sections():
@@ -393,6 +421,8 @@ def test_first_values_are_valid() -> None:
                     "LayoutView",
                     "FormulaSpec",
                     "ChainLink",
+                    "NumberMap",
+                    "ColorMap",
                 )
             ):
                 continue

@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from clfractal.scene.base import Section
+from clfractal.scene.maps import Map
 from clfractal.scene.model import Scene
 
 Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
@@ -76,6 +77,8 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Specular.ior": (1, 3),
     "Coat.ior": (1, 3),
     "Emission.luminance": (0, 4),
+    "Map.layer": (1, 64),
+    "Map.scale": (0.01, 10),
     "Environment.intensity": (0, 4),
     "Environment.rotation": (-180, 180),
     "Environment.rays": (0, 64),
@@ -195,6 +198,8 @@ def _child(holder: Any, name: str) -> Any:
 
 def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
     optional, options = _options(field.annotation)
+    # A material's value is one that is the same everywhere, or a map, which widgets show in its place.
+    options = [each for each in options if not (isinstance(each, type) and issubclass(each, Map))] or options
     bounds = _bounds(field.metadata)
     alternative = _alternative(options)
     if alternative:

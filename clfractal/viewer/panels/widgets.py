@@ -11,6 +11,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from clfractal.scene.maps import Map
 from clfractal.viewer.panels import metadata, theme
 from clfractal.viewer.panels.buttons import button, choose, icon_button, segments, text_box, tip, toggle
 from clfractal.viewer.panels.color_button import color_button
@@ -132,6 +133,8 @@ def section(ui: Ui, path: str, *, skip: Sequence[str] = (), depth: int = 0) -> N
                 section(ui, f"{path}.{name}", depth=depth + 1)
         else:
             field(ui, f"{path}.{name}")
+            if inner is not None and isinstance(inner.value, Map):
+                fields(ui, f"{path}.{name}", inner.value.used_keys)
 
 
 def field(
@@ -178,6 +181,11 @@ def field(
         reset=_reset(ui, path, meta),
     )
     if width is None:
+        return False
+    if isinstance(target.value, Map):
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.vec(theme.TEXT), target.value.told)
+        problem(ui, path)
         return False
     options = {
         "unit": unit,

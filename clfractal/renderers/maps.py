@@ -1,0 +1,233 @@
+"""Materials as paths read them, with what differs from place to place in them (`kernels/maps.h`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.orbit import Record
+from clfractal.device.structs import Field, Precision, Struct
+from clfractal.files.srgb import encode
+from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_material
+from clfractal.scene.base import unit
+from clfractal.scene.blends import Blends, blends_of
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
+from clfractal.scene.model import Scene
+
+MAP = Struct(
+    "Map",
+    [
+        Field("number", "int", 0, "the first number of a lane's material that it sets"),
+        Field("count", "int", 0, "how many it sets: 1, or 3 of a colour"),
+        Field("by", "int", 0, "the quantity, one of MAP_..."),
+        Field("asked", "int", 0, "which of the formula's answers that is"),
+        Field("table", "int", 0, "where its PALETTE_SIZE colours begin"),
+        Field("repeat", "int", 0, "1: the table begins again after its end; 0: its ends go on"),
+        Field("scale", "real", 0, "tables per unit of the quantity"),
+        Field("offset", "real", 0, "place in the table where the quantity is 0"),
+        Field("vector", "real", 3, "a direction of length 1, or a place, scene units"),
+        Field("picture", "int", 0, "where its pixels begin, those of narrower levels behind them"),
+        Field("levels", "int", 0, "of a picture; 0: there is none"),
+        Field("width", "int", 0, "of the picture, pixels"),
+        Field("height", "int", 0, ""),
+        Field("size", "real", 0, "its width, scene units"),
+        Field("sharpness", "real", 0, "exponent of the normal's parts, which blend its three sides"),
+    ],
+)
+MAP_DEFINES = {f"MAP_{name.upper()}": number for number, name in enumerate(QUANTITIES)}
+TABLE = 256
+"""Colours of a table, as of a palette."""
+
+Floats = npt.NDArray[np.float32]
+_GREY = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, item 3.2
+
+
+@dataclass(frozen=True)
+class MappedMaterials:
+    """The materials of a scene's surface, and their maps."""
+
+    scene: Scene
+
+    @cached_property
+    def blends(self) -> Blends:
+        """All materials, in the order of their records."""
+        return blends_of([used_material(self.scene)], self.scene.materials)
+
+    @cached_property
+    def _own(self) -> list[list[tuple[str, Map]]]:
+        """Of each material its parameters that are maps; of a blend, its mask alone, which may be a number."""
+        found: list[list[tuple[str, Map]]] = []
+        for material, parts in zip(self.blends.materials, self.blends.parts, strict=True):
+            if parts is None:
+                found.append([(path.replace(".", "_"), each) for path, each in maps_of(material)])
+                continue
+            mask = material.mask
+            if not isinstance(mask, NumberMap):
+                mask = NumberMap(by="iterations", curve=((0.0, mask), (1.0, mask)))
+            found.append([("mask", mask)])
+        return found
+
+    @property
+    def maps(self) -> list[tuple[str, Map]]:
+        """All maps, in the order of their records, with the parameters that they set."""
+        return [each for own in self._own for each in own]
+
+    @cached_property
+    def asked(self) -> list[Map]:
+        """One map of each quantity for which the formula is asked."""
+        return list({_question(each): each for _, each in self.maps if each.by in ASKED}.values())
+
+    def records(self, precision: Precision) -> Record:
+        """The materials' records."""
+        rows, first = [], 0
+        for material, parts, own in zip(self.blends.materials, self.blends.parts, self._own, strict=True):
+            values = material_values(material)
+            if parts is not None:
+                values |= {"blend": parts, "mask": first}
+            elif own:
+                values |= {"first_map": first, "map_count": len(own)}
+            rows.append(values)
+            first += len(own)
+        return PBR.array(precision, rows)
+
+    def map_records(self, precision: Precision) -> Record:
+        """The maps' records."""
+        numbers = {**parameter_numbers(), "mask": (-1, 1)}
+        questions = [_question(each) for each in self.asked]
+        pictures, place = {}, len(self.maps) * TABLE * 3
+        for key in self._pictures():
+            pictures[key] = place
+            place += sum(width * height * 3 for width, height in self._sizes(key))
+        rows = []
+        for index, (name, each) in enumerate(self.maps):
+            low, high = each.used_range
+            key = (each.texture or "", isinstance(each, ColorMap))
+            sizes = self._sizes(key) if each.texture is not None else [(0, 0)]
+            rows.append(
+                {
+                    "number": numbers[name][0],
+                    "count": numbers[name][1],
+                    "by": QUANTITIES.index(each.by) if each.by is not None else 0,
+                    "asked": questions.index(_question(each)) if each.by in ASKED else 0,
+                    "table": index * TABLE * 3,
+                    "repeat": int(each.repeat),
+                    "scale": 1 / (high - low),
+                    "offset": -low / (high - low),
+                    "vector": each.center if each.by == "distance" else unit(each.direction),
+                    "picture": pictures.get(key, 0),
+                    "levels": len(sizes) if each.texture is not None else 0,
+                    "width": sizes[0][0],
+                    "height": sizes[0][1],
+                    "size": each.scale,
+                    "sharpness": each.sharpness,
+                }
+            )
+        return MAP.array(precision, rows)
+
+    def tables(self) -> Floats:
+        """All tables, then all pictures; one-dimensional."""
+        parts: list[Floats] = [_table(each) for _, each in self.maps]
+        for file, in_color in self._pictures():
+            texture = self.scene.textures[file]
+            pixels = texture.pixels
+            if not in_color:
+                codes = encode(np.clip(pixels.astype(np.float64), 0, None)) if texture.has_codes else pixels
+                pixels = np.repeat((codes @ _GREY)[..., None], 3, axis=-1).astype(np.float32)
+            parts += levels_of(pixels)
+        return np.concatenate([np.asarray(part, np.float32).reshape(-1) for part in parts])
+
+    @property
+    def key(self) -> str:
+        """A text that differs for different tables."""
+        told = [each.model_dump_json() for _, each in self.maps]
+        return " ".join([*told, *(self.scene.textures[file].digest for file, _ in self._pictures())])
+
+    def _pictures(self) -> list[tuple[str, bool]]:
+        """Files, and whether their colours are wanted, or how grey they are."""
+        found = [
+            (each.texture, isinstance(each, ColorMap)) for _, each in self.maps if each.texture is not None
+        ]
+        return list(dict.fromkeys(found))
+
+    def _sizes(self, key: tuple[str, bool]) -> list[tuple[int, int]]:
+        height, width, _ = self.scene.textures[key[0]].pixels.shape
+        return level_sizes(width, height)
+
+
+def mapped_materials(scene: Scene) -> MappedMaterials | None:
+    """The materials of a scene where anything differs from place to place; else None."""
+    if not isinstance(scene.lighting, PathLighting):
+        return None
+    found = MappedMaterials(scene)
+    return found if found.maps else None
+
+
+def map_defines(scene: Scene) -> dict[str, object]:
+    """The defines of programs that may read maps."""
+    found = mapped_materials(scene)
+    if found is None:
+        return {"HAS_MAPS": 0, "ASKED": 0}
+    return {
+        "HAS_MAPS": 1,
+        "ASKED": len(found.asked),
+        "MATERIALS": len(found.blends.materials),
+        **MAP_DEFINES,
+    }
+
+
+def asked_maps(scene: Scene) -> list[Map]:
+    """See `MappedMaterials.asked`."""
+    found = mapped_materials(scene)
+    return found.asked if found is not None else []
+
+
+def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
+    """Widths and heights of a picture and its narrower levels, down to one pixel."""
+    found = [(width, height)]
+    while found[-1] != (1, 1):
+        found.append((max(found[-1][0] // 2, 1), max(found[-1][1] // 2, 1)))
+    return found
+
+
+def levels_of(pixels: Floats) -> list[Floats]:
+    """A picture, shape (height, width, 3), and its narrower levels, each the mean of the one before."""
+    found = [pixels]
+    for width, height in level_sizes(pixels.shape[1], pixels.shape[0])[1:]:
+        found.append(_narrowed(_narrowed(found[-1], height).swapaxes(0, 1), width).swapaxes(0, 1))
+    return found
+
+
+def _narrowed(pixels: Floats, count: int) -> Floats:
+    """Rows of equal height, each the mean of what it covers."""
+    given = pixels.shape[0]
+    if given == count:
+        return pixels
+    if given == 2 * count:
+        return np.asarray(0.5 * (pixels[::2] + pixels[1::2]), np.float32)
+    # An odd number of rows 2 n + 1 becomes n: each covers its two, and parts of the one between.
+    rows = np.arange(count)[:, None, None]
+    first, second, third = pixels[:-2:2], pixels[1:-1:2], pixels[2::2]
+    mixed = (count - rows) * first + count * second + (rows + 1) * third
+    return np.asarray(mixed / (2 * count + 1), np.float32)
+
+
+def _table(each: Map) -> Floats:
+    if isinstance(each, ColorMap):
+        from clfractal.scene.palette import named_table
+
+        return named_table(each.palette)
+    assert isinstance(each, NumberMap)
+    at, values = zip(*each.curve, strict=True)
+    curve = np.interp(np.linspace(0.0, 1.0, TABLE), at, values)
+    return np.repeat(curve[:, None], 3, axis=1).astype(np.float32)
+
+
+def _question(each: Map) -> tuple[object, ...]:
+    """What the formula is asked for a map."""
+    if each.by == "trap":
+        return (each.by, each.trap.model_dump_json())
+    return (each.by, each.step, each.layer if each.by == "layer_distance" else 0)

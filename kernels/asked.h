@@ -1,0 +1,32 @@
+// Quantities of a material's maps for which the formula is asked. `m` is one of the records behind the scene's own Material, with what
+// is asked in the fields of its colouring.
+
+// The mean curvature, half the divergence of the normals, above 0 where the set bulges: by differences over `coloring_step`, on the
+// surface of equal distance that lies so far above it, since below it there may be no gradient. A sphere's is then corrected exactly.
+INLINE real mean_curvature(vec point, vec normal, mask active, __constant const struct Material *m, __constant const struct Orbit *orbit,
+                           __constant const scalar *k) {
+    const real step = (real)(m->coloring_step);
+    const vec above = vec_along(point, step, normal);
+    vec side, up;
+    make_frame(normal, &side, &up);
+    real sum = R(0.0);
+    for (int i = 0; i < TURNS(4); ++i) {
+        const vec way = vec_scale(i < 2 ? side : up, i & 1 ? R(-0.5) : R(0.5));
+        surface_point found;
+        const clearance there = orbit_dual_distance(vec_along(above, step, way), active, orbit, k, &found);
+        const vec gradient = vec_normalize(found.gradient);
+        // Where there is none, as it is in the middle.
+        const mask flat = less(vec_dot(gradient, gradient), R(0.5)) | there.end.inside;
+        sum += pick(flat, R(0.0), R(2.0) * vec_dot(vec_sub(gradient, normal), way) / step);
+    }
+    const real mean = R(0.5) * sum;
+    return mean / fmax(R(1.0) - mean * step, R(0.1));
+}
+
+INLINE real asked_quantity(const spot *here, mask active, __constant const struct Material *m, __constant const struct Orbit *orbit,
+                           __constant const scalar *k) {
+    if (m->asks == MAP_CURVATURE) return mean_curvature(here->point, here->normal, active, m, orbit, k);
+    if (m->asks == MAP_THICKNESS) return set_thickness(here->point, vec_scale(here->normal, R(-1.0)), here->cone, active, m, orbit, k);
+    if (m->asks == MAP_LAYER_DISTANCE) return layer_distance(here->point, here->normal, active, m, orbit, k);
+    return orbit_trap(m->trap_shape, here->point, active, m, orbit, k);
+}

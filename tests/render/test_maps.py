@@ -1,0 +1,402 @@
+"""Materials that differ from place to place, against the same curves, palettes and pictures in NumPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import yaml
+from PIL import Image
+
+import clfractal
+from clfractal.device.select import choose, has_float64
+from clfractal.device.tune import accepted_lanes
+from clfractal.errors import ClfractalError
+from clfractal.files.srgb import decode
+from clfractal.renderers.maps import level_sizes, levels_of
+from clfractal.scene.load import dump_scene
+from clfractal.scene.model import Scene
+from clfractal.work.prepare import prepare
+from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
+
+Floats = npt.NDArray[np.float64]
+
+DARK: dict[str, Any] = {"base": {"weight": 0}, "specular": {"weight": 0}}
+RAMP = [[0.1, 0.5, 0.9], [0.7, 0.2, 0.3], [0.2, 0.8, 0.4]]
+
+
+def shining(emission: dict[str, Any], **sections: Any) -> Scene:
+    """A ball that only shines: one sample of a pixel is its emission at one spot.
+
+    With this little detail light is computed where the ray has met the ball, which the channel P tells.
+    """
+    return scene_of(
+        **{
+            "lighting": path(),
+            "materials": {"m": {**DARK, "emission": emission}},
+            "material": {"name": "m"},
+            "renderer": {"detail": 0.01},
+            **sections,
+        }
+    )
+
+
+def shown(scene: Scene, **options: Any) -> tuple[Floats, dict[str, Floats]]:
+    """Colours, shape (n, 3), of the pixels that see the set; what else their only samples have found there."""
+    one = scene.model_copy(
+        update={"renderer": {"samples": 1, **(scene.renderer.model_dump(exclude_unset=True))}}
+    )
+    names = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations")
+    film = clfractal.render(one, channels=names, **options)
+    found = {name: np.asarray(film[name], np.float64) for name in names}
+    whole = found["A"] == 1
+    assert whole.sum() > 300
+    facts = {
+        "normal": np.stack([found[f"N.{axis}"][whole] for axis in "XYZ"], axis=-1),
+        "point": np.stack([found[f"P.{axis}"][whole] for axis in "XYZ"], axis=-1),
+        "iterations": found["iterations"][whole],
+    }
+    return np.stack([found[name][whole] for name in "RGB"], axis=-1), facts
+
+
+def ramp(place: Floats, stops: list[list[float]]) -> Floats:
+    at = np.linspace(0, 1, len(stops))
+    return np.stack([np.interp(place, at, [stop[i] for stop in stops]) for i in range(3)], axis=-1)
+
+
+def quantity(by: str, facts: dict[str, Floats], vector: list[float]) -> Floats:
+    given = np.array(vector)
+    if by == "normal":
+        return np.asarray(facts["normal"] @ (given / np.linalg.norm(given)))
+    if by == "height":
+        return np.asarray(facts["point"] @ (given / np.linalg.norm(given)))
+    if by == "distance":
+        return np.asarray(np.linalg.norm(facts["point"] - given, axis=-1))
+    return facts["iterations"]
+
+
+BY: dict[str, dict[str, Any]] = {
+    "normal": {"direction": [1, 0, 2], "range": [-0.5, 1]},
+    "height": {"direction": [0, 1, -3], "range": [1, -1]},
+    "distance": {"center": [0.4, -1, 0.3], "range": [0.3, 1.4]},
+}
+BULB: dict[str, Any] = {
+    "formula": {"name": "mandelbulb", "iterations": 7},
+    "camera": {"position": [1.3, -2.6, 0.5], "fov": 50},
+}
+
+
+@pytest.mark.parametrize("by", BY)
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_colors_follow_quantities(by: str, precision: str) -> None:
+    if precision == "float64" and not has_float64(choose().info):
+        pytest.skip("the device has no float64")
+    colors, facts = shown(
+        shining({"luminance": 1, "color": {"by": by, "palette": RAMP, **BY[by]}}), precision=precision
+    )
+    low, high = BY[by]["range"]
+    vector = BY[by].get("direction") or BY[by]["center"]
+    place = (quantity(by, facts, vector) - low) / (high - low)
+    assert place.min() < 0.15
+    assert place.max() > 0.8
+    assert np.abs(colors - ramp(np.clip(place, 0, 1), RAMP)).max() < 0.005
+
+
+def test_iterations_of_a_fractal() -> None:
+    scene = shining({"luminance": 1, "color": {"by": "iterations", "range": [2, 5], "palette": RAMP}}, **BULB)
+    colors, facts = shown(scene)
+    place = (facts["iterations"] - 2) / 3
+    assert np.ptp(place) > 0.2
+    assert np.abs(colors - ramp(np.clip(place, 0, 1), RAMP)).max() < 0.004
+
+
+def test_numbers_follow_curves() -> None:
+    curve = [[0, 0.2], [0.25, 0.9], [1, 0.4]]
+    scene = shining({"luminance": {"by": "normal", "curve": curve}, "color": [1, 0.5, 0.25]})
+    colors, facts = shown(scene)
+    at, values = zip(*curve, strict=True)
+    expected = np.interp((facts["normal"][:, 2] + 1) / 2, at, values)
+    assert np.abs(colors - expected[:, None] * [1, 0.5, 0.25]).max() < 0.005
+
+
+def test_a_map_repeats() -> None:
+    """With `repeat` the last colour blends into the first, in the last 256th."""
+    color = {"by": "normal", "range": [0, 0.25], "repeat": True, "palette": [[0, 0, 0], [1, 1, 1]]}
+    colors, facts = shown(shining({"luminance": 1, "color": color}))
+    place = (facts["normal"][:, 2] / 0.25) % 1
+    inside = (place > 0.02) & (place < 0.98)
+    assert np.abs(colors[inside, 0] - place[inside] * 256 / 255).max() < 0.01
+
+
+def test_the_formula_is_asked() -> None:
+    """A ball's mean curvature is 1 / radius everywhere, its thickness its diameter, a trap's distance that of its plane."""
+    for by, expected, tolerance in (("curvature", 1.0, 0.02), ("thickness", 2.0, 0.03)):
+        scene = shining({"luminance": {"by": by, "range": [0, 4]}, "color": [4, 4, 4]})
+        colors, _ = shown(scene)
+        assert np.abs(colors - expected).max() < tolerance, by
+
+
+@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
+def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    if lanes not in accepted_lanes(choose(), "float32"):
+        pytest.skip("the device has no such packets")
+    emission = {
+        "luminance": {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]},
+        "color": {"by": "normal", "palette": RAMP},
+    }
+    pictures = []
+    for each in (1, lanes):
+        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
+        pictures.append(np.asarray(clfractal.render(shining(emission, **BULB), channels=("R",))["R"]))
+    assert pictures[0].max() > 0.1
+    assert np.abs(pictures[0] - pictures[1]).mean() < 2e-4
+
+
+def test_two_questions_have_their_own_answers() -> None:
+    """Two traps in one material: the picture is the product of the pictures of each."""
+    one = {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]}
+    two = {"by": "trap", "trap": {"shape": "axis"}, "range": [0, 1], "palette": RAMP}
+    both = shown(shining({"luminance": one, "color": two}, **BULB))[0]
+    first = shown(shining({"luminance": one}, **BULB))[0]
+    second = shown(shining({"luminance": 1, "color": two}, **BULB))[0]
+    assert first.std() > 0.05
+    assert np.abs(both - first * second).max() < 2e-3
+
+
+@pytest.mark.parametrize("mask", [0, 1])
+def test_a_blend_at_its_ends_is_its_part(mask: int) -> None:
+    """Bit for bit, nested as well."""
+    parts: dict[str, Any] = {
+        "a": {"base": {"color": [0.2, 0.5, 0.8]}, "coat": {"weight": 0.5}},
+        "b": {"base": {"color": [0.9, 0.6, 0.2], "metalness": 1}, "emission": {"luminance": 0.5}},
+    }
+    nested: dict[str, Any] = {
+        **parts,
+        "c": {"blend": ["b", "a"], "mask": 1 - mask},
+        "m": {"blend": ["a", "c"], "mask": mask},
+    }
+    sky: dict[str, Any] = {"lighting": path(1), "background": GREY}
+    blend = seen(scene_of(materials=nested, material={"name": "m"}, **sky), 4)[0]
+    # The part in the same program: a blend with itself.
+    alone = {**parts, "m": {"blend": ["ab"[mask], "ab"[mask]], "mask": mask}}
+    assert np.array_equal(blend, seen(scene_of(materials=alone, material={"name": "m"}, **sky), 4)[0])
+    plain = seen(scene_of(materials=parts, material={"name": "ab"[mask]}, **sky), 4)[0]
+    assert np.abs(blend - plain).max() < 1e-4
+
+
+def test_a_mask_mixes_what_its_parts_shine() -> None:
+    parts = {
+        "a": {**DARK, "emission": {"luminance": 2, "color": [1, 0, 0]}},
+        "b": {**DARK, "emission": {"luminance": 4, "color": [0, 0, 1]}},
+        "m": {"blend": ["a", "b"], "mask": {"by": "normal", "range": [0, 0.5]}},
+    }
+    colors, facts = shown(scene_of(lighting=path(), materials=parts, material={"name": "m"}))
+    share = np.clip(facts["normal"][:, 2] / 0.5, 0, 1)
+    assert np.abs(colors[:, 0] - 2 * (1 - share)).max() < 0.02
+    assert np.abs(colors[:, 2] - 4 * share).max() < 0.04
+
+
+FURNACES: dict[str, dict[str, Any]] = {
+    "roughness": {
+        "base": {"color": [1, 1, 1], "metalness": {"by": "height", "range": [-1, 1]}},
+        "specular": {"roughness": {"by": "normal", "curve": [[0, 0.1], [1, 0.9]]}},
+    },
+    "layers": {
+        "base": {"color": [1, 1, 1], "diffuse_roughness": {"by": "normal"}},
+        "coat": {"weight": {"by": "height", "range": [-1, 1]}, "roughness": {"by": "normal"}},
+        "specular": {"ior": {"by": "normal", "curve": [[0, 1], [1, 2]]}},
+    },
+}
+
+
+@pytest.mark.parametrize("name", FURNACES)
+def test_white_before_white_is_not_seen(name: str) -> None:
+    scene = scene_of(
+        background=GREY, materials={"m": FURNACES[name]}, material={"name": "m"}, lighting=path(2)
+    )
+    assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
+
+
+def test_a_blend_of_white_materials_is_white() -> None:
+    materials = {
+        **FURNACES,
+        "m": {"blend": ["roughness", "layers"], "mask": {"by": "normal", "range": [-0.5, 0.5]}},
+    }
+    scene = scene_of(background=GREY, materials=materials, material={"name": "m"}, lighting=path(2))
+    assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
+
+
+# -- pictures
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> npt.NDArray[np.uint8]:
+    """Codes of a picture that is nowhere the same, saved as tile.png."""
+    random = np.random.default_rng(4)
+    codes = random.integers(0, 256, (7, 12, 3), dtype=np.uint8)
+    Image.fromarray(codes).save(tmp_path / "tile.png")
+    return codes
+
+
+def look_up(pixels: Floats, u: Floats, v: Floats) -> Floats:
+    """A picture that repeats, blended linearly; u to the right and v down, in pictures."""
+    height, width, _ = pixels.shape
+    x, y = (u % 1) * width - 0.5, (v % 1) * height - 0.5
+    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
+    right, low = (x - column)[:, None], (y - row)[:, None]
+
+    def at(i: int, j: int) -> Floats:
+        return np.asarray(pixels[(row + j) % height, (column + i) % width])
+
+    upper = at(0, 0) * (1 - right) + at(1, 0) * right
+    lower = at(0, 1) * (1 - right) + at(1, 1) * right
+    return np.asarray(upper * (1 - low) + lower * low)
+
+
+def from_three_sides(pixels: Floats, facts: dict[str, Floats], scale: float, sharpness: float) -> Floats:
+    p, high = facts["point"] / scale, facts["point"] / scale * pixels.shape[1] / pixels.shape[0]
+    weights = np.abs(facts["normal"]) ** sharpness
+    weights /= weights.sum(axis=1, keepdims=True)
+    sides = (
+        look_up(pixels, p[:, 1], -high[:, 2]),
+        look_up(pixels, p[:, 0], -high[:, 2]),
+        look_up(pixels, p[:, 0], -high[:, 1]),
+    )
+    return np.asarray(sum(weights[:, i : i + 1] * side for i, side in enumerate(sides)))
+
+
+def placed(tmp_path: Path, emission: dict[str, Any], **sections: Any) -> Scene:
+    """As `shining`, in the folder of the pictures."""
+    scene = shining(emission, **sections)
+    return clfractal.load_scene(dump_scene(scene.placed(tmp_path)), folder=tmp_path)
+
+
+def test_a_picture_is_shown_from_three_sides(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    emission = {"luminance": 1, "color": {"texture": "tile.png", "scale": 1.5, "sharpness": 3}}
+    colors, facts = shown(placed(tmp_path, emission))
+    expected = from_three_sides(decode(picture / 255), facts, 1.5, 3)
+    assert np.abs(colors - expected).max() < 0.02
+    assert np.ptp(expected) > 0.3
+
+
+def test_numbers_are_codes(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    """A picture's grey is a number as its codes say, through the curve."""
+    number = {"texture": "tile.png", "scale": 1.5, "curve": [[0, 1], [1, 3]]}
+    colors, facts = shown(placed(tmp_path, {"luminance": number}))
+    grey = np.repeat((picture / 255 @ [0.2126, 0.7152, 0.0722])[..., None], 3, axis=-1)
+    assert np.abs(colors - 1 - 2 * from_three_sides(grey, facts, 1.5, 4)).max() < 0.04
+
+
+def test_far_pictures_are_their_mean(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    """Where a pixel covers a whole picture there is nothing left to shimmer."""
+    colors, _ = shown(placed(tmp_path, {"luminance": 1, "color": {"texture": "tile.png", "scale": 0.02}}))
+    assert np.abs(colors - decode(picture / 255).mean(axis=(0, 1))).max() < 1e-3
+
+
+@pytest.mark.parametrize("shape", [(7, 12), (1, 5), (64, 64), (3, 1)])
+def test_levels_keep_the_mean(shape: tuple[int, int]) -> None:
+    pixels = np.random.default_rng(1).random((*shape, 3), np.float32)
+    levels = levels_of(pixels)
+    assert [level.shape[1::-1] for level in levels] == level_sizes(shape[1], shape[0])
+    for level in levels:
+        assert np.allclose(level.mean(axis=(0, 1)), pixels.mean(axis=(0, 1)), atol=1e-5)
+
+
+# -- what is told
+
+
+@pytest.mark.parametrize(
+    ("materials", "message"),
+    [
+        ({"m": {"blend": ["a", "m"]}, "a": {}}, "materials.m.blend: is made of itself: m -> m"),
+        (
+            {"m": {"blend": ["a", "b"]}, "a": {}, "b": {"blend": ["m", "a"]}},
+            "materials.b.blend: is made of itself: b -> m -> b",
+        ),
+        ({"m": {"blend": ["rok", "m"]}, "rock": {}}, "blend.0: unknown material 'rok'; did you mean 'rock'?"),
+        ({"m": {"blend": ["m"]}}, "materials.m.blend: must have at least 2 entries, got 1"),
+        (
+            {"m": {"blend": ["a", "a"], "base": {"weight": 0.5}}, "a": {}},
+            "m.base: cannot be combined with blend",
+        ),
+        ({"m": {"mask": 0.3}}, "materials.m.mask: applies to a blend of two materials"),
+        ({"m": {"base": {"weight": {}}}}, "materials.m.base.weight: needs one of by or texture"),
+        (
+            {"m": {"base": {"weight": {"by": "normal", "curve": [[0, 0], [1, 2]]}}}},
+            "materials.m.base.weight.curve.1.1: must be at most 1, got 2",
+        ),
+        (
+            {"m": {"specular": {"ior": {"by": "normal"}}}},
+            "materials.m.specular.ior.curve.0.1: must be at least 1, got 0",
+        ),
+        (
+            {"m": {"base": {"color": {"by": "normal", "palette": [[0, 0, 0], [0, 3, 0]]}}}},
+            "materials.m.base.color.palette.1.color: must be at most 1, got 3",
+        ),
+        (
+            {"m": {"base": {"color": {"by": "normal", "palette": "virids"}}}},
+            "materials.m.base.color.palette: unknown palette 'virids'; did you mean 'viridis'?",
+        ),
+        (
+            {"m": {"base": {"weight": {"by": "normal", "range": [1, 1]}}}},
+            "materials.m.base.weight.range: must be two different numbers, got 1 twice",
+        ),
+        (
+            {"m": {"base": {"weight": {"by": "normal", "curve": [[0.5, 0], [0.2, 1]]}}}},
+            "curve.1.0: must be at least 0.5, the place of the point before, got 0.2",
+        ),
+        ({"m": {"base": {"weight": {"by": "hight"}}}}, "did you mean 'height'?"),
+        ({"m": {"base": {"weight": "thick"}}}, "materials.m.base.weight: must be a number, got 'thick'"),
+        (
+            {"m": {"base": {"color": {"texture": "none.png"}}}},
+            "materials.m.base.color.texture: none.png cannot be read: No such file",
+        ),
+        (
+            {"m": {"base": {"color": {"texture": "text.png"}}}},
+            "materials.m.base.color.texture: text.png is no picture, or a damaged one",
+        ),
+        (
+            {"m": {"base": {"color": {"texture": "../x.png"}}}},
+            "materials.m.base.color.texture: must be a path inside the scene's folder, got '../x.png'",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told(
+    materials: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("text.png").write_text("no picture")
+    text = yaml.safe_dump(
+        {"version": 1, "formula": BALL, "camera": {}, "background": BLACK, "materials": materials}
+    )
+    with pytest.raises(ClfractalError) as caught:
+        clfractal.load_scene(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.where.line is not None
+
+
+def test_a_scene_with_maps_is_written_and_read(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    scene = placed(tmp_path, {"luminance": {"texture": "tile.png"}, "color": {"by": "trap", "palette": RAMP}})
+    assert clfractal.load_scene(dump_scene(scene), folder=tmp_path) == scene
+    assert tmp_path / "tile.png" in scene.files
+
+
+def test_work_on_another_picture_is_other_work(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:
+    """The scene only names its pictures; of a scene that moves they are not read again."""
+    emission = {"luminance": 1, "color": {"texture": "tile.png"}}
+
+    def known_by() -> dict[str, Any]:
+        return prepare(placed(tmp_path, emission), choose(), precision="float32").identity(0)
+
+    before = known_by()
+    assert known_by() == before
+    scene = placed(tmp_path, emission)
+    Image.fromarray(255 - picture).save(tmp_path / "tile.png")
+    after = known_by()
+    assert {key for key in before if before[key] != after[key]} == {"textures"}
+    moved = scene.model_copy(update={"materials": {**scene.materials, "other": {}}})
+    assert moved.textures["tile.png"] is scene.textures["tile.png"]
