@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.renderers.glass import WAVELENGTHS
 from clfractal.renderers.scattering import (
     COSINES,
     REFLECTANCES,
@@ -11,6 +12,7 @@ from clfractal.renderers.scattering import (
     SMOOTHEST_FUZZ_PARTS,
     SMOOTHEST_PARTS,
 )
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Material
@@ -36,13 +38,24 @@ PBR = Struct(
         Field("fuzz_color", "real", 3, "linear Rec. 709"),
         Field("fuzz_roughness", "real", 0, "SMOOTHEST_FUZZ to 1"),
         Field("emission", "real", 3, "radiance, linear Rec. 709"),
+        Field("transmission_weight", "real", 0, "part of the body that is glass"),
+        Field("transmission_color", "real", 3, "what is left of light after the depth"),
+        Field("transmission_depth", "real", 0, "scene units; 0: the colour tints the boundary"),
+        Field("transmission_dispersion_scale", "real", 0, "0 to 1"),
+        Field("transmission_dispersion_abbe_number", "real", 0, "1 or more"),
     ],
 )
 
 
+def has_glass(scene: Scene) -> bool:
+    """Whether paths go through the set."""
+    return isinstance(scene.lighting, PathLighting) and used_material(scene).transmission.weight > 0
+
+
 def scattering_defines() -> dict[str, object]:
-    """The defines of `kernels/bsdf.h`."""
+    """The defines of `kernels/bsdf.h`, but for HAS_GLASS."""
     return {
+        "SPECTRUM_PLACES": WAVELENGTHS,
         "ALBEDO_COSINES": COSINES,
         "ALBEDO_ROUGHNESSES": ROUGHNESSES,
         "ALBEDO_REFLECTANCES": REFLECTANCES,
@@ -77,7 +90,7 @@ def material_records(scene: Scene, precision: Precision) -> Record:
 def material_values(material: PbrMaterial) -> dict[str, object]:
     """The fields of a record."""
     base, specular, coat, fuzz = material.base, material.specular, material.coat, material.fuzz
-    shine = material.emission
+    shine, clear = material.emission, material.transmission
     return {
         "base_weight": base.weight,
         "base_color": base.color if base.color is not None else (0.0, 0.0, 0.0),
@@ -97,4 +110,9 @@ def material_values(material: PbrMaterial) -> dict[str, object]:
         "fuzz_color": fuzz.color,
         "fuzz_roughness": fuzz.roughness,
         "emission": tuple(shine.luminance * part for part in shine.color),
+        "transmission_weight": clear.weight,
+        "transmission_color": clear.color,
+        "transmission_depth": clear.depth,
+        "transmission_dispersion_scale": clear.dispersion_scale,
+        "transmission_dispersion_abbe_number": clear.dispersion_abbe_number,
     }

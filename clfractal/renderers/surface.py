@@ -11,6 +11,7 @@ import numpy.typing as npt
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
+from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
     STATE_PADDING,
     KernelArgument,
@@ -20,7 +21,7 @@ from clfractal.renderers.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.renderers.materials import PBR, material_records, scattering_defines
+from clfractal.renderers.materials import PBR, has_glass, material_records, scattering_defines
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
@@ -36,6 +37,7 @@ from clfractal.renderers.waves import (
     air_turns,
     asks_formula,
     has_cones,
+    inside_kernels,
     march_kernels,
     most_turns,
     surface_stages,
@@ -57,6 +59,8 @@ TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
+# Neither search of `search_defines`: rays within glass have one of their own.
+SEARCH_INSIDE = 2
 # Numbers of a pixel in `kernels/state.h`, without its normals.
 STATE_NUMBERS = 120
 
@@ -134,6 +138,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "PLANES": plane_count(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
+        "HAS_GLASS": int(has_glass(scene)),
     }
 
 
@@ -215,7 +220,10 @@ class SurfaceKernel(TileKernel):
     def _materials(self) -> list[KernelArgument]:
         if not isinstance(self.scene.lighting, PathLighting):
             return [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32)]
-        return [material_records(self.scene, self.precision), albedo_tables()]
+        tables = albedo_tables()
+        if has_glass(self.scene):
+            tables = np.concatenate([tables, glass_tables()])
+        return [material_records(self.scene, self.precision), tables]
 
     def _palette(self) -> Floats:
         coloring = self.scene.coloring
@@ -260,6 +268,9 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             *light_kernels(scene),
         ),
     ]
+    if has_glass(scene):
+        within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+        texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
     if asks_formula(scene.coloring):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))

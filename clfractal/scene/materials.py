@@ -52,6 +52,22 @@ class Fuzz(Section):
     )
 
 
+class Transmission(Section):
+    """Glass in the place of the diffuse body; its roughness is that of `specular`."""
+
+    weight: Fraction = Field(0.0, description="part of the body that is glass")
+    color: Reflectance = Field(
+        WHITE, description="of light that has gone through `depth` of it; depth 0: factor at each boundary"
+    )
+    depth: Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)] = Field(
+        0.0, description="way through the set after which light has that colour, scene units"
+    )
+    dispersion_scale: Fraction = Field(0.0, description="0: all colours bend alike; 1: by the Abbe number")
+    dispersion_abbe_number: Annotated[float, Field(strict=True, ge=1, le=1000, allow_inf_nan=False)] = Field(
+        20.0, description="the smaller, the farther colours spread: 20 diamond-like, 60 window glass"
+    )
+
+
 class Emission(Section):
     """Light of the material's own."""
 
@@ -72,6 +88,9 @@ class PbrMaterial(Section):
     coat: Coat = Field(default_factory=dict, validate_default=True, description="a clear layer over the body")
     fuzz: Fuzz = Field(
         default_factory=dict, validate_default=True, description="short fibres over everything"
+    )
+    transmission: Transmission = Field(
+        default_factory=dict, validate_default=True, description="glass in the place of the diffuse body"
     )
     emission: Emission = Field(
         default_factory=dict, validate_default=True, description="light of the material's own"
