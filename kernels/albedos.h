@@ -4,6 +4,10 @@
 #define ALBEDO_ROW (ALBEDO_COSINES + 1)
 #define ALBEDO_FUZZ (ALBEDO_ROUGHNESSES * ALBEDO_ROW)
 #define ALBEDO_DIELECTRIC (2 * ALBEDO_FUZZ)
+// With HAS_GLASS (`clfractal/renderers/glass.py`): rough glass, seen from outside and from inside; wavelengths.
+#define ALBEDO_GLASS (ALBEDO_DIELECTRIC + ALBEDO_REFLECTANCES * ALBEDO_FUZZ)
+#define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_FUZZ)
+#define SPECTRUM (ALBEDO_GLASS_INSIDE + ALBEDO_REFLECTANCES * ALBEDO_FUZZ)
 
 // Of one direction, whose cosine with the normal is given, and of the mean over all directions.
 typedef struct {
@@ -26,8 +30,8 @@ INLINE albedo albedo_at(__global const float *table, real cosine, real roughness
     return a;
 }
 
-// Of a dielectric's boundary, whose reflectance at normal incidence has this square root.
-INLINE albedo albedo_of_dielectric(__global const float *tables, real cosine, real roughness, real root) {
+// From tables for square roots of the reflectance at normal incidence, the first of which is given.
+INLINE albedo albedo_of_root(__global const float *tables, real cosine, real roughness, real root) {
     scalar at[LANES];
     albedo low, high;
     real rest = clamp(root * (real)((scalar)ALBEDO_REFLECTANCES), R(0.0), (real)((scalar)ALBEDO_REFLECTANCES - S(1.001)));
@@ -42,11 +46,16 @@ INLINE albedo albedo_of_dielectric(__global const float *tables, real cosine, re
         const mask here = open & equal(step, (real)(at[lane]));
         if (!any_lane(here)) continue;
         open &= ~here;
-        __global const float *table = tables + ALBEDO_DIELECTRIC + (int)at[lane] * ALBEDO_FUZZ;
+        __global const float *table = tables + (int)at[lane] * ALBEDO_FUZZ;
         low = albedo_at(table, cosine, roughness);
         high = albedo_at(table + ALBEDO_FUZZ, cosine, roughness);
         sum.of_direction = pick(here, low.of_direction + rest * (high.of_direction - low.of_direction), sum.of_direction);
         sum.mean = pick(here, low.mean + rest * (high.mean - low.mean), sum.mean);
     }
     return sum;
+}
+
+// Of a dielectric's boundary.
+INLINE albedo albedo_of_dielectric(__global const float *tables, real cosine, real roughness, real root) {
+    return albedo_of_root(tables + ALBEDO_DIELECTRIC, cosine, roughness, root);
 }

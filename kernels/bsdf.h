@@ -1,9 +1,13 @@
 // How a material scatters light, by OpenPBR 1.1's layers: fuzz over a coat over a base, which is a metal, or a dielectric's boundary
-// over a diffuse body. A layer takes what it reflects from those below it, so that all energy is kept. A diffuse body under its
+// over a diffuse body or glass. A layer takes what it reflects from those below it, so that all energy is kept. A diffuse body under its
 // boundary gets 1 - albedo of the direction in which light comes and of the one in which it leaves, and is the same both ways. What is
-// under a coat or fuzz may be a mirror, and gets 1 - albedo of the viewer's direction: paths begin at the eye.
+// under a coat or fuzz may be a mirror, and gets 1 - albedo of the viewer's direction: paths begin at the eye. From inside glass nobody
+// sees its coat and fuzz.
 #include "albedos.h"
 #include "microfacets.h"
+#if HAS_GLASS
+#include "bsdf_glass.h"
+#endif
 
 // A material at a spot, `pbr`: generated from clfractal/renderers/materials.py.
 #include "pbr.h"
@@ -22,7 +26,12 @@ typedef struct {
     color fuzz;
     real fuzz_rough, fuzz_albedo;
     real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
+    real dielectric;          // part of the surface that has a body
     mask seen;                // whether the viewer is over the surface
+#if HAS_GLASS
+    glass clear;
+    real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
+#endif
 } bsdf;
 
 INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
@@ -62,6 +71,16 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.fuzz = color_scale(p->fuzz_color, p->fuzz_weight);
     b.fuzz_rough = fmax(p->fuzz_roughness, SMOOTHEST_FUZZ);
     b.coat_albedo = b.fuzz_albedo = R(0.0);
+    b.dielectric = R(1.0) - b.metalness;
+#if HAS_GLASS
+    const mask inside = less(R(0.5), p->inside);
+    b.coat = pick(inside, R(0.0), b.coat);
+    b.coat_tint = color_pick(inside, color_of(R(1.0), R(1.0), R(1.0)), b.coat_tint);
+    b.fuzz = color_pick(inside, color_of(R(0.0), R(0.0), R(0.0)), b.fuzz);
+    const color tint = color_pick(less(R(0.0), p->transmission_depth), color_of(R(1.0), R(1.0), R(1.0)), p->transmission_color);
+    b.clear = glass_at(b.dielectric * p->transmission_weight, b.out.z, p->inside, b.ior, b.rough, b.alpha, b.root, tint, tables);
+    b.dielectric *= R(1.0) - p->transmission_weight;
+#endif
     if (any_of(b.coat)) {
         // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
         const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
@@ -78,11 +97,19 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
         b.fuzz_albedo = brightest(b.fuzz) * albedo_at(tables + ALBEDO_FUZZ, b.out.z, b.fuzz_rough).of_direction;
     }
     real of_gloss = R(0.0);
-    if (any_of((R(1.0) - b.metalness) * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
-    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + (R(1.0) - b.metalness) * of_gloss;
-    const real scattered = (R(1.0) - b.metalness) * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
+    if (any_of(b.dielectric * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
+    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
+    real scattered = b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
                            + luminance(b.fuzz);
+#if HAS_GLASS
+    scattered += b.clear.weight * (R(1.0) - b.clear.crosses) * b.clear.lost;
+    const real bent = b.clear.weight * (R(1.0) - b.clear.lost), lost = b.clear.weight * b.clear.crosses * b.clear.lost;
+    const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered + bent + lost), all = b.coat_albedo + below;
+    b.by_glass = (R(1.0) - b.coat_albedo) * bent / all;
+    b.by_beyond = (R(1.0) - b.coat_albedo) * lost / all;
+#else
     const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered), all = b.coat_albedo + below;
+#endif
     b.by_coat = b.coat_albedo / all;
     b.by_gloss = (R(1.0) - b.coat_albedo) * mirrored / all;
     return b;
@@ -107,15 +134,26 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, __global cons
     return sum;
 }
 
-// f * cosine; 0 for directions below the surface.
+// What coat and fuzz leave of light that crosses the boundary.
+#define THROUGH_LAYERS(b) color_scale((b)->coat_tint, (R(1.0) - (b)->coat_albedo) * (R(1.0) - (b)->fuzz_albedo))
+
+// f * cosine; 0 for directions below the surface, unless it is glass.
 INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables) {
     vec i = bsdf_local(b, toward);
     const mask over = b->seen & less(R(0.0), i.z);
+    color below = color_of(R(0.0), R(0.0), R(0.0));
+#if HAS_GLASS
+    const mask under = b->seen & less(i.z, R(0.0));
+    if (any_lane(under & less(R(0.0), b->clear.weight))) {
+        const color passes = color_scale(glass_passes(&b->clear, b->out, i, tables), b->clear.weight);
+        below = color_pick(under, color_mul(passes, THROUGH_LAYERS(b)), below);
+    }
+#endif
     i.z = fmax(i.z, R(1e-6));
     const vec h = middle_way(b->out, i);
     const real single = ggx_value(b->out, i, h, b->alpha);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
-    if (any_of(R(1.0) - b->metalness)) {
+    if (any_of(b->dielectric)) {
         const color body = eon_value(b->body, b->out, i, b->rough_body);
         albedo o = {R(0.0), R(0.0)}, other = o;
         real gloss = R(0.0);
@@ -125,8 +163,16 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables)
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other))),
-                          R(1.0) - b->metalness);
+                          b->dielectric);
     }
+#if HAS_GLASS
+    if (any_of(b->clear.weight)) {
+        // The tint of the boundary is that of its outer side.
+        const color tint = color_pick(b->clear.inside, color_of(R(1.0), R(1.0), R(1.0)), b->gloss);
+        const real reflects = b->clear.weight * glass_reflects(&b->clear, b->out, i, h, single, tables);
+        sum = color_add(sum, color_scale(tint, reflects));
+    }
+#endif
     if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, tables), b->metalness));
     if (any_of(b->coat)) {
         const real coat = b->coat * ggx_value(b->out, i, h, b->coat_alpha) * fresnel_dielectric(vec_dot(b->out, h), b->coat_ior);
@@ -137,24 +183,49 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables)
         const real fibres = fuzz_value(b->out, i, b->fuzz_rough) * i.z;
         sum = color_add(color_scale(sum, R(1.0) - b->fuzz_albedo), color_scale(b->fuzz, fibres));
     }
-    return color_pick(over, sum, color_of(R(0.0), R(0.0), R(0.0)));
+    return color_pick(over, sum, below);
 }
 
 // Probability per steradian with which bsdf_sample chooses a direction.
 INLINE real bsdf_density(const bsdf *b, vec toward) {
     const vec i = bsdf_local(b, toward), h = middle_way(b->out, i);
+#if HAS_GLASS
+    const glass *g = &b->clear;
+    const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond) * fmax(i.z, R(0.0)) / BSDF_PI;
+    const real facets = b->by_gloss + b->by_glass * fresnel_across(vec_dot(b->out, h), g->across);
+    const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
+    const vec bends = bending_facet(b->out, i, g->across);
+    const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->across)) * bending_density(g, b->out, i, bends);
+    const real beyond = bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI;
+    return pick(b->seen, pick(less(R(0.0), i.z), sum, pick(less(i.z, R(0.0)), beyond, R(0.0))), R(0.0));
+#else
     const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss) * fmax(i.z, R(0.0)) / BSDF_PI;
     const real sum = hemisphere + b->by_gloss * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
     return pick(b->seen & less(R(0.0), i.z), sum, R(0.0));
+#endif
 }
 
 // A direction chosen by three numbers in (0, 1).
 INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density) {
     const mask coat = less(choice, b->by_coat), gloss = ~coat & less(choice, b->by_coat + b->by_gloss);
-    const vec mirrored = ggx_sample(b->out, pick(coat, b->coat_alpha, b->alpha), u, v);
+    const vec h = ggx_facet(b->out, pick(coat, b->coat_alpha, b->alpha), u, v), mirrored = mirrored_at(b->out, h);
     const vec around = hemisphere_direction(vec_of(R(0.0), R(0.0), R(1.0)), u, v);
+#if HAS_GLASS
+    const real before = b->by_coat + b->by_gloss, after = before + b->by_glass;
+    const mask facet = ~coat & ~gloss & less(choice, after), beyond = ~coat & ~gloss & ~facet & less(choice, after + b->by_beyond);
+    const mask bends = facet & less(fresnel_across(vec_dot(b->out, h), b->clear.across), (choice - before) / b->by_glass);
+    vec i = vec_pick(coat | gloss | facet, mirrored, around);
+    i = vec_pick(bends, refracted_at(b->out, h, b->clear.across), i);
+    i.z = pick(beyond, -i.z, i.z);
+    // A facet that mirrors below the surface, or refracts above it, is hidden by others.
+    const mask hidden = ~less(R(0.0), pick(bends | beyond, -i.z, i.z));
+#else
     const vec i = vec_pick(coat | gloss, mirrored, around);
+#endif
     const vec toward = vec_along(vec_along(vec_scale(b->normal, i.z), i.x, b->side), i.y, b->up);
     *density = bsdf_density(b, toward);
+#if HAS_GLASS
+    *density = pick(hidden, R(0.0), *density);
+#endif
     return toward;
 }

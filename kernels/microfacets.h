@@ -23,20 +23,22 @@ INLINE real ggx_value(vec o, vec i, vec h, real alpha) {
     return ggx_normals(h, alpha) / (R(4.0) * fmax(o.z, R(1e-6)) * (R(1.0) + ggx_lambda(o, alpha) + ggx_lambda(i, alpha)));
 }
 
-// Density per steradian of ggx_sample.
+// Density per steradian of directions that visible normals mirror to.
 INLINE real ggx_density(vec o, vec h, real alpha) {
     return ggx_normals(h, alpha) / (R(4.0) * fmax(o.z, R(1e-6)) * (R(1.0) + ggx_lambda(o, alpha)));
 }
 
-// The direction that `o` is mirrored to at a visible normal (Dupuy and Benyoub 2023); it may be below the surface.
-INLINE vec ggx_sample(vec o, real alpha, real u, real v) {
+// A visible normal (Dupuy and Benyoub 2023).
+INLINE vec ggx_facet(vec o, real alpha, real u, real v) {
     const vec stretched = vec_normalize(vec_of(alpha * o.x, alpha * o.y, o.z));
     const real z = R(1.0) - u * (R(1.0) + stretched.z);
     const real level = sqrt(fmax(R(1.0) - z * z, R(0.0))), angle = R(6.283185307179586) * v;
     const vec cap = vec_of(level * cos(angle) + stretched.x, level * sin(angle) + stretched.y, z + stretched.z);
-    const vec h = vec_normalize(vec_of(alpha * cap.x, alpha * cap.y, cap.z));
-    return vec_sub(vec_scale(h, R(2.0) * vec_dot(o, h)), o);
+    return vec_normalize(vec_of(alpha * cap.x, alpha * cap.y, cap.z));
 }
+
+// The direction that `o` is mirrored to there; it may be below the surface.
+INLINE vec mirrored_at(vec o, vec h) { return vec_sub(vec_scale(h, R(2.0) * vec_dot(o, h)), o); }
 
 // The reflectance of a dielectric's boundary from outside (exact, unpolarised).
 INLINE real fresnel_dielectric(real cosine, real ior) {

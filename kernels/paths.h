@@ -97,7 +97,11 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     const real other = pick(both, bsdf_density(b, chosen.toward), R(0.0));
     const real weight = pick(has_size, power_share(asked, other) / asked, R(1.0) / share);
     *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.albedos), chosen.light), weight);
-    const mask dark = ~less(R(0.0), brightest(*brings));
+    mask dark = ~less(R(0.0), brightest(*brings));
+#if HAS_GLASS
+    // The set hides what is behind its surface.
+    dark |= ~leads_out(chosen.toward, b->normal, number_of(b->clear.inside));
+#endif
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
     chosen.distance = pick(blocked & ~dark, chosen.distance, R(-1.0));
@@ -125,7 +129,8 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
 // Adds what a path sees at its end: a lamp, or where it leaves the set what is past it.
 INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mask leaves, real picture_y, world w) {
     color past = light_past(so_far->direction, picture_y, so_far->origin, with->density, with->total, w);
-    const real share = power_share(with->density, before->weight / with->total * before->density);
+    const mask alone = less(with->density, R(0.0));
+    const real share = pick(alone, R(1.0), power_share(with->density, before->weight / with->total * before->density));
     past = color_pick(before->met, color_scale(before->shows, share), past);
     const color more = limited(color_mul(past, so_far->through), w.settings);
     so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
@@ -142,6 +147,11 @@ STAGE(scatter_paths) {
     path so_far;
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
     carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
+#if HAS_GLASS
+    with.inside = R(0.0);
+    with.wave = R(-1.0);
+    with.absorption = with.awaited;
+#endif
     mask on_path = mask_of(so_far.on_path);
     real far = pick(mask_of(found.found), vec_dot(vec_sub(found.seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
     lamp before = lamp_met(arrived.origin, arrived.direction, bounce == 0, &far, w);
@@ -149,6 +159,9 @@ STAGE(scatter_paths) {
     const mask lands = on_path & mask_of(found.found) & ~before.met;
     if (bounce > 0) {
         STATE_RECALL(s, with, STATE_CARRIED);
+#if HAS_GLASS
+        path_absorbs(&so_far, &with, far, w);
+#endif
         path_ends(&so_far, &with, &before, on_path & ~lands, a.y, w);
     } else {
         so_far.seen = color_pick(before.met, before.shows, so_far.seen);
@@ -161,10 +174,17 @@ STAGE(scatter_paths) {
 #if !COLORING_PER_POINT
         found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
 #endif
-        const pbr p = pbr_at(s, &found, w);
+        pbr p = pbr_at(s, &found, w);
+        vec outward = found.normal;
+#if HAS_GLASS
+        real wave, unused;
+        path_square(s, &here.at, PURPOSE_WAVE, w, &wave, &unused);
+        const color weights = glass_met(&with, &p, &wave, w.albedos);
+        outward = vec_pick(mask_of(with.inside), vec_scale(outward, R(-1.0)), outward);
+#endif
         so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(color_scale(p.emission_color, p.emission_luminance), so_far.through)), so_far.seen);
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
-        so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), found.normal);
+        so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), outward);
         with.total = weight_of_all(so_far.origin, w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
@@ -174,6 +194,9 @@ STAGE(scatter_paths) {
         asks.far = light.distance;
         asks.footprint = found.cone * (real)(w.settings->shadow_detail);
         path_goes_on(s, &here.at, &so_far, &with, &b, w);
+#if HAS_GLASS
+        path_crosses(&so_far, &with, &found, &p, weights, wave);
+#endif
         spot seen_first = found;
         if (bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
         so_far.footprint = found.cone;
@@ -209,6 +232,11 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
+#if HAS_GLASS
+    const mask within = mask_of(with.inside);
+    send_clipped(s, 1, r, R(0.0), mask_of(so_far.on_path) & within, w);
+    so_far.on_path = pick(within, R(0.0), so_far.on_path);
+#endif
     send_clipped(s, 0, r, R(0.0), mask_of(so_far.on_path), w);
 }
 
@@ -227,7 +255,10 @@ STAGE(end_paths) {
     STATE_RECALL(s, cost, STATE_TALLY);
     const encounter last = queue_met(s.q, 0, s.slot);
     tally_met(&cost, last, 0);
-    const mask on_path = mask_of(so_far.on_path);
+    mask on_path = mask_of(so_far.on_path);
+#if HAS_GLASS
+    on_path &= ~mask_of(with.inside);
+#endif
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;

@@ -44,6 +44,17 @@ INLINE spot spot_of_ray(ray r, encounter met, world w) {
     return here;
 }
 
+#if HAS_GLASS
+// What a path has met: its ray within the set is its second one, and was sent in place of the first.
+INLINE encounter met_within(queue q, int slot, encounter met) {
+    const ray second = queue_ray(q, 1, slot);
+    const mask within = less(second.near, second.far);
+    const encounter other = queue_met(q, 1, slot);
+    for (int i = 0; i < NUMBERS_OF(encounter); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
+    return met;
+}
+#endif
+
 // What a march has cost, and where `of_surface` what finding its normal has.
 INLINE void tally_met(tally *cost, encounter met, int of_surface) {
     cost->steps += met.steps;

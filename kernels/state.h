@@ -57,6 +57,11 @@ typedef struct {
     color awaited;   // what a light brings, if nothing is in the way of the ray that asks for it
     real density;    // per steradian, of its direction; below 0 where lights were not asked for at all
     real total;      // what all lights weighed at the spot
+#if HAS_GLASS
+    real inside;        // whether the path is inside the set
+    real wave;          // its place in the spectrum; below 0 while it has all colours
+    color absorption;   // of the medium, per unit of the way
+#endif
 } carried;
 
 // Where a cutting plane opens the set, and its face is visible.

@@ -32,6 +32,9 @@
 #include "bsdf.h"
 #include "material_at.h"
 #include "lights.h"
+#if HAS_GLASS
+#include "glass_paths.h"
+#endif
 #include "paths.h"
 #endif
 
@@ -123,7 +126,10 @@ STAGE(find_spots) {
     } else
 #endif
     {
-        const encounter met = queue_met(s.q, 0, s.slot);
+        encounter met = queue_met(s.q, 0, s.slot);
+#if HAS_GLASS
+        if (bounce > 0) met = met_within(s.q, s.slot, met);
+#endif
         tally_met(&cost, met, 1);
         at_first.coverage = met.hit;
         at_first.steps = met.steps;

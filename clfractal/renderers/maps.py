@@ -166,6 +166,14 @@ def mapped_materials(scene: Scene) -> MappedMaterials | None:
     return found if found.maps else None
 
 
+def has_glass(scene: Scene) -> bool:
+    """Whether paths go through the set."""
+    if not isinstance(scene.lighting, PathLighting):
+        return False
+    weights = [material.transmission.weight for material in MappedMaterials(scene).blends.materials]
+    return any(isinstance(weight, Map) or weight > 0 for weight in weights)
+
+
 def map_defines(scene: Scene) -> dict[str, object]:
     """The defines of programs that may read maps."""
     found = mapped_materials(scene)

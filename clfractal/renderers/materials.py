@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from clfractal.device.structs import Field, Struct
+from clfractal.renderers.glass import WAVELENGTHS
 from clfractal.renderers.scattering import (
     COSINES,
     REFLECTANCES,
@@ -42,6 +43,11 @@ PBR = Struct(
             "factor on the colour, where that differs from place to place; else 1",
         ),
         Field("emission_color", "real", 3, "radiance, linear Rec. 709"),
+        Field("transmission_weight", "real", 0, "part of the body that is glass"),
+        Field("transmission_color", "real", 3, "what is left of light after the depth"),
+        Field("transmission_depth", "real", 0, "scene units; 0: the colour tints the boundary"),
+        Field("transmission_dispersion_scale", "real", 0, "0 to 1"),
+        Field("transmission_dispersion_abbe_number", "real", 0, "1 or more"),
         Field("first_map", "int", 0, "of the parameters that differ from place to place"),
         Field("map_count", "int", 0, ""),
         Field(
@@ -74,18 +80,23 @@ def pbr_text() -> str:
         "typedef struct {",
     ]
     lines += [f"    {kinds[field.count]} {field.name};" for field in PARAMETERS]
-    lines += ["} pbr;", "// `tint`: the colouring's colour."]
+    lines += [
+        "    real inside;   // whether the viewer is inside glass",
+        "} pbr;",
+        "// `tint`: the colouring's colour.",
+    ]
     lines += ["INLINE pbr pbr_of(__constant const struct Pbr *m, color tint) {", "    pbr p;"]
     for field in PARAMETERS:
         read = f"color_splat(m->{field.name})" if field.count else f"(real)(m->{field.name})"
         own = f"m->base_own ? {read} : tint" if field.name == "base_color" else read
         lines.append(f"    p.{field.name} = {own};")
-    return "\n".join([*lines, "    return p;", "}", ""])
+    return "\n".join([*lines, "    p.inside = R(0.0);", "    return p;", "}", ""])
 
 
 def scattering_defines() -> dict[str, object]:
-    """The defines of `kernels/bsdf.h`."""
+    """The defines of `kernels/bsdf.h`, but for HAS_GLASS."""
     return {
+        "SPECTRUM_PLACES": WAVELENGTHS,
         "ALBEDO_COSINES": COSINES,
         "ALBEDO_ROUGHNESSES": ROUGHNESSES,
         "ALBEDO_REFLECTANCES": REFLECTANCES,
@@ -115,7 +126,7 @@ def used_material(scene: Scene) -> PbrMaterial:
 def material_values(material: PbrMaterial) -> dict[str, object]:
     """The fields of a record."""
     values: dict[str, object] = {}
-    for part in ("base", "specular", "coat", "fuzz"):
+    for part in ("base", "specular", "coat", "fuzz", "transmission"):
         section = getattr(material, part)
         for name in type(section).model_fields:
             values[f"{part}_{name}"] = getattr(section, name)

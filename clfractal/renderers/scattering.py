@@ -42,7 +42,9 @@ def albedo_tables() -> Floats:
     cosines = table_cosines()
     for k in range(ROUGHNESSES):
         roughness = k / (ROUGHNESSES - 1)
-        weight, meeting = _visible_normals(cosines, max(roughness * roughness, 1 / SMOOTHEST_PARTS))
+        alpha = max(roughness * roughness, 1 / SMOOTHEST_PARTS)
+        cosine, facet, meeting = visible_normals(cosines, alpha)
+        weight = mirrored(cosine, facet, meeting, alpha)
         fresnel_one[k, :-1] = weight.mean(axis=(1, 2))
         for j in range(REFLECTANCES):
             root = j / REFLECTANCES
@@ -81,10 +83,11 @@ def fresnel(cosine: Doubles, ior: float) -> Doubles:
     return np.asarray(a * a * (1 + b * b) / 2)
 
 
-def _visible_normals(cosines: Doubles, alpha: float) -> tuple[Doubles, Doubles]:
-    """Weights G2 / G1, and cosines with the normal, of directions that visible normals reflect to; 0 below the surface.
+def visible_normals(cosines: Doubles, alpha: float) -> tuple[Doubles, Doubles, Doubles]:
+    """Cosines of the viewer's directions, of facets with the normal, and of both with each other.
 
-    Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps. Shapes (cosines, radii, angles).
+    Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps. Shapes (cosines, 1, 1), and twice (cosines,
+    radii, angles): facets of equal probability.
     """
     cosine = np.maximum(cosines, 1e-4)[:, None, None]
     sine = np.sqrt(1 - cosine * cosine)
@@ -99,15 +102,20 @@ def _visible_normals(cosines: Doubles, alpha: float) -> tuple[Doubles, Doubles]:
     )
     h = h / np.sqrt((h * h).sum(axis=0))
     meeting = np.clip(h[0] * sine + h[2] * cosine, 0.0, 1.0)
-    other = np.clip(2 * meeting * h[2] - cosine, None, 1.0)
+    return cosine, h[2], meeting
 
-    def shadow(mu: Doubles) -> Doubles:
-        tangent = (1 - mu * mu) / np.maximum(mu * mu, 1e-20)
-        return np.asarray((np.sqrt(1 + alpha * alpha * tangent) - 1) / 2)
 
-    one, two = shadow(np.broadcast_to(cosine, other.shape)), shadow(np.maximum(other, 1e-6))
-    weight = np.where(other > 0, (1 + one) / (1 + one + two), 0.0)
-    return weight, meeting
+def shadow(cosine: Doubles, alpha: float) -> Doubles:
+    """Smith's function of GGX, Lambda, of directions with these cosines to the normal."""
+    tangent = (1 - cosine * cosine) / np.maximum(cosine * cosine, 1e-20)
+    return np.asarray((np.sqrt(1 + alpha * alpha * tangent) - 1) / 2)
+
+
+def mirrored(cosine: Doubles, facet: Doubles, meeting: Doubles, alpha: float) -> Doubles:
+    """G2 / G1 of the directions that facets mirror to; 0 below the surface. Takes what `visible_normals` gives."""
+    other = np.clip(2 * meeting * facet - cosine, None, 1.0)
+    one, two = shadow(cosine, alpha), shadow(np.maximum(other, 1e-6), alpha)
+    return np.asarray(np.where(other > 0, (1 + one) / (1 + one + two), 0.0))
 
 
 def _fuzz_albedo(cosines: Doubles, roughness: float) -> Doubles:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
+from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
     STATE_PADDING,
     KernelArgument,
@@ -20,7 +21,14 @@ from clfractal.renderers.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.renderers.maps import MAP, MappedMaterials, asked_maps, map_defines, mapped_materials
+from clfractal.renderers.maps import (
+    MAP,
+    MappedMaterials,
+    asked_maps,
+    has_glass,
+    map_defines,
+    mapped_materials,
+)
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
@@ -37,6 +45,7 @@ from clfractal.renderers.waves import (
     air_turns,
     asks_formula,
     has_cones,
+    inside_kernels,
     march_kernels,
     most_turns,
     surface_stages,
@@ -57,6 +66,8 @@ ALONG = {"view": 0, "normal": 1, "reflection": 2}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
+# Neither search of `search_defines`: rays within glass have one of their own.
+SEARCH_INSIDE = 2
 # Numbers of a pixel in `kernels/state.h`, without its normals.
 STATE_NUMBERS = 120
 
@@ -135,6 +146,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
+        "HAS_GLASS": int(has_glass(scene)),
     }
 
 
@@ -217,12 +229,15 @@ class SurfaceKernel(TileKernel):
         if not isinstance(self.scene.lighting, PathLighting):
             none = [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32)]
             return [*none, *self._no_maps()]
+        albedos = albedo_tables()
+        if has_glass(self.scene):
+            albedos = np.concatenate([albedos, glass_tables()])
         found = mapped_materials(self.scene)
         records_of = MappedMaterials(self.scene).records(self.precision)
         if found is None:
-            return [records_of, albedo_tables(), *self._no_maps()]
+            return [records_of, albedos, *self._no_maps()]
         tables = self.resources.kept.once(f"maps {found.key}", found.tables)
-        return [records_of, albedo_tables(), found.map_records(self.precision), tables]
+        return [records_of, albedos, found.map_records(self.precision), tables]
 
     def _no_maps(self) -> list[KernelArgument]:
         return [np.zeros(1, MAP.dtype(self.precision)), np.zeros(4, np.float32)]
@@ -274,6 +289,9 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             *light_kernels(scene),
         ),
     ]
+    if has_glass(scene):
+        within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+        texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
     if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))

@@ -10,7 +10,7 @@ and each mirror adds what follows `begin_shots` but for the points. With `lighti
 
     scatter_paths  march  gather_paths
 
-ask for light and send the next ray of each path, and after the last bounce `march  end_paths` finds out which rays
+ask for light and send the next ray of each path (those within glass are marched by `march_inside` to where they leave the set), and after the last bounce `march  end_paths` finds out which rays
 leave the set. See "A shot" in docs/architecture.md.
 """
 
@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.renderers.kernel import Stage
-from clfractal.renderers.maps import asked_maps
+from clfractal.renderers.maps import asked_maps, has_glass
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.scene.light_paths import PathLighting
@@ -74,12 +74,19 @@ def air_turns(scene: Scene) -> int:
 
 def most_turns(scene: Scene) -> int:
     """The most rays that a pixel sends for one purpose."""
-    return max(scene.surface.used_points.count, max(light_turns(scene), 1) + air_turns(scene))
+    after = max(light_turns(scene), 1) + air_turns(scene)
+    # A path that is within glass has a ray of another kind.
+    return max(scene.surface.used_points.count, after, 1 + int(has_glass(scene)))
 
 
 def march_kernels(plan: Plan) -> tuple[str, ...]:
     """The kernels of `kernels/march.cl`: packets look at surfaces where they march."""
     return ("march_rays", "look_at_surfaces") if plan.lanes == 1 else ("march_rays",)
+
+
+def inside_kernels(plan: Plan) -> tuple[str, ...]:
+    """The kernels of `kernels/glass.cl`."""
+    return ("march_inside", "look_inside_set") if plan.lanes == 1 else ("march_inside",)
 
 
 def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterator[Stage]:
@@ -90,10 +97,11 @@ def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterat
         yield Stage("march_rays", "rays", 1, {"goal": GOAL_CONE}, of="blocks")
     # A launch without samples only writes what pixels have.
     for sample in range(*samples):
-        yield from _sample(scene, sample, march_kernels(plan), cones=cones)
+        yield from _sample(scene, sample, plan, cones=cones)
 
 
-def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool) -> Iterator[Stage]:
+def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[Stage]:
+    marching = march_kernels(plan)
     points, after = scene.surface.used_points.count, light_turns(scene)
     steps = scene.surface.search == "steps"
 
@@ -112,6 +120,8 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
             yield from _marched(marching, turns, GOAL_POINT if steps else GOAL_SURFACE)
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
+            if bounce > 0 and has_glass(scene):
+                yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE)
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
         if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)
@@ -132,6 +142,6 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
 
 
 def _marched(kernels: tuple[str, ...], turns: int, goal: int) -> Iterator[Stage]:
-    yield Stage("march_rays", "rays", turns, {"goal": goal})
+    yield Stage(kernels[0], "rays", turns, {"goal": goal})
     if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
-        yield Stage("look_at_surfaces", "packets of rays", turns)
+        yield Stage(kernels[1], "packets of rays", turns)

@@ -11,6 +11,10 @@ Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]
 IorMap = Annotated[Annotated[Ior, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 Stand = Annotated[float, Field(strict=True, ge=0.25, le=1, allow_inf_nan=False)]
 StandMap = Annotated[Annotated[Stand, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
+Depth = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
+DepthMap = Annotated[Annotated[Depth, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
+Abbe = Annotated[float, Field(strict=True, ge=1, le=1000, allow_inf_nan=False)]
+AbbeMap = Annotated[Annotated[Abbe, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 ShineMap = Annotated[Annotated[Color, Tag("given")] | Annotated[ColorMap, Tag("map")], FORM]
 WHITE = (1.0, 1.0, 1.0)
 
@@ -57,6 +61,22 @@ class Fuzz(Mapped):
     )
 
 
+class Transmission(Mapped):
+    """Glass in the place of the diffuse body; its roughness is that of `specular`."""
+
+    weight: FractionMap = Field(0.0, description="part of the body that is glass")
+    color: ReflectanceMap = Field(
+        WHITE, description="of light that has gone through `depth` of it; depth 0: factor at each boundary"
+    )
+    depth: DepthMap = Field(
+        0.0, description="way through the set after which light has that colour, scene units"
+    )
+    dispersion_scale: FractionMap = Field(0.0, description="0: all colours bend alike; 1: by the Abbe number")
+    dispersion_abbe_number: AbbeMap = Field(
+        20.0, description="the smaller, the farther colours spread: 20 diamond-like, 60 window glass"
+    )
+
+
 class Emission(Mapped):
     """Light of the material's own."""
 
@@ -86,6 +106,9 @@ class PbrMaterial(Mapped):
     coat: Coat = Field(default_factory=dict, validate_default=True, description="a clear layer over the body")
     fuzz: Fuzz = Field(
         default_factory=dict, validate_default=True, description="short fibres over everything"
+    )
+    transmission: Transmission = Field(
+        default_factory=dict, validate_default=True, description="glass in the place of the diffuse body"
     )
     emission: Emission = Field(
         default_factory=dict, validate_default=True, description="light of the material's own"

@@ -14,6 +14,7 @@ from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
+from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.materials import PBR, material_values, pbr_text, scattering_defines
 from clfractal.renderers.scattering import albedo_tables
 from clfractal.scene.materials import PbrMaterial
@@ -51,14 +52,15 @@ _SCATTER = """\
 // Planes of `count` numbers. In: viewer, light (x, y, z each), choice, u, v. Out: value and density of the light's
 // direction; the sampled direction, its density, its value.
 __kernel void scatter(__global const scalar *in, __global scalar *out, __constant struct Pbr *material,
-                      __global const float *albedos, int count) {
+                      __global const float *albedos, int count, int inside) {
     const int lane = (int)get_global_id(0) * LANES;
     in += lane;
     out += lane;
     const vec viewer = vec_of(load(in), load(in + count), load(in + 2 * count));
     const vec light = vec_of(load(in + 3 * count), load(in + 4 * count), load(in + 5 * count));
     const vec normal = vec_of(R(0.0), R(0.6), R(0.8));
-    const pbr p = pbr_of(material, color_splat(material->base_color));
+    pbr p = pbr_of(material, color_splat(material->base_color));
+    p.inside = (real)((scalar)inside);
     const bsdf b = bsdf_at(&p, normal, viewer, albedos);
     const color value = bsdf_value(&b, light, albedos);
     PUT_COLOR(0, value);
@@ -79,8 +81,9 @@ NORMAL = np.array([0.0, 0.6, 0.8])
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int) -> Any:
+def _program(device: Device, precision: Precision, lanes: int, *, glass: bool) -> Any:
     defines = {
+        "HAS_GLASS": int(glass),
         "LANES": lanes,
         "REAL_IS_DOUBLE": int(precision == "float64"),
         "PALETTE_SIZE": 256,
@@ -117,8 +120,15 @@ def ask(
     *,
     precision: Precision = "float32",
     lanes: int = 1,
+    inside: bool = False,
 ) -> Answers:
-    """Runs the kernel on world directions, shape (n, 3) each, and numbers in (0, 1), shape (n, 3)."""
+    """Runs the kernel on world directions, shape (n, 3) each, and numbers in (0, 1), shape (n, 3).
+
+    The normal is on the viewer's side, also where the viewer is `inside` glass.
+    """
+    weight = material.transmission.weight
+    glass = not isinstance(weight, float) or weight > 0
+    tables = np.concatenate([albedo_tables(), glass_tables()]) if glass else albedo_tables()
     given = max(len(viewer), len(light))
     count = -(-given // lanes) * lanes
     planes = np.full((9, count), 0.5, precision)
@@ -132,10 +142,10 @@ def ask(
     record = PBR.array(precision, [material_values(material)])
     buffers = [
         cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
-        for array in (planes, result, record, albedo_tables())
+        for array in (planes, result, record, tables)
     ]
-    kernel = cl.Kernel(_program(device, precision, lanes), "scatter")
-    kernel.set_args(*buffers, np.int32(count))
+    kernel = cl.Kernel(_program(device, precision, lanes, glass=glass), "scatter")
+    kernel.set_args(*buffers, np.int32(count), np.int32(inside))
     cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
     cl.enqueue_copy(device.queue, result, buffers[1])
     found = result[:, :given].astype(np.float64)

@@ -1,0 +1,31 @@
+// The surface where rays within glass leave the set.
+
+// The rays within: each pixel's second one.
+INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride) {
+    const queue q = {rays + wave, met + wave, wave, 1, stride};
+    return q;
+}
+
+// Looks at the surfaces where rays of a queue from number `at` on leave the set. It is the surface that a ray meets which comes
+// the other way; its normal is told on the side of the inside.
+INLINE void look_inside(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                        __constant const scalar *k) {
+    encounter e = queue_met(q, 0, at);
+    const mask hit = mask_of(e.hit);
+    if (!any_lane(hit)) return;
+    ray r = queue_ray(q, 0, at);
+    r.footprint += r.spread * e.t;
+    r.spread = R(0.0);
+    r.origin = vec_along(r.origin, e.touch, r.direction);
+    r.direction = vec_scale(r.direction, R(-1.0));
+    const real beyond = e.touch, t = e.t;
+    e.t = beyond - t;
+    e.last = beyond - e.last;
+    e.touch = R(0.0);
+    surface_at(r, &e, hit, settings, orbit, k);
+    e.normal = vec_scale(e.normal, R(-1.0));
+    e.touch = beyond - e.touch;
+    e.t = t;
+    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,
+                 q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
+}

@@ -1,0 +1,33 @@
+// Entry points that know the formula: rays within glass go on to where they leave the set. They are the second ones of the queue.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "numbers/dual.h"
+#include "vectors.h"
+#include "structs.h"
+#include "formula.h"
+#include "orbit.h"
+#include "rays.h"
+#include "queue.h"
+#include "march_inside.h"
+#include "share.h"
+#include "arguments.h"
+#include "surface_at.h"
+#include "exits.h"
+
+STAGE(march_inside) {
+    const queue q = inside_of(rays, met, wave, queue_stride);
+    const share mine = share_of_item(ITEM, slice, q);
+    if (mine.next >= mine.end || WAS_CANCELLED) return;
+    const int waits = march_share(mine, q, goal, settings, orbit, k);
+    if (LANES == 1) return;
+    for (int at = mine.next; at < mine.end; at += LANES) look_inside(q, at, settings, orbit, k);
+    atomic_add(statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet) + STATISTIC_WAITS, (uint)waits);
+}
+
+#if LANES == 1
+STAGE(look_inside_set) {
+    const queue q = inside_of(rays, met, wave, queue_stride);
+    const int at = ITEM;
+    if (at < q.turns * q.wave && !WAS_CANCELLED) look_inside(q, at, settings, orbit, k);
+}
+#endif

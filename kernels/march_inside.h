@@ -1,0 +1,82 @@
+// The search for the place where a ray that begins at the surface leaves the set again. Distances are of no use inside: fixed steps
+// and the inside test alone, then a binary search. What is thinner than a step may be missed.
+//
+// A ray begins where another has met the surface, which may be some footprints before the set: until it is inside its steps grow from
+// a part of a footprint. One that does not find the set there has met a sheet without an inside, and leaves at once.
+#define ENTRANCE_REACH R(16.0)      // footprints before the set, at the most ...
+#define ENTRANCE_START R(0.0625)    // ... and the first place to test
+#define ENTRANCE_GROWTH R(0.5)      // of the way so far
+#define EXIT_TOLERANCE R(0.01)      // of the footprint
+#define EXIT_NEARER R(0.25)         // part of the height over the exit at which the place beyond is looked for next
+#define EXIT_TRIES R(3.5)
+
+typedef struct {
+    ray r;
+    mask active;
+    crossing found;
+    real t, low, high;       // the present place; the last place inside, and the first one outside after it
+    mask entered, left, narrow;
+    real height, tries;      // over the exit, where light is computed
+} march;
+
+// Lanes `fresh` begin a march along new rays; the others go on with theirs.
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+    const real start = r.near + ENTRANCE_START * (real)(settings->detail) * r.footprint;
+    m->r = ray_pick(fresh, r, m->r);
+    m->active |= fresh;
+    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    m->t = pick(fresh, start, m->t);
+    m->low = pick(fresh, r.near, m->low);
+    m->high = pick(fresh, r.near, m->high);
+    m->entered &= ~fresh;
+    m->left &= ~fresh;
+    m->narrow &= ~fresh;
+    m->height = pick(fresh, R(0.0), m->height);
+    m->tries = pick(fresh, R(0.0), m->tries);
+}
+
+// One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
+INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
+                       __constant const scalar *k) {
+    const real step = (real)(settings->step), cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
+    const vec point = vec_along(m->r.origin, m->t, m->r.direction);
+    const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
+    m->found.steps += pick(m->active, R(1.0), R(0.0));
+    m->found.count += pick(m->active, here.count, R(0.0));
+    const mask inside = m->active & here.inside, outside = m->active & ~here.inside;
+
+    // A sheet without an inside.
+    const mask sheet = outside & ~m->entered & less(m->r.near + ENTRANCE_REACH * cone, m->t);
+    m->found.t = pick(sheet, m->r.near, m->found.t);
+    m->found.last = pick(sheet, m->t, m->found.last);
+    m->found.touch = pick(sheet, m->t, m->found.touch);
+
+    // Over the exit: the place at which light is computed, nearer where something else begins there.
+    const mask over = m->active & m->narrow;
+    m->tries += pick(over, R(1.0), R(0.0));
+    m->height = pick(over & inside, EXIT_NEARER * m->height, m->height);
+    const mask placed = over & (outside | less(EXIT_TRIES, m->tries));
+    m->found.t = pick(placed, m->low, m->found.t);
+    m->found.last = pick(placed, m->high, m->found.last);
+    m->found.touch = pick(placed, m->high + m->height, m->found.touch);
+
+    const mask searching = m->active & ~m->narrow;
+    m->left |= outside & searching & m->entered;
+    m->entered |= inside;
+    m->low = pick(inside & searching, m->t, m->low);
+    m->high = pick(outside & searching & m->entered, m->t, m->high);
+    const real size = fmax(fmax(fabs(point.x), fabs(point.y)), fmax(fabs(point.z), m->t));
+    const real finest = fmax(EXIT_TOLERANCE * cone, R(2.0) * (real)(REAL_EPSILON) * size);
+    const mask narrow = searching & m->left & less_equal(m->high - m->low, finest);
+    m->narrow |= narrow;
+    m->height = pick(narrow, (real)(settings->near) * cone, m->height);
+
+    const mask done = sheet | placed;
+    m->found.hit |= done;
+    m->active &= ~done;
+    const real entrance = fmax(ENTRANCE_START * cone, ENTRANCE_GROWTH * (m->t - m->r.near));
+    const real onward = m->t + pick(m->entered, step, fmin(entrance, step));
+    m->t = pick(m->narrow, m->high + m->height, pick(m->left, R(0.5) * (m->low + m->high), onward));
+    // The set may end where its bounds do.
+    m->active &= less_equal(m->t, m->r.far + step);
+}

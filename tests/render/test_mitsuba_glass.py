@@ -1,0 +1,144 @@
+"""A ball of glass beside Mitsuba 3: clear, rough, and of a medium that absorbs.
+
+The ball fills the picture; it stands under a sky that changes with the height and the colour, so that light which is bent the wrong
+way has the wrong colour. Regions are compared as in `test_mitsuba.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import clfractal
+
+Floats = npt.NDArray[np.float64]
+
+SIZE, SAMPLES, SEEDS, REGIONS = 32, 128, 6, 4
+EYE, FOV = [1.0, -3.6, 1.4], 17.0
+TOP, BOTTOM = [1.0, 0.3, 0.1], [0.1, 0.25, 0.8]
+BOUNCES = 24
+INDEX, ALPHA = 1.5, 0.06
+COLOR, DEPTH = [0.8, 0.5, 0.2], 1.0
+_THEIRS = """
+import json, sys
+import mitsuba as mi
+import numpy as np
+mi.set_variant("scalar_rgb")
+from mitsuba import ScalarTransform4f as T
+told = json.load(sys.stdin)
+height = np.cos(np.pi * (np.arange(256) + 0.5) / 256)[:, None, None]
+top, bottom = np.array(told["top"]), np.array(told["bottom"])
+sky = np.broadcast_to(top + (bottom - top) * (0.5 - 0.5 * height), (256, 512, 3)).astype(np.float32).copy()
+ball = {"type": "sphere", "radius": 1.0, "bsdf": told["material"]}
+if told["absorbs"]:
+    ball["interior"] = {
+        "type": "homogeneous", "albedo": 0.0, "scale": 4.0,
+        "sigma_t": {"type": "rgb", "value": [part / 4 for part in told["absorbs"]]},
+    }
+scene = mi.load_dict({
+    "type": "scene",
+    "integrator": {"type": "volpath", "max_depth": told["bounces"] + 2, "rr_depth": 1000},
+    "sensor": {
+        "type": "perspective", "fov": told["fov"], "fov_axis": "y",
+        "to_world": T().look_at(origin=told["eye"], target=[0, 0, 0], up=[0, 0, 1]),
+        "film": {"type": "hdrfilm", "width": told["size"], "height": told["size"], "rfilter": {"type": "box"}},
+        "sampler": {"type": "independent", "sample_count": told["samples"]},
+    },
+    "ball": ball,
+    "sky": {"type": "envmap", "bitmap": mi.Bitmap(sky), "to_world": T().rotate([1, 0, 0], 90)},
+})
+np.save(told["to"], np.stack([np.array(mi.render(scene, seed=1 + seed))[..., :3] for seed in range(told["seeds"])]))
+"""
+
+BALLS: dict[str, tuple[dict[str, Any], dict[str, Any], list[float]]] = {
+    "clear": (
+        {"specular": {"roughness": 0, "ior": INDEX}, "transmission": {"weight": 1}},
+        {"type": "dielectric", "int_ior": INDEX, "ext_ior": 1.0},
+        [],
+    ),
+    "rough": (
+        {"specular": {"roughness": math.sqrt(ALPHA), "ior": INDEX}, "transmission": {"weight": 1}},
+        {"type": "roughdielectric", "distribution": "ggx", "alpha": ALPHA, "int_ior": INDEX, "ext_ior": 1.0},
+        [],
+    ),
+    "amber": (
+        {
+            "specular": {"roughness": 0, "ior": INDEX},
+            "transmission": {"weight": 1, "color": COLOR, "depth": DEPTH},
+        },
+        {"type": "dielectric", "int_ior": INDEX, "ext_ior": 1.0},
+        [-math.log(part) / DEPTH for part in COLOR],
+    ),
+}
+
+
+def theirs(ball: str, folder: Path) -> Floats:
+    """Pictures by Mitsuba, one of each seed, shape (SEEDS, SIZE, SIZE, 3)."""
+    told = {
+        "material": BALLS[ball][1],
+        "absorbs": BALLS[ball][2],
+        "top": TOP,
+        "bottom": BOTTOM,
+        "bounces": BOUNCES,
+        "fov": FOV,
+        "eye": EYE,
+        "size": SIZE,
+        "samples": SAMPLES,
+        "seeds": SEEDS,
+        "to": str(folder / "theirs.npy"),
+    }
+    subprocess.run(
+        [sys.executable, "-c", _THEIRS], input=json.dumps(told), text=True, check=True, timeout=300
+    )
+    return np.asarray(np.load(folder / "theirs.npy"), np.float64)
+
+
+def ours(ball: str) -> Floats:
+    """The same by paths."""
+    pictures = []
+    for seed in range(SEEDS):
+        scene = clfractal.Scene(
+            version=1,
+            formula={"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]},
+            camera={"position": EYE, "target": [0, 0, 0], "fov": FOV},
+            image={"width": SIZE, "height": SIZE},
+            renderer={"samples": SAMPLES, "detail": 0.1, "seed": seed},
+            lighting={"mode": "path", "bounces": BOUNCES, "roulette": BOUNCES},
+            background={"top": TOP, "bottom": BOTTOM},
+            lights=[],
+            materials={"m": BALLS[ball][0]},
+            material={"name": "m"},
+        )
+        film = clfractal.render(scene)
+        pictures.append(np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64))
+    return np.stack(pictures)
+
+
+def regions(pictures: Floats) -> Floats:
+    """Means of regions, shape (SEEDS, REGIONS, REGIONS, 3)."""
+    each = SIZE // REGIONS
+    return np.asarray(pictures.reshape(len(pictures), REGIONS, each, REGIONS, each, 3).mean(axis=(2, 4)))
+
+
+@pytest.mark.parametrize("ball", BALLS)
+def test_balls_of_glass_agree_with_mitsuba(ball: str, tmp_path: Path) -> None:
+    from scipy.stats import t
+
+    # One of all regions fails in a thousand runs.
+    factor = float(t.ppf(1 - 0.001 / 2 / (REGIONS * REGIONS * 3), 2 * SEEDS - 2))
+    one, other = regions(ours(ball)), regions(theirs(ball, tmp_path))
+    error = np.sqrt((one.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)) / SEEDS)
+    difference, scale = one.mean(axis=0) - other.mean(axis=0), other.mean(axis=0)
+    print("MAX", (np.abs(difference) / scale).max(), (error / scale).max(), difference.mean() / scale.mean())
+    assert scale.max() > 0.3
+    assert scale.max() / scale.min() > 2
+    assert (np.abs(difference) <= 0.01 * scale + factor * error + 1e-4).all()
+    assert abs(difference.mean() / scale.mean()) < 0.005
