@@ -26,7 +26,7 @@ from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.sampled import Sampled
-from clfractal.scene.volume import VolumeRenderer
+from clfractal.scene.volume import Transfer, VolumeRenderer
 from clfractal.voxels.blocks import seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid, shows_outside
@@ -35,6 +35,8 @@ from clfractal.voxels.grid import Grid
 TRANSFER_SIZE = 1024
 # Shadow rays leave the surface by this many voxels, so that they do not meet the voxel that they start from.
 SHADOW_LIFT = 1.5
+# What is opaque still has a depth, of which its own light comes and into which paths go.
+MOST_OPACITY = 0.9999
 
 GRID = Struct(
     "Grid",
@@ -82,6 +84,8 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "PALETTE_SIZE": 256,
         **records.LIGHT_DEFINES,
         "TRANSFER_SIZE": TRANSFER_SIZE,
+        "TRANSFER_COLUMNS": transfer_columns(settings.transfer),
+        "HAS_EMISSION": int(settings.transfer.emission is not None),
         "SURFACE": int(settings.transfer.opacity is None),
         "VALUE_IS_FLOAT": int(grid.kind == "float"),
         "NEAREST": int(settings.interpolation == "nearest"),
@@ -194,15 +198,14 @@ def grid_key(scene: Scene, plan: Plan) -> str:
 
 def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
     """The largest value at which a grid's voxels are invisible; None if even the least is visible."""
-    stops = settings.transfer.opacity
-    if stops is None:
+    stops = settings.transfer.visible
+    if not stops:
         return float(
             np.nextafter(np.float32(settings.used_level(given.low, given.high)), np.float32(-np.inf))
         )
-    for before, stop in pairwise(stops):
-        if before.opacity == 0 and stop.opacity > 0:
-            return before.at if stops[0].opacity == 0 else None
-    return None if stops[0].opacity > 0 else stops[-1].at
+    if stops[0][1]:
+        return None
+    return next((at for (at, _), (_, seen) in pairwise(stops) if seen), stops[-1][0])
 
 
 def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
@@ -257,7 +260,8 @@ def unseen_sample(scene: Scene, grid: Grid) -> float:
     record = volume_record(scene, grid, "float32")
     if settings_of(scene).transfer.opacity is None:
         return float(np.nextafter(np.float32(record["level"]), np.float32(-np.inf)))
-    seen = np.flatnonzero(transfer_table(scene, value_range(scene, grid))[:, 0])
+    table = transfer_table(scene, value_range(scene, grid))
+    seen = np.flatnonzero((table[:, 0] > 0) | (table[:, 4:] > 0).any(axis=1))
     if not len(seen):
         return float(np.inf)
     if seen[0] == 0:
@@ -273,7 +277,7 @@ def unseen_sample(scene: Scene, grid: Grid) -> float:
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
     """The values between which the transfer table lies: those of its stops, or of the grid."""
     transfer = settings_of(scene).transfer
-    stops = [stop.at for stop in transfer.opacity or ()] + [stop.at for stop in transfer.color or ()]
+    stops = [stop.at for part in (transfer.opacity, transfer.color, transfer.emission) for stop in part or ()]
     if not stops:
         given = scene.given
         stops = list(grid.range) if given is None else [given.low, given.high]
@@ -282,7 +286,12 @@ def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
 
 
 def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
-    """Opacity of one step, red, green and blue (linear) for values between `limits`; shape (TRANSFER_SIZE, 4)."""
+    """What a kernel needs of values between `limits`; shape (TRANSFER_SIZE, `transfer_columns`).
+
+    The columns are the opacity of one step, the colour (linear), and the light that one step adds, if anything shines. With
+    dL/ds = j - sigma L, a step of length h adds j (1 - exp(-sigma h)) / sigma (Max 1995, Optical models for direct volume
+    rendering, Eq. 5), so that pictures do not depend on the step.
+    """
     settings = settings_of(scene)
     transfer = settings.transfer
     values = np.linspace(*limits, TRANSFER_SIZE)
@@ -291,13 +300,37 @@ def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
         table[:, 0] = 1.0
     else:
         opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
+        if transfer.emission is not None:
+            opacity = np.minimum(opacity, MOST_OPACITY)
         # An opacity is that of one voxel's side; a step is a part of it (Beer's law).
         table[:, 0] = 1 - (1 - opacity) ** settings.step
     if transfer.color is None:
         table[:, 1:] = scene.material.color
     else:
         table[:, 1:] = _mixed(values, [(stop.at, stop.color) for stop in transfer.color])
+    if transfer.opacity is not None and transfer.emission is not None:
+        shines = _mixed(values, [(stop.at, stop.emission) for stop in transfer.emission])
+        table = np.hstack([table, shines * _shining_length(extinction(values, transfer), settings.step)])
     return np.ascontiguousarray(table, np.float32)
+
+
+def extinction(values: npt.NDArray[np.float64], transfer: Transfer) -> npt.NDArray[np.float64]:
+    """Extinction per side of a voxel where a voxel has these values; an opacity of 1 counts as MOST_OPACITY."""
+    assert transfer.opacity is not None
+    opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
+    return -np.log1p(-np.minimum(opacity, MOST_OPACITY))
+
+
+def _shining_length(extinctions: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.float64]:
+    """The length of a step in sides of a voxel, as its own light is dimmed in it; shape (n, 1)."""
+    depth = extinctions * step
+    length = step * -np.expm1(-depth) / np.where(depth > 0, depth, 1)
+    return np.where(depth > 0, length, step)[:, None]
+
+
+def transfer_columns(transfer: Transfer) -> int:
+    """Numbers of the transfer table for one value."""
+    return 4 if transfer.emission is None else 7
 
 
 def _mixed(
