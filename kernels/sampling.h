@@ -34,6 +34,7 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_SCATTER 8u
 #define PURPOSE_CHOICES 9u
 #define PURPOSE_AIR 10u
+#define PURPOSE_FLIGHT 11u
 #define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0

@@ -17,6 +17,7 @@
 #include "state.h"
 #include "eye.h"
 #include "cones.h"
+#include "sky.h"
 #include "spot.h"
 #include "pixel_points.h"
 #include "light_places.h"
@@ -32,6 +33,7 @@
 #include "bsdf.h"
 #include "material_at.h"
 #include "lights.h"
+#include "light_asks.h"
 #include "paths.h"
 #endif
 

@@ -7,6 +7,10 @@ typedef struct {
     __global const float *transfer;   // TRANSFER_SIZE entries of TRANSFER_COLUMNS numbers: opacity of a step, colour, light that a step adds
     grid grid;
     __constant const struct Sampling *sampling;
+#if HAS_PATHS
+    __global const float *bounds;        // of each stored brick the most extinction that may be met in it
+    __global const float *environment;   // see environment.h
+#endif
 #if PLANES > 0
     plane_set planes;
 #endif
@@ -106,7 +110,7 @@ INLINE real transfer_column(transfer_place p, int column, __global const float *
     return between(gather_floats(transfer, at), gather_floats(transfer, at + TRANSFER_COLUMNS), p.share);
 }
 
-// The opacity of a step where the value is this.
+// The opacity of a step where the value is this; of paths the extinction.
 INLINE real opacity_of(real value, world w) { return transfer_column(transfer_at(value, w.settings), 0, w.transfer); }
 
 #if HAS_EMISSION

@@ -172,6 +172,10 @@ class VolumeRenderer(Sampled):
     transfer: Transfer = Field(
         default_factory=dict, validate_default=True, description="opacity and colour of the voxels' values"
     )
+    anisotropy: Annotated[float, Field(strict=True, ge=-0.95, le=0.95)] = Field(
+        0.0,
+        description="where light is scattered to, with lighting.mode path: 0 everywhere alike, 0.95 nearly straight on, below 0 back",
+    )
     shadows: bool = Field(
         False, description="whether lights with `shadow: true` cast shadows inside the grid"
     )
