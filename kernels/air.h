@@ -1,12 +1,6 @@
 // Light that fog scatters towards the eye: for each light and sample one place of the ray, and from there a ray to the light. Where
 // the set is in the way, the fog is dark: shafts of light stand between the shadows.
-
-// The part of light that is scattered into a direction, per steradian (Henyey and Greenstein 1941); `cosine`: between the ways before
-// and after.
-INLINE real phase_of(real cosine, scalar g) {
-    const real base = fmax((real)(S(1.0) + g * g) - (real)(S(2.0) * g) * cosine, R(1e-6));
-    return (real)((S(1.0) - g * g) * S(0.07957747154594767)) / (base * sqrt(base));
-}
+#include "phase.h"
 
 // The fog's density at a distance along a ray.
 INLINE real fog_density_at(vec origin, vec direction, real t, __constant const struct Material *m) {

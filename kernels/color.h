@@ -17,6 +17,13 @@ INLINE color color_mix(color a, color b, real share) {
 INLINE color color_add(color a, color b) { return color_of(a.r + b.r, a.g + b.g, a.b + b.b); }
 INLINE color color_mul(color a, color b) { return color_of(a.r * b.r, a.g * b.g, a.b * b.b); }
 INLINE color color_scale(color a, real s) { return color_of(a.r * s, a.g * s, a.b * s); }
+INLINE real brightest(color c) { return fmax(fmax(c.r, c.g), c.b); }
+
+// A colour whose brightest component is at most the limit: one sample must not outshine all others of its pixel.
+INLINE color color_limited(color c, real limit) {
+    const real brightest = fmax(fmax(c.r, c.g), c.b);
+    return color_scale(c, pick(less(limit, brightest), limit / brightest, R(1.0)));
+}
 
 // Where a quantity lies in the palette, 0 to 1, at scale * quantity + offset: the palette repeats, or its ends go on.
 INLINE real place_in_palette(real quantity, scalar scale, scalar offset, int repeat) {

@@ -41,6 +41,20 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     return gathered;
 }
 
+// The first thing that the eye sees here is a light: a spot for depth and coverage, without light of others.
+INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real far, mask met) {
+    if (!any_lane(met) || s.bounce > 0) return;
+    sighting first;
+    STATE_RECALL(s, first, STATE_SIGHTING);
+    first.coverage = pick(met, R(1.0), first.coverage);
+    STATE_KEEP(s, first, STATE_SIGHTING);
+    found->found = pick(met, R(1.0), found->found);
+    found->point = vec_pick(met, vec_along(origin, far, direction), found->point);
+    found->seen = vec_pick(met, found->point, found->seen);
+    found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
+    spot_keep(found, s.state, 0, s.stride);
+}
+
 // A path that meets a light before the surface ends there.
 INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, world w) {
     real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));

@@ -35,6 +35,7 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_CHOICES 9u
 #define PURPOSE_AIR 10u
 #define PURPOSE_WAVE 11u
+#define PURPOSE_FLIGHT 12u
 #define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0

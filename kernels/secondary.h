@@ -1,11 +1,6 @@
 // Rays that leave the surface for its light: towards parts of a light that has a size, and into the hemisphere.
 
-// A colour whose brightest component is at most the limit: one sample must not outshine all others of its pixel.
-INLINE color limited(color c, __constant const struct March *settings) {
-    const real brightest = fmax(fmax(c.r, c.g), c.b);
-    const real limit = (real)(settings->firefly_limit);
-    return color_scale(c, pick(less(limit, brightest), limit / brightest, R(1.0)));
-}
+INLINE color limited(color c, __constant const struct March *settings) { return color_limited(c, (real)(settings->firefly_limit)); }
 
 #if HAS_SOFT_LIGHT
 // The direction to the part of a light that this ray goes to; `toward` is the direction to its middle.

@@ -1,15 +1,5 @@
 // Spots of the surface, of what marches have met.
 
-// The background where nothing is hit, for rays from the eye (`mirrored` 0) and for mirrored ones.
-INLINE color sky(vec direction, real picture_y, int mirrored, world w) {
-#if HAS_ENVIRONMENT
-    if (mirrored || w.material->environment_seen) return environment_color(direction, w.material, w.environment);
-#endif
-    const real share = mirrored ? R(0.5) - R(0.5) * direction.z : picture_y / (real)((scalar)w.view->height);
-    return color_mix(color_splat(w.material->background_top), color_splat(w.material->background_bottom),
-                     clamp(share, R(0.0), R(1.0)));
-}
-
 // Normals of a spot: only the first one, and that of pixels with points, may have several.
 INLINE int facet_count(int bounce) { return POINTS > 1 && bounce == 0 ? NORMAL_COUNT : 1; }
 

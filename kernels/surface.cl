@@ -17,6 +17,7 @@
 #include "state.h"
 #include "eye.h"
 #include "cones.h"
+#include "sky.h"
 #include "spot.h"
 #include "pixel_points.h"
 #include "light_places.h"
@@ -35,6 +36,7 @@
 #if HAS_GLASS
 #include "glass_paths.h"
 #endif
+#include "light_asks.h"
 #include "paths.h"
 #endif
 

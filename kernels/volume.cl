@@ -32,10 +32,20 @@ typedef float sample;
 typedef uchar sample;
 #endif
 #include "grid.h"
+#if HAS_ENVIRONMENT
+#include "environment.h"
+#endif
 #include "volume_ray.h"
 #include "volume_light.h"
 #include "volume_sight.h"
 #include "volume_shot.h"
+#if HAS_PATHS
+#include "sky.h"
+#include "light_places.h"
+#include "lights.h"
+#include "light_asks.h"
+#include "volume_paths.h"
+#endif
 
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
     real lens_x = R(0.0), lens_y = R(0.0);
@@ -45,7 +55,11 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     unit_disk(lens_x, lens_y, &lens_x, &lens_y);
 #endif
     const real time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
+#if HAS_PATHS
+    return take_path(at, at->x + across, at->y + below, lens_x, lens_y, time, sample, active, w, &cost->steps);
+#else
     return take_shot(at->x + across, at->y + below, lens_x, lens_y, time, active, w, &cost->steps);
+#endif
 }
 
 #include "packets.h"
@@ -56,6 +70,9 @@ __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __c
                      __global const sample *values0, __global const sample *values1, __global const sample *values2,
                      __global const sample *values3, __global const uchar *normals0, __global const uchar *normals1,
                      __global const uchar *normals2, __global const uchar *normals3,
+#if HAS_PATHS
+                     __global const float *bounds, __global const float *environment,
+#endif
 #if PLANES > 0
                      __global const struct CutPlane *planes, __constant const struct Orbit *orbits,
                      __constant const scalar *k, __global const float *plane_palettes,
@@ -64,6 +81,9 @@ __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __c
     const world w = {view, settings, material, lights, transfer,
                      {about, table, blocks, {values0, values1, values2, values3}, {normals0, normals1, normals2, normals3}},
                      sampling
+#if HAS_PATHS
+                     , bounds, environment
+#endif
 #if PLANES > 0
                      , {planes, orbits, k, plane_palettes}
 #endif

@@ -4,9 +4,13 @@ typedef struct {
     __constant const struct Volume *settings;
     __constant const struct Material *material;
     __constant const struct Light *lights;
-    __global const float *transfer;   // TRANSFER_SIZE entries: opacity of a step, red, green, blue
+    __global const float *transfer;   // TRANSFER_SIZE entries of TRANSFER_COLUMNS numbers: opacity of a step, colour, light that a step adds
     grid grid;
     __constant const struct Sampling *sampling;
+#if HAS_PATHS
+    __global const float *bounds;        // of each stored brick the most extinction that may be met in it
+    __global const float *environment;   // see environment.h
+#endif
 #if PLANES > 0
     plane_set planes;
 #endif
@@ -102,12 +106,20 @@ INLINE transfer_place transfer_at(real value, __constant const struct Volume *se
 }
 
 INLINE real transfer_column(transfer_place p, int column, __global const float *transfer) {
-    const ints at = 4 * p.first + column;
-    return between(gather_floats(transfer, at), gather_floats(transfer, at + 4), p.share);
+    const ints at = TRANSFER_COLUMNS * p.first + column;
+    return between(gather_floats(transfer, at), gather_floats(transfer, at + TRANSFER_COLUMNS), p.share);
 }
 
-// The opacity of a step where the value is this.
+// The opacity of a step where the value is this; of paths the extinction.
 INLINE real opacity_of(real value, world w) { return transfer_column(transfer_at(value, w.settings), 0, w.transfer); }
+
+#if HAS_EMISSION
+// The light that a step adds by itself where the value is this.
+INLINE color emission_of(real value, world w) {
+    const transfer_place p = transfer_at(value, w.settings);
+    return color_of(transfer_column(p, 4, w.transfer), transfer_column(p, 5, w.transfer), transfer_column(p, 6, w.transfer));
+}
+#endif
 
 // The colour of a value, or that of a normal: the thesis's (n + 1) / 2.
 INLINE color tint_of(real value, vec normal, world w) {

@@ -167,6 +167,10 @@ INLINE mask sight_step(sight *e, unlit *u, grid_ray g, mask active, real *number
         const real value = grid_value(c, entry, seen, w.grid), opacity = opacity_of(value, w);
         const mask adds = seen & less(R(0.0), opacity);
         onward = pick(seen, *number + R(1.0), onward);
+#if HAS_EMISSION
+        sight_quads(e, distance_of(g, *number, w), seen, q, w);
+        e->light = color_pick(seen, color_add(e->light, color_scale(emission_of(value, w), e->through)), e->light);
+#endif
         if (any_lane(adds)) {
             const real t = distance_of(g, *number, w);
             sight_quads(e, t, adds, q, w);

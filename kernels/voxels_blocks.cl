@@ -1,4 +1,4 @@
-// Which parts of stored bricks may be seen: a bit for each block of 2 x 2 x 2 cells. One work-item takes one brick.
+// Which parts of stored bricks may be seen: a bit for each block of 2 x 2 x 2 cells; and the values in each. One work-item takes one brick.
 //
 // From the build: VALUE, the type of a stored value.
 #include "direct.h"
@@ -33,4 +33,20 @@ __kernel void seen_blocks(__global uint2 *blocks, __global const VALUE *values, 
         }
     }
     blocks[slot + brick] = (uint2)((uint)bits, (uint)(bits >> 32));
+}
+
+// The least and the largest sample of the bricks from `first` on, in slots from `slot` on; everything, if one is not a number.
+__kernel void brick_ranges(__global float2 *ranges, __global const VALUE *values, int first, int count, int slot) {
+    const int brick = first + (int)get_global_id(1);
+    if (brick >= count) return;
+    __global const VALUE *value = values + (size_t)brick * BRICK_STRIDE;
+    float low = INFINITY, high = -INFINITY;
+    int unknown = 0;
+    for (int i = 0; i < BRICK_SIDE * BRICK_SIDE * BRICK_SIDE; ++i) {
+        const float one = (float)value[i];
+        unknown |= one != one;
+        low = fmin(low, one);
+        high = fmax(high, one);
+    }
+    ranges[slot + brick] = unknown ? (float2)(-INFINITY, INFINITY) : (float2)(low, high);
 }

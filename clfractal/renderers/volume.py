@@ -17,17 +17,19 @@ from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
+from clfractal.renderers.environment import PackedEnvironment, packed_map
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.sampled import Sampled
-from clfractal.scene.volume import VolumeRenderer
-from clfractal.voxels.blocks import seen_blocks
+from clfractal.scene.volume import Transfer, VolumeRenderer
+from clfractal.voxels.blocks import brick_ranges, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid, shows_outside
 from clfractal.voxels.grid import Grid
@@ -35,6 +37,10 @@ from clfractal.voxels.grid import Grid
 TRANSFER_SIZE = 1024
 # Shadow rays leave the surface by this many voxels, so that they do not meet the voxel that they start from.
 SHADOW_LIFT = 1.5
+# What is opaque still has a depth, of which its own light comes and into which paths go.
+MOST_OPACITY = 0.9999
+# How often, at least, a ray stops per side of a voxel to see what shines there.
+SHINING_RATE = 0.25
 
 GRID = Struct(
     "Grid",
@@ -58,6 +64,12 @@ VOLUME = Struct(
         Field("value_offset", "real", 0, "... and what the kept value 0 stands for"),
         Field("opacity_limit", "real", 0, "a ray ends once it is that opaque"),
         Field("shadow_lift", "real", 0, "where shadow rays start above the surface, scene units"),
+        Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
+        Field("firefly_limit", "real", 0, "most light that one bounce of a sample may add"),
+        Field("anisotropy", "real", 0, "Henyey and Greenstein's g"),
+        Field("seed", "uint", 0, "chooses where paths go"),
+        Field("bounces", "int", 0, "most bounces of a path after the first place that scatters it"),
+        Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("max_steps", "int", 0, "most places of a ray"),
         Field("light_count", "int", 0, "number of lights"),
     ],
@@ -82,12 +94,18 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "PALETTE_SIZE": 256,
         **records.LIGHT_DEFINES,
         "TRANSFER_SIZE": TRANSFER_SIZE,
+        "TRANSFER_COLUMNS": transfer_columns(settings.transfer),
+        "HAS_EMISSION": int(settings.transfer.emission is not None),
         "SURFACE": int(settings.transfer.opacity is None),
         "VALUE_IS_FLOAT": int(grid.kind == "float"),
         "NEAREST": int(settings.interpolation == "nearest"),
         "POOLS": len(grid.values),
         "TINTED": int(settings.transfer.color is not None),
-        "HAS_SHADOWS": int(settings.shadows and any(light.shadow for light in scene.lights)),
+        "HAS_SHADOWS": int(
+            settings.shadows and any(light.shadow for light in scene.lights) and not has_paths(scene)
+        ),
+        "HAS_PATHS": int(has_paths(scene)),
+        "HAS_ENVIRONMENT": int(has_paths(scene) and scene.environment is not None),
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
         "ADAPTIVE": int(settings.noise is not None),
@@ -140,16 +158,35 @@ class VolumeKernel(TileKernel):
         )
         four = (0, 1, 2, 3)
         return [
-            volume_record(scene, grid, precision),
+            volume_record(scene, grid, precision, self._environment),
             grid_record(scene, grid, precision),
-            records.material_record(scene, precision),
+            records.material_record(scene, precision, self._environment),
             records.light_records(scene, precision),
             transfer_table(scene, value_range(scene, grid)),
             grid.table,
             blocks,
             *(_one_of(grid.values, pool) for pool in four),
             *(_one_of(grid.normals, pool) for pool in four),
+            *(self._path_arguments() if has_paths(scene) else []),
             *(_plane_arguments(scene, precision) if scene.cut_planes else []),
+        ]
+
+    @cached_property
+    def _environment(self) -> PackedEnvironment | None:
+        found = self.scene.surroundings if has_paths(self.scene) else None
+        if found is None:
+            return None
+        return self.resources.kept.once(f"environment {found.digest}", lambda: packed_map(found))
+
+    def _path_arguments(self) -> list[KernelArgument]:
+        """The bricks' bounds, and the environment."""
+        grid, packed = self.grid, self._environment
+        ranges = self.resources.kept.once(
+            f"{self._grid_key} ranges", lambda: brick_ranges(grid, self.resources.on_compile)
+        )
+        return [
+            brick_bounds(self.scene, grid, ranges),
+            np.zeros(1, np.float32) if packed is None else packed.data,
         ]
 
     @cached_property
@@ -185,7 +222,15 @@ def grid_key(scene: Scene, plan: Plan) -> str:
     settings, given = settings_of(scene), scene.given
     shown = settings.model_dump(
         mode="json",
-        exclude={*Sampled.model_fields, "transfer", "level", "step", "shadows", "opacity_limit"},
+        exclude={
+            *Sampled.model_fields,
+            "transfer",
+            "level",
+            "step",
+            "shadows",
+            "opacity_limit",
+            "anisotropy",
+        },
     )
     solid = scene.formula.mapping() if given is None else given.digest
     seen = shows_outside(settings) if given is None else least_visible(settings, given)
@@ -194,15 +239,14 @@ def grid_key(scene: Scene, plan: Plan) -> str:
 
 def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
     """The largest value at which a grid's voxels are invisible; None if even the least is visible."""
-    stops = settings.transfer.opacity
-    if stops is None:
+    stops = settings.transfer.visible
+    if not stops:
         return float(
             np.nextafter(np.float32(settings.used_level(given.low, given.high)), np.float32(-np.inf))
         )
-    for before, stop in pairwise(stops):
-        if before.opacity == 0 and stop.opacity > 0:
-            return before.at if stops[0].opacity == 0 else None
-    return None if stops[0].opacity > 0 else stops[-1].at
+    if stops[0][1]:
+        return None
+    return next((at for (at, _), (_, seen) in pairwise(stops) if seen), stops[-1][0])
 
 
 def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
@@ -223,11 +267,14 @@ def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[A
     return GRID.value(precision, values)
 
 
-def volume_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
+def volume_record(
+    scene: Scene, grid: Grid, precision: Precision, environment: PackedEnvironment | None = None
+) -> npt.NDArray[Any]:
     """How rays go through the grid and how pixels are put together."""
     settings = settings_of(scene)
     voxel = float(min(grid.spacing)) * _zoom(scene)
-    step = settings.step * voxel
+    # Paths count in sides of a voxel.
+    step = voxel if has_paths(scene) else settings.step * voxel
     longest = float(np.linalg.norm(np.array(grid.spacing) * np.array(grid.shape))) * _zoom(scene)
     per_sample = (grid.range[1] - grid.range[0]) / full_sample(grid)
     low, high = ((value - grid.range[0]) / per_sample for value in value_range(scene, grid))
@@ -241,10 +288,64 @@ def volume_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray
         "value_offset": grid.range[0],
         "opacity_limit": settings.opacity_limit,
         "shadow_lift": SHADOW_LIFT * voxel,
+        **_path_fields(scene, environment),
         "max_steps": int(np.ceil(longest / step)) + 2,
         "light_count": len(scene.lights),
     }
     return VOLUME.value(precision, values)
+
+
+def has_paths(scene: Scene) -> bool:
+    """Whether light goes along paths."""
+    return isinstance(scene.lighting, PathLighting)
+
+
+def _path_fields(scene: Scene, environment: PackedEnvironment | None) -> dict[str, object]:
+    """The fields of a Volume for `kernels/volume_paths.h`."""
+    settings, lighting = settings_of(scene), scene.lighting
+    largest = float(np.finfo(np.float32).max) / 16
+    if not isinstance(lighting, PathLighting):
+        names = ("environment_weight", "firefly_limit", "anisotropy", "seed", "bounces", "roulette")
+        return dict.fromkeys(names, 0)
+    return {
+        "environment_weight": records.environment_weight(scene, environment),
+        "firefly_limit": largest if lighting.clamp is None else min(lighting.clamp, largest),
+        "anisotropy": settings.anisotropy,
+        "seed": settings.seed,
+        "bounces": lighting.bounces,
+        "roulette": lighting.roulette,
+    }
+
+
+def brick_bounds(scene: Scene, grid: Grid, ranges: Floats) -> Floats:
+    """A bound of the extinction in each brick, per side of a voxel; where something shines at least SHINING_RATE.
+
+    Args:
+        ranges: the least and the largest sample of each slot, see `brick_ranges`.
+    """
+    record = volume_record(scene, grid, "float32")
+    table = transfer_table(scene, value_range(scene, grid))
+    most = table[:, 0].astype(np.float64)
+    most = np.where((table[:, 4:] > 0).any(axis=1), np.maximum(most, SHINING_RATE), most)
+    # An entry further either way, for what rounding does to a place in the table.
+    with np.errstate(invalid="ignore", over="ignore"):
+        places = (
+            (ranges.astype(np.float64) - float(record["low"])) * float(record["range"]) * (TRANSFER_SIZE - 1)
+        )
+    places = np.clip(np.nan_to_num(places, posinf=np.inf, neginf=-np.inf), 0, TRANSFER_SIZE - 1)
+    first = np.maximum(np.floor(places[:, 0]).astype(int) - 1, 0)
+    last = np.minimum(np.ceil(places[:, 1]).astype(int) + 1, TRANSFER_SIZE - 1)
+    # The largest of 2^k entries from each on; two of these cover any range.
+    levels = [most]
+    while 2 ** len(levels) <= TRANSFER_SIZE:
+        half = 2 ** (len(levels) - 1)
+        before = levels[-1]
+        levels.append(np.maximum(before, np.append(before[half:], np.full(half, before[-1]))))
+    last = np.maximum(last, first)
+    level = np.log2(last - first + 1).astype(int)
+    stacked = np.stack(levels)
+    bounds = np.maximum(stacked[level, first], stacked[level, last + 1 - 2**level])
+    return (bounds * (1 + 1e-5)).astype(np.float32)
 
 
 def full_sample(grid: Grid) -> float:
@@ -257,7 +358,8 @@ def unseen_sample(scene: Scene, grid: Grid) -> float:
     record = volume_record(scene, grid, "float32")
     if settings_of(scene).transfer.opacity is None:
         return float(np.nextafter(np.float32(record["level"]), np.float32(-np.inf)))
-    seen = np.flatnonzero(transfer_table(scene, value_range(scene, grid))[:, 0])
+    table = transfer_table(scene, value_range(scene, grid))
+    seen = np.flatnonzero((table[:, 0] > 0) | (table[:, 4:] > 0).any(axis=1))
     if not len(seen):
         return float(np.inf)
     if seen[0] == 0:
@@ -273,7 +375,7 @@ def unseen_sample(scene: Scene, grid: Grid) -> float:
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
     """The values between which the transfer table lies: those of its stops, or of the grid."""
     transfer = settings_of(scene).transfer
-    stops = [stop.at for stop in transfer.opacity or ()] + [stop.at for stop in transfer.color or ()]
+    stops = [stop.at for part in (transfer.opacity, transfer.color, transfer.emission) for stop in part or ()]
     if not stops:
         given = scene.given
         stops = list(grid.range) if given is None else [given.low, given.high]
@@ -282,7 +384,13 @@ def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
 
 
 def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
-    """Opacity of one step, red, green and blue (linear) for values between `limits`; shape (TRANSFER_SIZE, 4)."""
+    """What a kernel needs of values between `limits`; shape (TRANSFER_SIZE, `transfer_columns`).
+
+    For paths the columns are the extinction per side of a voxel, the colour, and the light that a side adds. Else they
+    are the opacity of one step, the colour (linear), and the light that one step adds, if anything shines. With
+    dL/ds = j - sigma L, a step of length h adds j (1 - exp(-sigma h)) / sigma (Max 1995, Optical models for direct volume
+    rendering, Eq. 5), so that pictures do not depend on the step.
+    """
     settings = settings_of(scene)
     transfer = settings.transfer
     values = np.linspace(*limits, TRANSFER_SIZE)
@@ -291,13 +399,42 @@ def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
         table[:, 0] = 1.0
     else:
         opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
-        # An opacity is that of one voxel's side; a step is a part of it (Beer's law).
-        table[:, 0] = 1 - (1 - opacity) ** settings.step
+        if transfer.emission is not None:
+            opacity = np.minimum(opacity, MOST_OPACITY)
+        # An opacity is that of one voxel's side; a step is a part of it (Beer's law). Paths want what it is made of.
+        if has_paths(scene):
+            table[:, 0] = extinction(values, transfer)
+        else:
+            table[:, 0] = 1 - (1 - opacity) ** settings.step
     if transfer.color is None:
         table[:, 1:] = scene.material.color
     else:
         table[:, 1:] = _mixed(values, [(stop.at, stop.color) for stop in transfer.color])
+    if transfer.opacity is not None and transfer.emission is not None:
+        shines = _mixed(values, [(stop.at, stop.emission) for stop in transfer.emission])
+        if not has_paths(scene):
+            shines = shines * _shining_length(extinction(values, transfer), settings.step)
+        table = np.hstack([table, shines])
     return np.ascontiguousarray(table, np.float32)
+
+
+def extinction(values: npt.NDArray[np.float64], transfer: Transfer) -> npt.NDArray[np.float64]:
+    """Extinction per side of a voxel where a voxel has these values; an opacity of 1 counts as MOST_OPACITY."""
+    assert transfer.opacity is not None
+    opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
+    return -np.log1p(-np.minimum(opacity, MOST_OPACITY))
+
+
+def _shining_length(extinctions: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.float64]:
+    """The length of a step in sides of a voxel, as its own light is dimmed in it; shape (n, 1)."""
+    depth = extinctions * step
+    length = step * -np.expm1(-depth) / np.where(depth > 0, depth, 1)
+    return np.where(depth > 0, length, step)[:, None]
+
+
+def transfer_columns(transfer: Transfer) -> int:
+    """Numbers of the transfer table for one value."""
+    return 4 if transfer.emission is None else 7
 
 
 def _mixed(

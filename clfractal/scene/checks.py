@@ -190,9 +190,7 @@ def check_lighting(scene: Scene) -> None:
         return
     renderer = scene.renderer
     if isinstance(renderer, VolumeRenderer):
-        raise SceneError(
-            "must be direct for a volume, got path; surfaces are lit along paths", Where(path="lighting.mode")
-        )
+        _check_medium(scene, renderer)
     if isinstance(renderer, SurfaceRenderer):
         _check_paths(scene, renderer)
 
@@ -206,6 +204,22 @@ def _check_paths(scene: Scene, renderer: SurfaceRenderer) -> None:
         )
     if scene.cut_planes:
         raise SceneError("cannot be combined with lighting.mode path yet", Where(path="cut_planes"))
+
+
+def _check_medium(scene: Scene, renderer: VolumeRenderer) -> None:
+    """Paths go through media; what they would have to know besides is refused."""
+    if renderer.transfer.opacity is None:
+        raise SceneError(
+            "must be direct for a volume's surface, got path; give renderer.transfer.opacity for a medium, or use the"
+            " surface renderer",
+            Where(path="lighting.mode"),
+        )
+    for key, given in (("cut_planes", bool(scene.cut_planes)), ("fog", scene.fog is not None)):
+        if given:
+            raise SceneError(
+                "cannot be combined with lighting.mode path in a volume; remove it, or use lighting.mode direct",
+                Where(path=key),
+            )
 
 
 def _check_lights(scene: Scene) -> None:

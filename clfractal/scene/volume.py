@@ -59,8 +59,17 @@ class ColorStop(Section):
     color: Color = Field(description="linear Rec. 709")
 
 
+class EmissionStop(Section):
+    """Light of its own at a value of a voxel; between two stops it is interpolated."""
+
+    at: float = Field(ge=-1e12, le=1e12, description="value of a voxel at this stop")
+    emission: Color = Field(
+        description="light that the length of a voxel's side adds where nothing dims it, linear Rec. 709"
+    )
+
+
 class Transfer(Section):
-    """Opacity and colour of the voxels' values."""
+    """Opacity, colour and emission of the voxels' values."""
 
     opacity: Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = (
         Field(None, description="stops in order of `at`; null: a surface at the renderer's level")
@@ -68,10 +77,13 @@ class Transfer(Section):
     color: Annotated[tuple[ColorStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = Field(
         None, description="stops in order of `at`; null: the material's colour"
     )
+    emission: (
+        Annotated[tuple[EmissionStop, ...], Field(strict=False, min_length=1, max_length=256)] | None
+    ) = Field(None, description="stops in order of `at`, beside `opacity`; null: nothing shines by itself")
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        for name in ("opacity", "color"):
+        for name in ("opacity", "color", "emission"):
             stops = getattr(self, name) or ()
             for index in range(1, len(stops)):
                 if stops[index].at < stops[index - 1].at:
@@ -80,7 +92,36 @@ class Transfer(Section):
                         f" got {stops[index].at:g}",
                         f"{name}.{index}.at",
                     )
+        if self.emission is not None and self.opacity is None:
+            raise problem("needs opacity, since a surface at a level has no depth that shines", "emission")
         return self
+
+    @property
+    def visible(self) -> tuple[tuple[float, bool], ...]:
+        """Values in order, and whether there is something to see at each; between two of them, where one is to be seen.
+
+        Empty where a surface is shown.
+        """
+        if self.opacity is None:
+            return ()
+        values = sorted({stop.at for stop in (*self.opacity, *(self.emission or ()))})
+        return tuple((at, self.shows(at)) for at in values)
+
+    def shows(self, value: float) -> bool:
+        """Whether a value has an opacity or an emission; where one of them jumps, on either side."""
+        opaque = [(stop.at, stop.opacity) for stop in self.opacity or ()]
+        shining = [(stop.at, max(stop.emission)) for stop in self.emission or ()]
+        return any(_shows(stops, value) for stops in (opaque, shining) if stops)
+
+
+def _shows(stops: list[tuple[float, float]], value: float) -> bool:
+    """Whether a function through stops in order is above 0 at a value, on either side of it."""
+    here = [amount for at, amount in stops if at == value]
+    if here:
+        return max(here) > 0
+    before = [amount for at, amount in stops if at < value][-1:] or [stops[0][1]]
+    after = [amount for at, amount in stops if at > value][:1] or [stops[-1][1]]
+    return before[0] > 0 or after[0] > 0
 
 
 class VolumeRenderer(Sampled):
@@ -130,6 +171,10 @@ class VolumeRenderer(Sampled):
     )
     transfer: Transfer = Field(
         default_factory=dict, validate_default=True, description="opacity and colour of the voxels' values"
+    )
+    anisotropy: Annotated[float, Field(strict=True, ge=-0.95, le=0.95)] = Field(
+        0.0,
+        description="where light is scattered to, with lighting.mode path: 0 everywhere alike, 0.95 nearly straight on, below 0 back",
     )
     shadows: bool = Field(
         False, description="whether lights with `shadow: true` cast shadows inside the grid"

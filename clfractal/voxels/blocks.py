@@ -1,17 +1,19 @@
-"""Finds the parts of stored bricks that may be visible: the octree's last levels, for values above a given one."""
+"""What stored bricks hold: the parts that may be visible, the octree's last levels; and the range of their values."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.launch import run_in_parts
 from clfractal.voxels.grid import Grid
-from clfractal.voxels.programs import blocks_recipe, build_all
+from clfractal.voxels.programs import blocks_recipe, build_all, ranges_recipe
 
 BLOCK_BYTES = 8
+RANGE_BYTES = 8
 
 
 def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | None = None) -> cl.Buffer:
@@ -48,3 +50,32 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
             first_part=4096,
         )
     return blocks
+
+
+def brick_ranges(grid: Grid, on_compile: Callable[[str], None] | None = None) -> npt.NDArray[np.float32]:
+    """The least and the largest sample of each slot, as samples are kept; shape (slots, 2), infinite where one is NaN.
+
+    Raises:
+        DeviceError: status 2 if there is no room, 3 if the device failed.
+        KernelBuildError: the program does not compile.
+    """
+    device = grid.device
+    built = build_all(device, [ranges_recipe(grid.kind)], on_compile)[0]
+    ranges = device.buffer(RANGE_BYTES * grid.parts.slots, "the ranges of bricks")
+    for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
+        with device.failures("reading the grid's bricks"):
+            built.kernel.set_args(ranges, values, np.int32(0), np.int32(after - first), np.int32(first))
+        run_in_parts(
+            device,
+            built.kernel,
+            2,
+            after - first,
+            doing="reading the grid's bricks",
+            group=built.group,
+            first_part=4096,
+        )
+    found = np.empty((grid.parts.slots, 2), np.float32)
+    with device.failures("reading the grid's bricks"):
+        cl.enqueue_copy(device.queue, found, ranges)
+    ranges.release()
+    return found

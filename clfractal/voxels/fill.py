@@ -110,12 +110,7 @@ def check_grid(lattice: Lattice, renderer: VolumeRenderer, device: Device) -> No
 
 def shows_outside(renderer: VolumeRenderer) -> bool:
     """Whether a voxel that is outside, of value 0, can be seen."""
-    stops = renderer.transfer.opacity
-    if stops is None:
-        return False
-    opacity = float(np.interp(0.0, [stop.at for stop in stops], [stop.opacity for stop in stops]))
-    # Where the opacity jumps at 0 either side may be met.
-    return max([opacity, *(stop.opacity for stop in stops if stop.at == 0)]) > 0
+    return renderer.transfer.opacity is not None and renderer.transfer.shows(0.0)
 
 
 class _Filler:

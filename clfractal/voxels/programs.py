@@ -213,6 +213,13 @@ def blocks_recipe(kept: Kind) -> Recipe:
     return Recipe("voxels_blocks.cl", "seen_blocks", defines, "float32", None, 1, BRICK_GROUP, arguments)
 
 
+def ranges_recipe(kept: Kind) -> Recipe:
+    """`brick_ranges`: the least and the largest sample of stored bricks."""
+    defines: dict[str, object] = {"VALUE": C_TYPES[kept]}
+    arguments = (_BUFFER, _BUFFER, _INT, _INT, _INT)
+    return Recipe("voxels_blocks.cl", "brick_ranges", defines, "float32", None, 1, BRICK_GROUP, arguments)
+
+
 def normals_recipe(
     chain: Chain, formula: FormulaText, renderer: VolumeRenderer, lanes: int, precision: Precision
 ) -> Recipe:

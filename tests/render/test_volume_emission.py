@@ -1,0 +1,93 @@
+"""Light that a medium adds by itself, beside the integral of dL/ds = j - sigma L through a cube of one density."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.renderers.volume import MOST_OPACITY
+from clfractal.scene.load import load_scene
+from tests.render.shots import Floats, rays, shoot, stacked
+from tests.render.volumes import keep, to_box
+
+SIDE, VOXELS = 2.0, 20
+VOXEL = SIDE / VOXELS
+CORNER = np.full(3, -SIDE / 2)
+CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
+DARK: dict[str, Any] = {
+    "material": {"color": [0, 0, 0], "specular": 0},
+    "lights": [],
+    "background": "transparent",
+}
+LIGHT = np.array([0.03, 0.2, 0.006])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cube in which all voxels are 1."""
+    path = tmp_path_factory.mktemp("cube")
+    keep(path / "cube.nrrd", np.ones((VOXELS,) * 3, np.float32), CORNER, [VOXEL] * 3)
+    return path
+
+
+def shown(
+    folder: Path, device: Device, opacity: float, step: float, **sections: Any
+) -> tuple[Floats, Floats]:
+    """The picture's light, and how long rays are in the cube, in voxels."""
+    scene = load_scene(
+        {
+            "version": 1,
+            "formula": {"name": "mandelbulb"},
+            "image": {"width": 24, "height": 24},
+            "camera": CAMERA,
+            "renderer": {
+                "type": "volume",
+                "file": "cube.nrrd",
+                "step": step,
+                "opacity_limit": 1,
+                "transfer": {
+                    "opacity": [{"at": 0.5, "opacity": opacity}],
+                    "emission": [{"at": 0.5, "emission": LIGHT.tolist()}],
+                },
+            },
+            **DARK,
+            **sections,
+        },
+        folder=folder,
+    )
+    near, far = to_box(*rays(scene)[:2], CORNER, np.full(3, SIDE))
+    return stacked(shoot(scene, device), "RGB"), np.maximum(far - near, 0) / VOXEL
+
+
+@pytest.mark.parametrize("opacity", [0.0, 0.02, 0.3, 1.0])
+@pytest.mark.parametrize("step", [2.0, 0.5, 0.1])
+def test_a_cube_that_shines(device: Device, folder: Path, opacity: float, step: float) -> None:
+    """j (1 - exp(-sigma L)) / sigma, whatever the step; L is a whole number of steps, the last of which may go past the cube."""
+    light, length = shown(folder, device, opacity, step)
+    steps = length / step
+    # Where rounding may decide of a whole step.
+    sure = np.abs(steps - np.rint(steps)) > 1e-3
+    assert (length[sure] > 5).sum() > 100
+    way = np.ceil(steps) * step
+    sigma = -np.log(1 - min(opacity, MOST_OPACITY))
+    expected = LIGHT * (way if sigma == 0 else -np.expm1(-sigma * way) / sigma)[..., None]
+    np.testing.assert_allclose(light[sure], expected[sure], rtol=3e-4, atol=1e-6)
+
+
+def test_emission_is_light_on_top(device: Device, folder: Path) -> None:
+    """With a lit medium the picture is the sum of both."""
+    lit = {
+        "material": {"color": [0.4, 0.5, 0.6], "ambient": 1, "diffuse": 0, "specular": 0},
+        "lights": [{"direction": [0, 1, -0.5], "shadow": False}],
+    }
+    alone, _ = shown(folder, device, 0.1, 0.5)
+    both, length = shown(folder, device, 0.1, 0.5, **lit)
+    inside = length > 5
+    way = np.ceil(length[inside] / 0.5) * 0.5
+    opacity = 1 - 0.9**way
+    expected = opacity[:, None] * np.array([0.4, 0.5, 0.6])
+    np.testing.assert_allclose(both[inside] - alone[inside], expected, rtol=2e-2, atol=2e-3)
