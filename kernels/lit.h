@@ -117,10 +117,18 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     STATE_RECALL(s, air, STATE_AIR);
     seen = color_add(seen, air);
 #endif
+#if HAS_GLOW
+    color glow;
+    STATE_RECALL(s, glow, STATE_GLOW);
+    seen = color_add(seen, glow);
+#endif
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
 #if HAS_SHAFTS
     background = color_add(background, air);
+#endif
+#if HAS_GLOW
+    background = color_add(background, glow);
 #endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);

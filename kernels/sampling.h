@@ -34,6 +34,8 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_SCATTER 8u
 #define PURPOSE_CHOICES 9u
 #define PURPOSE_AIR 10u
+#define PURPOSE_GLOW 12u
+#define PURPOSE_SET_LIGHT 13u
 #define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0

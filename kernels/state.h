@@ -80,7 +80,8 @@ typedef struct {
 #define STATE_PATH (STATE_TALLY + NUMBERS_OF(tally))
 #define STATE_CARRIED (STATE_PATH + NUMBERS_OF(path))
 #define STATE_AIR (STATE_CARRIED + (HAS_PATHS ? NUMBERS_OF(carried) : 0))
-#define STATE_SUMS (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0))
+#define STATE_GLOW (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0))
+#define STATE_SUMS (STATE_GLOW + (HAS_GLOW ? NUMBERS_OF(color) : 0))
 // Of the first spot, and of the one after the last bounce.
 #define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))
 #define STATE_FACE (STATE_SPOT(1) + NUMBERS_OF(spot))

@@ -95,6 +95,7 @@ SECTIONS = {
     "environment": "Environment",
     "fog": "Fog",
     "fog.scattering": "Scattering",
+    "glow": "Glow",
     "layout": "Layout",
     "layout.views": "LayoutView",
     "stereo": "Stereo",

@@ -17,6 +17,7 @@ from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
 from clfractal.scene.base import unit
+from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import (
     Light,
@@ -155,6 +156,12 @@ MATERIAL = Struct(
         Field("fog_scattering", "real", 3, "part of each light that it scatters"),
         Field("fog_anisotropy", "real", 0, "of that, Henyey and Greenstein's g"),
         Field("fog_background", "int", 0, "1: the fog covers what is past the set"),
+        Field("glow_color", "real", 3, "times its intensity"),
+        Field("glow_width", "real", 0, "distance over which it fades to 1/e, scene units"),
+        Field("glow_reach", "real", 0, "distance from its trap over which it fades to 1/e, in z"),
+        Field("glow_center", "real", 3, "of its trap, as for colours"),
+        Field("glow_direction", "real", 3, ""),
+        Field("glow_radius", "real", 0, ""),
         Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
         Field("environment_intensity", "real", 0, "factor on the environment's light"),
@@ -409,11 +416,25 @@ def material_record(
         "fog_scattering": shafts.color if shafts else (0.0, 0.0, 0.0),
         "fog_anisotropy": shafts.anisotropy if shafts else 0.0,
         "fog_background": int(fog is not None and fog.background and fog.density > 0),
+        **_glow(scene),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),
         **material_fields(scene.environment, environment),
     }
     return MATERIAL.value(precision, values)
+
+
+def _glow(scene: Scene) -> dict[str, object]:
+    """The fields of a Material for `kernels/glow.h`."""
+    glow = scene.glow or Glow()
+    return {
+        "glow_color": tuple(glow.intensity * part for part in glow.color),
+        "glow_width": glow.used_width(scene.bounds[1]),
+        "glow_reach": glow.reach,
+        "glow_center": glow.trap.center,
+        "glow_direction": unit(glow.trap.direction),
+        "glow_radius": glow.trap.radius,
+    }
 
 
 def _way_and_trap(scene: Scene) -> dict[str, object]:

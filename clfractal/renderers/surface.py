@@ -41,6 +41,7 @@ from clfractal.renderers.waves import (
     surface_stages,
 )
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -134,6 +135,20 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "PLANES": plane_count(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
+        "HAS_GLOW": int(scene.glow is not None),
+    }
+
+
+def glow_defines(scene: Scene, plan: Plan, glow: Glow) -> dict[str, object]:
+    """The defines of `kernels/glow.cl`."""
+    return {
+        **state_defines(scene, plan),
+        **coloring_defines(Coloring()),
+        "HAS_FOG": int(scene.fog is not None),
+        "GLOW_BY_CLOSENESS": 0,
+        "GLOW_BY_TRAP": 1,
+        "GLOW_BY": int(glow.by == "trap"),
+        "GLOW_TRAP": TRAPS[glow.trap.shape],
     }
 
 
@@ -263,6 +278,8 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     if asks_formula(scene.coloring):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
+    if scene.glow is not None:
+        texts.append(text("glow", "glow.cl", glow_defines(scene, plan, scene.glow), "add_glow"))
     if scene.cut_planes:
         planes = {**state_defines(scene, plan), **coloring_defines(Coloring()), **plane_defines(scene)}
         texts.append(text("planes", "see_planes.cl", planes, "find_faces", "find_planes"))

@@ -6,7 +6,8 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
 
-and each mirror adds what follows `begin_shots` but for the points. With `lighting.mode: path` in the place of the last two
+with `[find_planes]` and `[add_glow]` after `[color_spots]`; each mirror adds what follows `begin_shots` but for the points.
+With `lighting.mode: path` in the place of the last two
 
     scatter_paths  march  gather_paths
 
@@ -117,6 +118,8 @@ def _sample(scene: Scene, sample: int, marching: tuple[str, ...], *, cones: bool
             yield stage("color_spots", bounce=bounce)
         if scene.cut_planes and bounce == 0:
             yield stage("find_planes")
+        if scene.glow is not None:
+            yield stage("add_glow", bounce=bounce)
         air = air_turns(scene) if bounce == 0 else 0
         if isinstance(scene.lighting, PathLighting):
             yield stage("scatter_paths", 1, bounce=bounce)

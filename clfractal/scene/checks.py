@@ -31,6 +31,10 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if isinstance(scene.renderer, VolumeRenderer):
         _check_volume(scene, scene.renderer)
     _check_planes(scene)
+    if scene.glow is not None and not isinstance(scene.renderer, SurfaceRenderer):
+        raise SceneError(
+            f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
+        )
     check_lighting(scene)
     if scene.stereo is not None:
         _check_eyes(scene)

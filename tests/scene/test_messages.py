@@ -238,6 +238,9 @@ CASES = [
     ("environment: {name: §''}", "environment.name: must not be empty, got ''"),
     ("environment: {name: a, rotation: §400}", "environment.rotation: must be at most 360, got 400"),
     ("environment: {name: a, rays: §-1}", "environment.rays: must be at least 0, got -1"),
+    ("glow: {by: §nearness}", "glow.by: must be closeness or trap, got 'nearness'"),
+    ("glow: {§witdh: 1}", "glow: unknown key 'witdh'; did you mean 'width'?"),
+    ("glow: {width: §0}", "glow.width: must be above 0, got 0"),
     ("fog: {density: §-1}", "fog.density: must be at least 0, got -1"),
     ("fog: {§colour: [1, 1, 1]}", "fog: unknown key 'colour'; did you mean 'color'?"),
     # The lens.
