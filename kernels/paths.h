@@ -15,6 +15,9 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
 INLINE real weight_of_all(vec point, world w) {
     real sum = (real)(w.settings->environment_weight);
     for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, point);
+#if HAS_SET_LIGHTS
+    sum += set_weight(point, w);
+#endif
     return fmax(sum, (real)(REAL_SMALLEST));
 }
 
@@ -87,15 +90,40 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
         if (!is_light || light_is_met(light) || light_is_seen(light)) both |= here;
         if (is_light && !light->shadow) blocked &= ~here;
     }
+    // A factor on the density with which both ways to find a light reckon.
+    real reckoned = R(1.0);
+    vec begin = from;
+#if HAS_SET_LIGHTS
+    const real weight_of_set = set_weight(from, w);
+    const mask of_set = open & less(R(0.0), weight_of_set);
+    if (any_lane(of_set)) {
+        real first, second;
+        path_square(s, at, PURPOSE_SET_LIGHT, w, &first, &second);
+        const set_choice choice_of_set = set_choose(point, b->normal, first, second, w);
+        const set_ball ball = set_ball_of(choice_of_set.number, w);
+        real distance, density;
+        const vec toward = set_direction(&ball, point, u, v, &distance, &density);
+        const mask shines = less(R(0.0), choice_of_set.weight);
+        chosen.toward = vec_pick(of_set, toward, chosen.toward);
+        chosen.distance = pick(of_set, distance, chosen.distance);
+        chosen.light = color_pick(of_set, color_pick(shines, ball.light, color_of(R(0.0), R(0.0), R(0.0))), chosen.light);
+        chosen.density = pick(of_set, density / pick(shines, choice_of_set.weight, R(1.0)), chosen.density);
+        reckoned = pick(of_set & shines, choice_of_set.weight, reckoned);
+        begin = vec_pick(of_set, point, from);
+        share = pick(of_set, weight_of_set / total, share);
+        both |= of_set;
+        blocked &= ~of_set | ball.shadow;
+    }
+#endif
     // Lights hide what is behind them.
     real far = chosen.distance * R(0.999);
-    const lamp hides = lamp_met(from, chosen.toward, 0, &far, w);
+    const lamp hides = lamp_met(begin, chosen.toward, 0, &far, w);
     chosen.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), chosen.light);
     // A light of one direction is never met by chance.
     const mask has_size = less(R(0.0), chosen.density);
     const real asked = share * chosen.density;
     const real other = pick(both, bsdf_density(b, chosen.toward), R(0.0));
-    const real weight = pick(has_size, power_share(asked, other) / asked, R(1.0) / share);
+    const real weight = pick(has_size, power_share(reckoned * asked, other) / asked, R(1.0) / share);
     *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.albedos), chosen.light), weight);
     const mask dark = ~less(R(0.0), brightest(*brings));
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);

@@ -86,6 +86,7 @@ SECTIONS = {
     "lights, point": "PointLight",
     "lights, spot": "SpotLight",
     "lights, sphere": "SphereLight",
+    "lights, set": "SetLight",
     "lights, rectangle": "RectangleLight",
     "material": "Material",
     "coloring": "Coloring",

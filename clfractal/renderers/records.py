@@ -16,11 +16,12 @@ from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
+from clfractal.renderers.set_lights import SetLights, SingleLight, march_fields, single_lights
 from clfractal.scene.base import unit
 from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import (
-    Light,
+    DirectionalLight,
     PlacedLight,
     PointLight,
     RectangleLight,
@@ -87,6 +88,12 @@ MARCH = Struct(
         Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
+        Field("set_count", "int", 0, "number of balls of lights on the set"),
+        Field("set_cells", "int", 0, "cells of their probabilities along an edge of their cube"),
+        Field("set_lists", "int", 0, "cells of their lists likewise"),
+        Field("set_rays", "int", 0, "shadow rays of a shot to them"),
+        Field("set_corner", "real", 3, "of their cube, scene units"),
+        Field("set_edge", "real", 0, "its length"),
         Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
         Field("map_rays", "int", 0, "rays into the hemisphere, spread like the environment's light"),
         Field("ambient_far", "real", 0, "how long these rays are, scene units"),
@@ -255,7 +262,11 @@ def near_height(scene: Scene, samples: int) -> float:
 
 
 def march_record(
-    scene: Scene, precision: Precision, samples: int = 1, environment: PackedEnvironment | None = None
+    scene: Scene,
+    precision: Precision,
+    samples: int = 1,
+    environment: PackedEnvironment | None = None,
+    on_set: SetLights | None = None,
 ) -> Record:
     """The settings of the march, and of the rays that a shot sends; a pixel averages `samples` shots."""
     renderer = scene.surface
@@ -288,7 +299,8 @@ def march_record(
         "bounces": bounces(scene),
         "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,
         "environment_weight": environment_weight(scene, environment),
-        "light_count": len(scene.lights),
+        "light_count": len(single_lights(scene)),
+        **march_fields(on_set),
         "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
         "map_rays": rays.map,
@@ -322,7 +334,7 @@ def bounces(scene: Scene) -> int:
 
 def light_rays(scene: Scene) -> int:
     """Most shadow rays of a shot that a light has."""
-    return max((light.used_rays for light in scene.lights), default=1)
+    return max((light.used_rays for light in single_lights(scene)), default=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -344,7 +356,7 @@ def hemisphere_rays(scene: Scene) -> HemisphereRays:
     return HemisphereRays(max(open_rays, (lit_rays + 1) // 2), lit_rays // 2, lit_rays > 0)
 
 
-def _light_row(light: Light) -> Mapping[str, object]:
+def _light_row(light: SingleLight) -> Mapping[str, object]:
     placed = isinstance(light, PlacedLight)
     vector = np.array(light.position if isinstance(light, PlacedLight) else light.direction, float)
     row: dict[str, object] = {
@@ -384,9 +396,9 @@ def _light_row(light: Light) -> Mapping[str, object]:
 
 
 def light_records(scene: Scene, precision: Precision) -> Record:
-    """The lights; one unused record where there are none, since no buffer is empty."""
-    rows = [_light_row(light) for light in scene.lights]
-    return LIGHT.array(precision, rows) if rows else np.zeros(1, LIGHT.dtype(precision))
+    """The lights, and a white one that stands for those on the set (and for none, since no buffer is empty)."""
+    rows = [_light_row(light) for light in (*single_lights(scene), DirectionalLight())]
+    return LIGHT.array(precision, rows)
 
 
 def material_record(

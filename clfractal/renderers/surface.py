@@ -32,6 +32,7 @@ from clfractal.renderers.planes import (
     plane_records,
 )
 from clfractal.renderers.scattering import albedo_tables
+from clfractal.renderers.set_lights import set_light_data, set_lights_of, single_lights
 from clfractal.renderers.waves import (
     air_turns,
     asks_formula,
@@ -43,6 +44,7 @@ from clfractal.renderers.waves import (
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 
@@ -112,7 +114,8 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
         "HAS_SOFT_LIGHT": int(
-            any(light.has_size for light in scene.lights) and not isinstance(scene.lighting, PathLighting)
+            any(light.has_size for light in single_lights(scene))
+            and not isinstance(scene.lighting, PathLighting)
         ),
         "HAS_FOG": int(scene.fog is not None),
         "ADAPTIVE": int(renderer.noise is not None),
@@ -135,6 +138,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "PLANES": plane_count(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
+        "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
         "HAS_GLOW": int(scene.glow is not None),
     }
 
@@ -206,8 +210,9 @@ class SurfaceKernel(TileKernel):
         packed = None
         if surroundings is not None:
             packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
+        on_set = set_lights_of(scene)
         return [
-            records.march_record(scene, precision, self.plan.averaged, packed),
+            records.march_record(scene, precision, self.plan.averaged, packed, on_set),
             np.stack(
                 [
                     records.orbit_record(scene.chain, scene.formula.iterations, precision),
@@ -225,6 +230,7 @@ class SurfaceKernel(TileKernel):
                 else [np.zeros(4, np.float32)] * 2
             ),
             *self._materials(),
+            set_light_data(on_set, precision),
         ]
 
     def _materials(self) -> list[KernelArgument]:

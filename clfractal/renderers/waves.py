@@ -22,8 +22,10 @@ from collections.abc import Iterator
 from clfractal.renderers.kernel import Stage
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
+from clfractal.renderers.set_lights import single_lights
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 
@@ -64,13 +66,16 @@ def light_turns(scene: Scene) -> int:
     if isinstance(scene.lighting, PathLighting):
         return 0
     rays = hemisphere_rays(scene)
-    return rays.cosine + rays.map + len(scene.lights) * light_rays(scene)
+    to_set = max((light.used_rays for light in scene.lights if isinstance(light, SetLight)), default=0)
+    return rays.cosine + rays.map + len(single_lights(scene)) * light_rays(scene) + to_set
 
 
 def air_turns(scene: Scene) -> int:
     """Rays that leave the fog before the first spot: one to each light."""
     fog = scene.fog
-    return len(scene.lights) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
+    return (
+        len(single_lights(scene)) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
+    )
 
 
 def most_turns(scene: Scene) -> int:

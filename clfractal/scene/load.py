@@ -24,6 +24,7 @@ from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 
 
@@ -251,6 +252,9 @@ def _check_palettes(scene: Scene) -> None:
         used.append(("renderer.colors.palette", scene.renderer.colors.palette))
     for index, plane in enumerate(scene.cut_planes):
         used.append((f"cut_planes.{index}.colors.palette", plane.colors.palette))
+    for index, light in enumerate(scene.lights):
+        if isinstance(light, SetLight) and light.palette is not None:
+            used.append((f"lights.{index}.palette", light.palette))
     if used:
         from clfractal.scene.palette import check_palette
 
