@@ -85,34 +85,45 @@ INLINE real layer_distance(vec point, vec outward, mask active, __constant const
     return pick(met.found, fmin(R(0.5) * (met.before + met.beyond), limit), limit);
 }
 
-// From the first three variables of z to the trap: its point, the axis or plane through it, or the sphere around it.
-INLINE real trap_distance(int shape, state z, __constant const struct Material *material) {
-    const vec offset = vec_sub(vec_of(z.s0, z.s1, z.s2), vec_splat(material->trap_center));
-    const vec direction = vec_splat(material->trap_direction);
-    const real along = vec_dot(offset, direction);
-    if (shape == TRAP_PLANE) return fabs(along);
-    const vec arm = shape == TRAP_AXIS ? vec_along(offset, -along, direction) : offset;
-    const real radius = shape == TRAP_SPHERE ? (real)(material->trap_radius) : R(0.0);
-    return fabs(sqrt(vec_dot(arm, arm)) - radius);
+// A trap: a point, an axis or plane through it, or the sphere around it.
+typedef struct {
+    int shape;
+    vec center, direction;
+    real radius;
+} trap;
+
+// From the first three variables of z to the trap.
+INLINE real trap_distance(trap near, state z) {
+    const vec offset = vec_sub(vec_of(z.s0, z.s1, z.s2), near.center);
+    const real along = vec_dot(offset, near.direction);
+    if (near.shape == TRAP_PLANE) return fabs(along);
+    const vec arm = near.shape == TRAP_AXIS ? vec_along(offset, -along, near.direction) : offset;
+    return fabs(sqrt(vec_dot(arm, arm)) - (near.shape == TRAP_SPHERE ? near.radius : R(0.0)));
 }
 
-// How near z comes to the trap after one application or more, the one that leaves the bailout included. An orbit that is
+// How near z comes to a trap after one application or more, the one that leaves the bailout included. An orbit that is
 // outside from the start has only its start.
-INLINE real orbit_trap(int shape, vec point, mask active, __constant const struct Material *material,
-                       __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real orbit_near(trap near, vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
-    const real at_start = trap_distance(shape, z, material);
+    const real at_start = trap_distance(near, z);
     real nearest = FIRST_COUNT > 0 ? at_start : (real)(REAL_LARGEST);
     mask alive = active & less_equal(state_square(z), (real)(orbit->bailout_square));
     for (int n = FIRST_COUNT; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;
         const state next = apply(n, z, c, k);
         z = state_pick(alive, next, z);
-        nearest = pick(alive, fmin(nearest, trap_distance(shape, next, material)), nearest);
+        nearest = pick(alive, fmin(nearest, trap_distance(near, next)), nearest);
         alive &= less_equal(state_square(z), (real)(orbit->bailout_square));
     }
     return pick(less(nearest, (real)(REAL_LARGEST)), nearest, at_start);
+}
+
+// The same, for the trap that chooses colours.
+INLINE real orbit_trap(int shape, vec point, mask active, __constant const struct Material *material,
+                       __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const trap near = {shape, vec_splat(material->trap_center), vec_splat(material->trap_direction), (real)(material->trap_radius)};
+    return orbit_near(near, point, active, orbit, k);
 }
 
 // What chooses the colour of a point of the surface, in scene units (a trap's: those of z; `smooth`: applications; `residual`:

@@ -10,6 +10,9 @@ INLINE real power_share(real own, real other) {
 INLINE real weight_of_all(vec point, world w) {
     real sum = (real)(w.settings->environment_weight);
     for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, point);
+#if HAS_SET_LIGHTS
+    sum += set_weight(point, w);
+#endif
     return fmax(sum, (real)(REAL_SMALLEST));
 }
 
@@ -48,11 +51,16 @@ INLINE lamp lamp_met(vec origin, vec direction, int of_eye, real *far, world w) 
 typedef struct {
     light_ray ray;
     real share;            // of all lights, that this one is chosen
+    real reckoned;         // a factor on the density with which both ways to find it reckon
     mask both, unblocked;  // whether a path meets it by chance, too; whether nothing can be in its way
 } asked;
 
-// One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`.
-INLINE asked light_asked(vec point, vec from, real u, real v, real choice, real total, world w) {
+// Numbers in (0, 1): two for the place on a light, one for the light, two for the one of those on the set.
+#define ASKING_NUMBERS 5
+
+// One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium.
+INLINE asked light_asked(vec point, vec from, vec normal, const real *numbers, real total, world w) {
+    const real u = numbers[0], v = numbers[1], choice = numbers[2];
     light_ray chosen = {vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
     real share = R(1.0);
     mask blocked = less(R(0.0), R(1.0));
@@ -86,11 +94,33 @@ INLINE asked light_asked(vec point, vec from, real u, real v, real choice, real 
         if (!is_light || light_is_met(light) || light_is_seen(light)) both |= here;
         if (is_light && !light->shadow) blocked &= ~here;
     }
+    real reckoned = R(1.0);
+    vec begin = from;
+#if HAS_SET_LIGHTS
+    const real weight_of_set = set_weight(from, w);
+    const mask of_set = open & less(R(0.0), weight_of_set);
+    if (any_lane(of_set)) {
+        const set_choice choice_of_set = set_choose(point, normal, numbers[3], numbers[4], w);
+        const set_ball ball = set_ball_of(choice_of_set.number, w);
+        real distance, density;
+        const vec toward = set_direction(&ball, point, u, v, &distance, &density);
+        const mask shines = less(R(0.0), choice_of_set.weight);
+        chosen.toward = vec_pick(of_set, toward, chosen.toward);
+        chosen.distance = pick(of_set, distance, chosen.distance);
+        chosen.light = color_pick(of_set, color_pick(shines, ball.light, color_of(R(0.0), R(0.0), R(0.0))), chosen.light);
+        chosen.density = pick(of_set, density / pick(shines, choice_of_set.weight, R(1.0)), chosen.density);
+        reckoned = pick(of_set & shines, choice_of_set.weight, reckoned);
+        begin = vec_pick(of_set, point, from);
+        share = pick(of_set, weight_of_set / total, share);
+        both |= of_set;
+        blocked &= ~of_set | ball.shadow;
+    }
+#endif
     // Lights hide what is behind them.
     real far = chosen.distance * R(0.999);
-    const lamp hides = lamp_met(from, chosen.toward, 0, &far, w);
+    const lamp hides = lamp_met(begin, chosen.toward, 0, &far, w);
     chosen.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), chosen.light);
-    const asked found = {chosen, share, both, ~blocked};
+    const asked found = {chosen, share, reckoned, both, ~blocked};
     return found;
 }
 
@@ -99,5 +129,5 @@ INLINE real asked_weight(const asked *a, real other) {
     // A light of one direction is never met by chance.
     const mask has_size = less(R(0.0), a->ray.density);
     const real density = a->share * a->ray.density;
-    return pick(has_size, power_share(density, pick(a->both, other, R(0.0))) / density, R(1.0) / a->share);
+    return pick(has_size, power_share(a->reckoned * density, pick(a->both, other, R(0.0))) / density, R(1.0) / a->share);
 }

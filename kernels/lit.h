@@ -12,6 +12,21 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
     return sum;
 }
 
+#if HAS_SET_LIGHTS
+// The light of one of the rays to balls on the set. (After the lights stands one that is white, for them.)
+INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, tally *cost, world w) {
+    const place_in_pass place = place_of_packet(s.span, s.packet, s.tile);
+    const encounter met = queue_met(s.q, turn, s.slot);
+    tally_met(cost, met, 0);
+    color shines;
+    mask shadow;
+    const int number = s.sample * w.settings->set_rays + of_set;
+    const incidence in = set_incidence(here->point, here->normal, &place.at, number, s.bounce, w, &shines, &shadow);
+    const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, w.material);
+    return color_scale(color_mul(white, shines), (real)(S(1.0) / (scalar)w.settings->set_rays));
+}
+#endif
+
 // The light that the spot's rays have brought.
 INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
@@ -28,6 +43,13 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
 #endif
     for (; turn < turns_for_light(w); ++turn) {
         const int number = turn - hemisphere_turns(w);
+#if HAS_SET_LIGHTS
+        const int of_set = number - w.settings->light_count * w.settings->light_rays;
+        if (of_set >= 0) {
+            gathered = color_add(gathered, set_gathered(s, here, to_viewer, turn, of_set, open, cost, w));
+            continue;
+        }
+#endif
         __constant const struct Light *light = w.lights + number / w.settings->light_rays;
         if (number % w.settings->light_rays >= light->rays) continue;
         const encounter met = queue_met(s.q, turn, s.slot);
@@ -131,10 +153,18 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     STATE_RECALL(s, air, STATE_AIR);
     seen = color_add(seen, air);
 #endif
+#if HAS_GLOW
+    color glow;
+    STATE_RECALL(s, glow, STATE_GLOW);
+    seen = color_add(seen, glow);
+#endif
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
 #if HAS_SHAFTS
     background = color_add(background, air);
+#endif
+#if HAS_GLOW
+    background = color_add(background, glow);
 #endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);

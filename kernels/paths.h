@@ -11,7 +11,11 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     real u, v, choice, unused;
     path_square(s, at, PURPOSE_ASK, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICE, w, &choice, &unused);
-    const asked a = light_asked(point, from, u, v, choice, total, w);
+    real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
+#if HAS_SET_LIGHTS
+    path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
+#endif
+    const asked a = light_asked(point, from, b->normal, numbers, total, w);
     light_ray chosen = a.ray;
     const real weight = asked_weight(&a, bsdf_density(b, chosen.toward));
     *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.albedos), chosen.light), weight);

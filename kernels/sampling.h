@@ -36,6 +36,8 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_AIR 10u
 #define PURPOSE_WAVE 11u
 #define PURPOSE_FLIGHT 12u
+#define PURPOSE_GLOW 13u
+#define PURPOSE_SET_LIGHT 14u
 #define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0

@@ -18,8 +18,9 @@ typedef struct {
     __global const float *albedos;
     __global const struct Map *maps;
     __global const float *tables;
+    __global const scalar *set_lights;
 } world;
-#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, maps, tables}
+#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, maps, tables, set_lights}
 
 // A work-item's packet.
 typedef struct {

@@ -87,7 +87,8 @@ typedef struct {
 #define STATE_AIR (STATE_CARRIED + (HAS_PATHS ? NUMBERS_OF(carried) : 0))
 // What the formula was asked for the present spot's material.
 #define STATE_ASKED(i) (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0) + (i))
-#define STATE_SUMS STATE_ASKED(ASKED)
+#define STATE_GLOW STATE_ASKED(ASKED)
+#define STATE_SUMS (STATE_GLOW + (HAS_GLOW ? NUMBERS_OF(color) : 0))
 // Of the first spot, and of the one after the last bounce.
 #define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))
 #define STATE_FACE (STATE_SPOT(1) + NUMBERS_OF(spot))

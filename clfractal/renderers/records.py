@@ -17,11 +17,13 @@ from clfractal.renderers.maps import MAP, asked_maps
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
+from clfractal.renderers.set_lights import SetLights, SingleLight, march_fields, single_lights
 from clfractal.scene.base import unit
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import (
-    Light,
+    DirectionalLight,
     PlacedLight,
     PointLight,
     RectangleLight,
@@ -89,6 +91,12 @@ MARCH = Struct(
         Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
+        Field("set_count", "int", 0, "number of balls of lights on the set"),
+        Field("set_cells", "int", 0, "cells of their probabilities along an edge of their cube"),
+        Field("set_lists", "int", 0, "cells of their lists likewise"),
+        Field("set_rays", "int", 0, "shadow rays of a shot to them"),
+        Field("set_corner", "real", 3, "of their cube, scene units"),
+        Field("set_edge", "real", 0, "its length"),
         Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
         Field("map_rays", "int", 0, "rays into the hemisphere, spread like the environment's light"),
         Field("ambient_far", "real", 0, "how long these rays are, scene units"),
@@ -162,6 +170,12 @@ MATERIAL = Struct(
         Field("fog_scattering", "real", 3, "part of each light that it scatters"),
         Field("fog_anisotropy", "real", 0, "of that, Henyey and Greenstein's g"),
         Field("fog_background", "int", 0, "1: the fog covers what is past the set"),
+        Field("glow_color", "real", 3, "times its intensity"),
+        Field("glow_width", "real", 0, "distance over which it fades to 1/e, scene units"),
+        Field("glow_reach", "real", 0, "distance from its trap over which it fades to 1/e, in z"),
+        Field("glow_center", "real", 3, "of its trap, as for colours"),
+        Field("glow_direction", "real", 3, ""),
+        Field("glow_radius", "real", 0, ""),
         Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
         Field("environment_intensity", "real", 0, "factor on the environment's light"),
@@ -256,7 +270,11 @@ def near_height(scene: Scene, samples: int) -> float:
 
 
 def march_record(
-    scene: Scene, precision: Precision, samples: int = 1, environment: PackedEnvironment | None = None
+    scene: Scene,
+    precision: Precision,
+    samples: int = 1,
+    environment: PackedEnvironment | None = None,
+    on_set: SetLights | None = None,
 ) -> Record:
     """The settings of the march, and of the rays that a shot sends; a pixel averages `samples` shots."""
     renderer = scene.surface
@@ -289,7 +307,8 @@ def march_record(
         "bounces": bounces(scene),
         "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,
         "environment_weight": environment_weight(scene, environment),
-        "light_count": len(scene.lights),
+        "light_count": len(single_lights(scene)),
+        **march_fields(on_set),
         "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
         "map_rays": rays.map,
@@ -323,7 +342,7 @@ def bounces(scene: Scene) -> int:
 
 def light_rays(scene: Scene) -> int:
     """Most shadow rays of a shot that a light has."""
-    return max((light.used_rays for light in scene.lights), default=1)
+    return max((light.used_rays for light in single_lights(scene)), default=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,7 +364,7 @@ def hemisphere_rays(scene: Scene) -> HemisphereRays:
     return HemisphereRays(max(open_rays, (lit_rays + 1) // 2), lit_rays // 2, lit_rays > 0)
 
 
-def _light_row(light: Light) -> Mapping[str, object]:
+def _light_row(light: SingleLight) -> Mapping[str, object]:
     placed = isinstance(light, PlacedLight)
     vector = np.array(light.position if isinstance(light, PlacedLight) else light.direction, float)
     row: dict[str, object] = {
@@ -385,9 +404,9 @@ def _light_row(light: Light) -> Mapping[str, object]:
 
 
 def light_records(scene: Scene, precision: Precision) -> Record:
-    """The lights; one unused record where there are none, since no buffer is empty."""
-    rows = [_light_row(light) for light in scene.lights]
-    return LIGHT.array(precision, rows) if rows else np.zeros(1, LIGHT.dtype(precision))
+    """The lights, and a white one that stands for those on the set (and for none, since no buffer is empty)."""
+    rows = [_light_row(light) for light in (*single_lights(scene), DirectionalLight())]
+    return LIGHT.array(precision, rows)
 
 
 def material_record(
@@ -418,12 +437,26 @@ def material_record(
         "fog_scattering": shafts.color if shafts else (0.0, 0.0, 0.0),
         "fog_anisotropy": shafts.anisotropy if shafts else 0.0,
         "fog_background": int(fog is not None and fog.background and fog.density > 0),
+        **_glow(scene),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),
         **material_fields(scene.environment, environment),
     }
     asked = [{**values, **_way_and_trap(scene, each)} for each in asked_maps(scene)]
     return MATERIAL.array(precision, [values, *asked])
+
+
+def _glow(scene: Scene) -> dict[str, object]:
+    """The fields of a Material for `kernels/glow.h`."""
+    glow = scene.glow or Glow()
+    return {
+        "glow_color": tuple(glow.intensity * part for part in glow.color),
+        "glow_width": glow.used_width(scene.bounds[1]),
+        "glow_reach": glow.reach,
+        "glow_center": glow.trap.center,
+        "glow_direction": unit(glow.trap.direction),
+        "glow_radius": glow.trap.radius,
+    }
 
 
 def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:

@@ -41,6 +41,7 @@ from clfractal.renderers.planes import (
     plane_records,
 )
 from clfractal.renderers.scattering import albedo_tables
+from clfractal.renderers.set_lights import set_light_data, set_lights_of, single_lights
 from clfractal.renderers.waves import (
     air_turns,
     asks_formula,
@@ -51,7 +52,9 @@ from clfractal.renderers.waves import (
     surface_stages,
 )
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 
@@ -122,7 +125,8 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
         "HAS_SOFT_LIGHT": int(
-            any(light.has_size for light in scene.lights) and not isinstance(scene.lighting, PathLighting)
+            any(light.has_size for light in single_lights(scene))
+            and not isinstance(scene.lighting, PathLighting)
         ),
         "HAS_FOG": int(scene.fog is not None),
         "ADAPTIVE": int(renderer.noise is not None),
@@ -147,6 +151,21 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
         "HAS_GLASS": int(has_glass(scene)),
+        "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
+        "HAS_GLOW": int(scene.glow is not None),
+    }
+
+
+def glow_defines(scene: Scene, plan: Plan, glow: Glow) -> dict[str, object]:
+    """The defines of `kernels/glow.cl`."""
+    return {
+        **state_defines(scene, plan),
+        **coloring_defines(Coloring()),
+        "HAS_FOG": int(scene.fog is not None),
+        "GLOW_BY_CLOSENESS": 0,
+        "GLOW_BY_TRAP": 1,
+        "GLOW_BY": int(glow.by == "trap"),
+        "GLOW_TRAP": records.TRAPS[glow.trap.shape],
     }
 
 
@@ -204,8 +223,9 @@ class SurfaceKernel(TileKernel):
         packed = None
         if surroundings is not None:
             packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
+        on_set = set_lights_of(scene)
         return [
-            records.march_record(scene, precision, self.plan.averaged, packed),
+            records.march_record(scene, precision, self.plan.averaged, packed, on_set),
             np.stack(
                 [
                     records.orbit_record(scene.chain, scene.formula.iterations, precision),
@@ -223,6 +243,7 @@ class SurfaceKernel(TileKernel):
                 else [np.zeros(4, np.float32)] * 2
             ),
             *self._materials(),
+            set_light_data(on_set, precision),
         ]
 
     def _materials(self) -> list[KernelArgument]:
@@ -295,6 +316,8 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
+    if scene.glow is not None:
+        texts.append(text("glow", "glow.cl", glow_defines(scene, plan, scene.glow), "add_glow"))
     if scene.cut_planes:
         planes = {**state_defines(scene, plan), **coloring_defines(Coloring()), **plane_defines(scene)}
         texts.append(text("planes", "see_planes.cl", planes, "find_faces", "find_planes"))

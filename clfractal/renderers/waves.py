@@ -6,7 +6,8 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
 
-and each mirror adds what follows `begin_shots` but for the points. With `lighting.mode: path` in the place of the last two
+with `[find_planes]` and `[add_glow]` after `[color_spots]`; each mirror adds what follows `begin_shots` but for the points.
+With `lighting.mode: path` in the place of the last two
 
     scatter_paths  march  gather_paths
 
@@ -22,7 +23,9 @@ from clfractal.renderers.kernel import Stage
 from clfractal.renderers.maps import asked_maps, has_glass
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
+from clfractal.renderers.set_lights import single_lights
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 
@@ -63,13 +66,16 @@ def light_turns(scene: Scene) -> int:
     if isinstance(scene.lighting, PathLighting):
         return 0
     rays = hemisphere_rays(scene)
-    return rays.cosine + rays.map + len(scene.lights) * light_rays(scene)
+    to_set = max((light.used_rays for light in scene.lights if isinstance(light, SetLight)), default=0)
+    return rays.cosine + rays.map + len(single_lights(scene)) * light_rays(scene) + to_set
 
 
 def air_turns(scene: Scene) -> int:
     """Rays that leave the fog before the first spot: one to each light."""
     fog = scene.fog
-    return len(scene.lights) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
+    return (
+        len(single_lights(scene)) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
+    )
 
 
 def most_turns(scene: Scene) -> int:
@@ -127,6 +133,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield stage("color_spots", bounce=bounce)
         if scene.cut_planes and bounce == 0:
             yield stage("find_planes")
+        if scene.glow is not None:
+            yield stage("add_glow", bounce=bounce)
         air = air_turns(scene) if bounce == 0 else 0
         if isinstance(scene.lighting, PathLighting):
             yield stage("scatter_paths", 1, bounce=bounce)

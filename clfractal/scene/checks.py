@@ -7,7 +7,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import PlacedLight
+from clfractal.scene.lighting import PlacedLight, SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
@@ -31,6 +31,10 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if isinstance(scene.renderer, VolumeRenderer):
         _check_volume(scene, scene.renderer)
     _check_planes(scene)
+    if scene.glow is not None and not isinstance(scene.renderer, SurfaceRenderer):
+        raise SceneError(
+            f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
+        )
     check_lighting(scene)
     if scene.stereo is not None:
         _check_eyes(scene)
@@ -41,6 +45,23 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
         # (A grid from a file is not the formula's solid, so its lights may be anywhere.)
         _check_lights(scene)
+    _check_places(scene)
+
+
+def _check_places(scene: Scene) -> None:
+    """Lights on the set need a surface, and places near their traps."""
+    for number, light in enumerate(scene.lights):
+        if not isinstance(light, SetLight):
+            continue
+        if not isinstance(scene.renderer, SurfaceRenderer):
+            raise SceneError(
+                f"set is for surface renderers, got a {scene.renderer.type}; remove this light",
+                Where(path=f"lights.{number}.type"),
+            )
+        # Here, because NumPy takes long to import.
+        from clfractal.scene.places import places_of
+
+        places_of(scene, number)
 
 
 def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from clfractal.scene.base import Color, Fraction, Section, problem
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
+from clfractal.scene.glow import Glow
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Material
 from clfractal.scene.renderer import Renderer
@@ -42,6 +43,7 @@ class LayoutView(Section):
         None, description="replaces the scene's environment; null: keeps it"
     )
     fog: Fog | None = Field(None, description="replaces the scene's fog; null: keeps it")
+    glow: Glow | None = Field(None, description="replaces the scene's glow; null: keeps it")
     cut_planes: CutPlanes | None = Field(
         None, description="replaces the scene's cut planes; null: keeps them, except for a cut_plane renderer"
     )

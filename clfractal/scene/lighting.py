@@ -20,9 +20,12 @@ from clfractal.scene.base import (
     problem,
     unit,
 )
+from clfractal.scene.coloring import Palette, Trap, check_order
+from clfractal.scene.surface import Ball
 from clfractal.scene.temperature import black_body
 
 MAX_LIGHTS = 64
+MAX_PLACES = 20_000
 
 
 class LightBase(Section):
@@ -167,6 +170,49 @@ class RectangleLight(LightBase):
         return side, unit(cross(side, self.direction))
 
 
+class SetLight(LightBase):
+    """Small balls that stand on the set, where its orbits come near a trap; each shows `intensity` times the colour."""
+
+    tag = "set"
+    type: Literal["set"] = "set"
+    trap: Trap = Field(
+        default_factory=dict,
+        validate_default=True,
+        description="the shape near which orbits of its places come",
+    )
+    threshold: Length = Field(0.1, description="largest distance of an orbit from the trap")
+    count: Annotated[int, Field(strict=True, ge=1, le=MAX_PLACES)] = Field(
+        2000, description="most of these balls; fewer if `spacing` leaves room for fewer"
+    )
+    spacing: Length | None = Field(
+        None, description="least distance between two, scene units; null: as far apart as so many can be"
+    )
+    within: Ball | None = Field(None, description="ball in which they stand; null: the bounds")
+    radius: Length | None = Field(
+        None, description="of each ball, scene units; null: 1/200 of the bounds' radius"
+    )
+    height: Length | None = Field(
+        None,
+        description="of their middles over the surface, scene units; null: the radius, so that they lie on it",
+    )
+    palette: Palette | None = Field(
+        None, description="colours, times `color`, by the orbit's distance over the threshold; null: `color`"
+    )
+    visible: bool = Field(True, description="whether the eye sees them; mirrors and paths of light always do")
+    seed: Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)] = Field(0, description="chooses the places")
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.palette is not None:
+            check_order(self.palette)
+        return self
+
+    @property
+    def used_rays(self) -> int:
+        """Shadow rays per sample, each to one of them."""
+        return self.rays if self.rays is not None else 8
+
+
 AreaLight = SphereLight | RectangleLight
 PlacedLight = PointLight | SpotLight | SphereLight | RectangleLight
 Light = Annotated[
@@ -174,7 +220,8 @@ Light = Annotated[
     | Annotated[PointLight, Tag("point")]
     | Annotated[SpotLight, Tag("spot")]
     | Annotated[SphereLight, Tag("sphere")]
-    | Annotated[RectangleLight, Tag("rectangle")],
+    | Annotated[RectangleLight, Tag("rectangle")]
+    | Annotated[SetLight, Tag("set")],
     chosen_by("type", "directional"),
 ]
 Lights = Annotated[tuple[Light, ...], Field(strict=False, max_length=MAX_LIGHTS)]

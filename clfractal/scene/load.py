@@ -24,6 +24,7 @@ from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.maps import ColorMap, maps_of
 from clfractal.scene.model import Scene
 
@@ -259,6 +260,9 @@ def _check_palettes(scene: Scene) -> None:
             for key, each in maps_of(material)
             if isinstance(each, ColorMap)
         ]
+    for index, light in enumerate(scene.lights):
+        if isinstance(light, SetLight) and light.palette is not None:
+            used.append((f"lights.{index}.palette", light.palette))
     if used:
         from clfractal.scene.palette import check_palette
 

@@ -18,6 +18,7 @@ from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
+from clfractal.scene.glow import Glow
 from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting
 from clfractal.scene.lighting import Environment, Fog, Lights
@@ -78,6 +79,7 @@ class Scene(Section):
     background: Background = Field(default_factory=dict, validate_default=True)
     environment: Environment | None = None
     fog: Fog | None = None
+    glow: Glow | None = None
     cut_planes: CutPlanes = Field(
         (), description="planes that are shown in the picture or cut the object open"
     )

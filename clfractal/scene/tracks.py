@@ -10,6 +10,7 @@ from clfractal.scene.base import Section
 from clfractal.scene.camera_base import CameraBase
 from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
 from clfractal.scene.formula import FormulaSpec
+from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane, Transform
@@ -90,12 +91,27 @@ def target_of(scene: Scene, name: str) -> Target:
     if path[0] == "formula" and path[1:2] not in ((), ("chain",)) and scene.formula.chain is not None:
         known = ", ".join(f"formula.chain.{number}" for number in range(len(scene.formula.chain)))
         raise SceneError(f"cannot move: formula is a chain; name a value of {known}")
+    _check_stands(scene, path)
     owner: Any = None
     value: Any = scene
     for depth in range(len(path)):
         owner, value = value, _below(value, path, depth)
     kind = _kind(scene, owner, path, value)
     return Target(path, kind, _size(owner, path[-1], kind, value))
+
+
+def _check_stands(scene: Scene, path: Sequence[str]) -> None:
+    """Lights on the set would jump from place to place if the set, or what chooses their places, moved."""
+    standing = {str(number) for number, light in enumerate(scene.lights) if isinstance(light, SetLight)}
+    chooses = path[0] == "lights" and path[1:2] != () and path[1] in standing and path[2:3] != ()
+    if standing and (
+        path[0] == "formula"
+        or list(path[:2]) == ["renderer", "bounds"]
+        or (chooses and path[2] in ("trap", "threshold", "spacing", "within"))
+    ):
+        raise SceneError(
+            f"cannot move: the lights on the set, lights.{min(standing)}, would stand at other places in each frame"
+        )
 
 
 def _below(value: Any, path: Sequence[str], depth: int) -> Any:

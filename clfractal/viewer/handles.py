@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import View
-from clfractal.scene.lighting import DirectionalLight, PlacedLight
+from clfractal.scene.lighting import DirectionalLight, PlacedLight, SetLight
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST
 from clfractal.viewer.pointer import Floats, Size, point_at, project
 
-Light = DirectionalLight | PlacedLight
+Light = DirectionalLight | PlacedLight | SetLight
 Bounds = tuple[npt.ArrayLike, float]
 
 # Radius of the circle, parts of the picture's smaller side.
@@ -57,10 +57,13 @@ def light_circle(view: View, size: Size, bounds: Bounds) -> Circle:
 
 @np.errstate(all="ignore")
 def handle_position(light: Light, view: View, size: Size, bounds: Bounds) -> tuple[float, float] | None:
-    """Where a light is shown, x and y in pixels; None for a point light that is not in front of the eye.
+    """Where a light is shown, x and y in pixels; None for a point light that is not in front of the eye,
+    and for lights on the set.
 
     A point light may be outside the picture.
     """
+    if isinstance(light, SetLight):
+        return None
     if isinstance(light, PlacedLight):
         x, y, depth = project(view, light.position, size)
         return (x, y) if isfinite(x) and isfinite(y) and depth > 0 else None
@@ -85,7 +88,7 @@ def dragged(
     A directional light comes from the ball's front, or its back if `behind`; beside the circle, from its rim. A point light
     moves in the plane at its depth; one that is not in front of the eye comes to the depth of the ball's middle.
     """
-    if not (isfinite(x) and isfinite(y)):
+    if not (isfinite(x) and isfinite(y)) or isinstance(light, SetLight):
         return light
     if isinstance(light, PlacedLight):
         depth = project(view, light.position, size)[2]

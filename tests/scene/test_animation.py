@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import clfractal
-from clfractal.errors import ClfractalError
+from clfractal.errors import ClfractalError, SceneError
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
@@ -250,6 +250,27 @@ def test_parameters_that_move_are_live_and_need_no_new_text() -> None:
     assert links[1].live == ("power",)
     assert links[1].parameters == {"power": 9}
     assert links[0].live == ()
+
+
+def test_lights_on_the_set_stay_where_they_stand() -> None:
+    light = {"type": "set", "trap": {"shape": "plane"}, "threshold": 0.5, "count": 9}
+    base = {"formula": {"name": "menger_sponge", "iterations": 3}, "lights": [{}, light]}
+    bright = {
+        "lights.1.intensity": keys((0, 1), (20, 5)),
+        "lights.1.temperature": keys((0, 2000), (20, 3000)),
+    }
+    assert clfractal.at_frame(moving(bright, base=base), 10).lights[1].intensity == pytest.approx(3)
+    for name in (
+        "formula.iterations",
+        "lights.1.threshold",
+        "lights.1.trap.center.0",
+        "renderer.bounds.radius",
+    ):
+        with pytest.raises(
+            SceneError, match=r"cannot move: the lights on the set, lights\.1, would stand"
+        ) as caught:
+            moving({name: keys((0, 1), (20, 2))}, base=base)
+        assert caught.value.where.path == f"animation.tracks.{name}"
 
 
 def test_noise_is_new_in_each_frame_or_fixed() -> None:

@@ -205,6 +205,24 @@ CASES = [
         "lights.0.angle: must be at most 180, got 200",
     ),
     ("lights: [{type: §sfere}]", "lights.0.type: unknown type 'sfere'; did you mean 'sphere'?"),
+    ("lights: [{type: set, count: §20001}]", "lights.0.count: must be at most 20000, got 20001"),
+    (
+        "lights: [{type: set, trap: {shape: §cube}}]",
+        "lights.0.trap.shape: must be point, axis, plane or sphere, got 'cube'",
+    ),
+    (
+        "lights: [{type: set, threshold: 1, palette: §viridas}]",
+        "lights.0.palette: unknown palette 'viridas'; did you mean 'viridis'?",
+    ),
+    (
+        "lights: [{type: set, trap: {center: [9, 9, 9]}, threshold: §0.5}]",
+        "lights.0.threshold: no place of the set is that near to the trap: the nearest is 1.24 away, got 0.5",
+    ),
+    (
+        "renderer: {type: cut_plane}\nlights: [{type: §set, threshold: 1}]",
+        "lights.0.type: set is for surface renderers, got a cut_plane; remove this light",
+    ),
+    ("renderer: {type: cut_plane}\nglow: §{}", "glow: is for surface renderers, got a cut_plane; remove it"),
     ("fog: {height: 1, up: §[0, 0, 0]}", "fog.up: must not be zero"),
     ("fog: {scattering: {anisotropy: §1}}", "fog.scattering.anisotropy: must be at most 0.95, got 1"),
     ("lights: [{rays: §0}]", "lights.0.rays: must be at least 1, got 0"),
@@ -238,6 +256,9 @@ CASES = [
     ("environment: {name: §''}", "environment.name: must not be empty, got ''"),
     ("environment: {name: a, rotation: §400}", "environment.rotation: must be at most 360, got 400"),
     ("environment: {name: a, rays: §-1}", "environment.rays: must be at least 0, got -1"),
+    ("glow: {by: §nearness}", "glow.by: must be closeness or trap, got 'nearness'"),
+    ("glow: {§witdh: 1}", "glow: unknown key 'witdh'; did you mean 'width'?"),
+    ("glow: {width: §0}", "glow.width: must be above 0, got 0"),
     ("fog: {density: §-1}", "fog.density: must be at least 0, got -1"),
     ("fog: {§colour: [1, 1, 1]}", "fog: unknown key 'colour'; did you mean 'color'?"),
     # The lens.

@@ -6,7 +6,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight, SmallLight
+from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight, SetLight, SmallLight
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.color_button import shown
@@ -15,6 +15,8 @@ from clfractal.viewer.panels.ui import Ui
 
 # What only some kinds have.
 _OWN = ("falloff", "direction", "angle", "softness", "up", "radius", "width", "height", "visible")
+# Of lights on the set.
+_PLACES = ("threshold", "count", "spacing", "radius", "height", "visible", "seed")
 
 
 def summary(ui: Ui) -> str:
@@ -109,7 +111,7 @@ def _light(ui: Ui, index: int) -> None:
         ui,
         "Type",
         path=f"{path}.type",
-        tip="from infinitely far away, a point, a cone, a ball, or a rectangle",
+        tip="from infinitely far away, a point, a cone, a ball, a rectangle, or many balls on the set",
     )
     if width is not None:
         words = {
@@ -118,6 +120,7 @@ def _light(ui: Ui, index: int) -> None:
             "spot": "Spot",
             "sphere": "Ball",
             "rectangle": "Area",
+            "set": "Set",
         }
         found = w.segments(f"{path}.type", words, light.type, width)
         if found is not None:
@@ -125,12 +128,30 @@ def _light(ui: Ui, index: int) -> None:
                 name: plain(getattr(light, name)) for name in ("color", "temperature", "intensity", "shadow")
             }
             old = getattr(light, "position", None)
-            more = {} if found == "directional" else {"position": plain(old) if old else _free_place(ui)}
+            more = (
+                {}
+                if found in ("directional", "set")
+                else {"position": plain(old) if old else _free_place(ui)}
+            )
             ui.studio.edit({path: {"type": found, **common, **more}})
             return
     w.fields(ui, path, ("color", "temperature", "intensity"))
     if isinstance(light, DirectionalLight):
         w.field(ui, f"{path}.direction", step=0.01)
+    elif isinstance(light, SetLight):
+        keys = {"point": ("center",), "sphere": ("center", "radius")}.get(
+            light.trap.shape, ("center", "direction")
+        )
+        w.fields(ui, f"{path}.trap", ("shape", *keys))
+        small = float(f"{ui.studio.scene.bounds[1] / 200:.2g}")
+        w.fields(
+            ui,
+            path,
+            _PLACES,
+            spacing={"auto": "even", "start": 4 * small},
+            radius={"auto": "1/200 of the bounds", "start": small},
+            height={"auto": "radius", "start": small},
+        )
     else:
         radius = ui.studio.scene.bounds[1]
         w.field(ui, f"{path}.position", step=0.01 * radius)

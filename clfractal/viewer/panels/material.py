@@ -75,15 +75,33 @@ def summary(ui: Ui) -> str:
     """For the heading of the surroundings."""
     scene = ui.studio.scene
     parts = [_source(scene.environment)] if scene.environment is not None else []
-    return ", ".join([*parts, *(["fog"] if scene.fog is not None else [])])
+    return ", ".join(
+        [*parts, *(["fog"] if scene.fog is not None else []), *(["glow"] if scene.glow is not None else [])]
+    )
 
 
 def _source(environment: Environment) -> str:
     return environment.name or ("sky" if environment.sky is not None else "map")
 
 
+def _glow(ui: Ui, radius: float) -> None:
+    w.group(ui, "Glow")
+    if not _switch(ui, "glow", "Glow", {}):
+        return
+    width = {"auto": "1/20 of the bounds", "start": float(f"{radius / 20:.2g}")}
+    w.fields(ui, "glow", ("color", "intensity", "width", "by"), width=width)
+    glow = ui.studio.scene.glow
+    if glow is None or glow.by != "trap":
+        return
+    w.field(ui, "glow.reach")
+    keys = {"point": ("center",), "sphere": ("center", "radius")}.get(
+        glow.trap.shape, ("center", "direction")
+    )
+    w.fields(ui, "glow.trap", ("shape", *keys))
+
+
 def draw_surroundings(ui: Ui) -> None:
-    """Draws background, fog and environment."""
+    """Draws background, fog, glow and environment."""
     w.group(ui, "Background")
     _background(ui)
     w.group(ui, "Fog")
@@ -98,6 +116,7 @@ def draw_surroundings(ui: Ui) -> None:
         )
         if _switch(ui, "fog.scattering", "Shafts", {}):
             w.fields(ui, "fog.scattering", ("color", "anisotropy"))
+    _glow(ui, radius)
     w.group(ui, "Environment")
     if _switch(ui, "environment", "Environment", {"name": names()[0]}):
         _map(ui)
