@@ -1,6 +1,6 @@
 """Makes docs/textures/marble.jpg, a picture without seams for the pages: dark stone with bright veins.
 
-    python docs/make_texture.py
+python docs/make_texture.py
 """
 
 from __future__ import annotations

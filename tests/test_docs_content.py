@@ -127,6 +127,8 @@ PATHS = {
     "coat": "Coat",
     "fuzz": "Fuzz",
     "emission": "Emission",
+    "A number": "NumberMap",
+    "A colour": "ColorMap",
 }
 ANIMATION = {
     "animation": "Animation",
