@@ -115,7 +115,9 @@ def _panel(base: Mapping[str, Any], values: dict[str, Any]) -> Panel:
     if show not in (None, "samples", "left", "right"):
         raise ValueError(f"{TABLE.name}: a panel cannot show {show!r}")
     # JSON is YAML, and has no line breaks or bare words that the shell form of a value could trip over.
-    scene = load_scene(base, overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()])
+    scene = load_scene(
+        base, folder=DOCS, overrides=[f"{key}={json.dumps(value)}" for key, value in values.items()]
+    )
     return Panel(scene, show)
 
 

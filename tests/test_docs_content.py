@@ -129,6 +129,8 @@ PATHS = {
     "coat": "Coat",
     "fuzz": "Fuzz",
     "emission": "Emission",
+    "A number": "NumberMap",
+    "A colour": "ColorMap",
 }
 ANIMATION = {
     "animation": "Animation",
