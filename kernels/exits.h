@@ -23,7 +23,9 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
     e.last = beyond - e.last;
     e.touch = R(0.0);
     surface_at(r, &e, hit, settings, orbit, k);
-    e.normal = vec_scale(e.normal, R(-1.0));
+    // A sheet without an inside lets rays straight through.
+    const mask sheet = less_equal(t, r.near);
+    e.normal = vec_pick(sheet, r.direction, vec_scale(e.normal, R(-1.0)));
     e.touch = beyond - e.touch;
     e.t = t;
     numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,

@@ -126,6 +126,7 @@ PATHS = {
     "specular": "Specular",
     "coat": "Coat",
     "fuzz": "Fuzz",
+    "transmission": "Transmission",
     "emission": "Emission",
 }
 ANIMATION = {

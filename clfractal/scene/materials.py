@@ -57,14 +57,14 @@ class Transmission(Section):
 
     weight: Fraction = Field(0.0, description="part of the body that is glass")
     color: Reflectance = Field(
-        WHITE, description="of light that has gone through `depth` of it; depth 0: factor at each boundary"
+        WHITE, description="of light that has gone through `depth` of it; with depth 0 a factor at each boundary"
     )
     depth: Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)] = Field(
         0.0, description="way through the set after which light has that colour, scene units"
     )
     dispersion_scale: Fraction = Field(0.0, description="0: all colours bend alike; 1: by the Abbe number")
     dispersion_abbe_number: Annotated[float, Field(strict=True, ge=1, le=1000, allow_inf_nan=False)] = Field(
-        20.0, description="the smaller, the farther colours spread: 20 diamond-like, 60 window glass"
+        20.0, description="the smaller, the farther colours spread: 20 more than any glass, 60 window glass"
     )
 
 
