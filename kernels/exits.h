@@ -1,5 +1,7 @@
 // The surface where rays within glass leave the set.
 
+#define EXIT_GRAZES R(0.05)   // least cosine of a ray with the normal where it leaves the set
+
 // The rays within: each pixel's second one.
 INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride) {
     const queue q = {rays + wave, met + wave, wave, 1, stride};
@@ -23,7 +25,13 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
     e.last = beyond - e.last;
     e.touch = R(0.0);
     surface_at(r, &e, hit, settings, orbit, k);
-    e.normal = vec_scale(e.normal, R(-1.0));
+    // A sheet without an inside lets rays straight through.
+    const mask sheet = less_equal(t, r.near);
+    e.normal = vec_pick(sheet, r.direction, vec_scale(e.normal, R(-1.0)));
+    // What leaves the set does not come from beyond it: a normal that says so is turned until the ray grazes.
+    const real facing = vec_dot(e.normal, r.direction);
+    const vec turned = vec_normalize(vec_along(e.normal, EXIT_GRAZES - facing, r.direction));
+    e.normal = vec_pick(less(facing, EXIT_GRAZES), turned, e.normal);
     e.touch = beyond - e.touch;
     e.t = t;
     numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,

@@ -128,6 +128,7 @@ PATHS = {
     "specular": "Specular",
     "coat": "Coat",
     "fuzz": "Fuzz",
+    "transmission": "Transmission",
     "emission": "Emission",
     "A number": "NumberMap",
     "A colour": "ColorMap",

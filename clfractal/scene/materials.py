@@ -66,14 +66,15 @@ class Transmission(Mapped):
 
     weight: FractionMap = Field(0.0, description="part of the body that is glass")
     color: ReflectanceMap = Field(
-        WHITE, description="of light that has gone through `depth` of it; depth 0: factor at each boundary"
+        WHITE,
+        description="of light that has gone through `depth` of it; with depth 0 a factor at each boundary",
     )
     depth: DepthMap = Field(
         0.0, description="way through the set after which light has that colour, scene units"
     )
     dispersion_scale: FractionMap = Field(0.0, description="0: all colours bend alike; 1: by the Abbe number")
     dispersion_abbe_number: AbbeMap = Field(
-        20.0, description="the smaller, the farther colours spread: 20 diamond-like, 60 window glass"
+        20.0, description="the smaller, the farther colours spread: 20 more than any glass, 60 window glass"
     )
 
 

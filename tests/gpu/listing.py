@@ -45,6 +45,11 @@ _SHAPES = [
     {"type": "rectangle", "position": [-9, 0, 9], "direction": [1, 0, -1], "width": 2, "height": 1},
     {"type": "spot", "position": [0, -9, 9], "direction": [0, 1, -1]},
 ]
+_GLASS = {
+    "lighting": {"mode": "path"},
+    "materials": {"glass": {"transmission": {"weight": 1, "dispersion_scale": 1}}},
+    "material": {"name": "glass"},
+}
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
@@ -65,7 +70,7 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
-    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}},
+    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}, "glass": _GLASS},
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
     "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
@@ -106,9 +111,14 @@ _CUT_PLANE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
 _APART = {
     frozenset({("coloring", "residual"), ("points", "")}),  # a plane needs points
     # Each sample of a path finds a spot of its own.
-    *(frozenset({("lighting", "path"), ("points", name)}) for name in _SURFACE["points"] if name),
-    frozenset({("lighting", "path"), ("coloring", "residual")}),
-    frozenset({("lighting", "path"), ("planes", "planes")}),
+    *(
+        frozenset({("lighting", light), ("points", name)})
+        for light in ("path", "glass")
+        for name in _SURFACE["points"]
+        if name
+    ),
+    *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass")),
+    *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass")),
 }
 _FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
 

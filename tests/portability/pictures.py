@@ -49,11 +49,13 @@ _SCENES: dict[str, str] = {
     "steps": "{name: mandelbulb, iterations: 5}",
     "cloud": "{name: mandelbulb, iterations: 5}",
     "plane": "{name: hast, iterations: 60}",
+    "glass": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "inside": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "coverage": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
 }
 _RENDERERS = {
     "paths": "{samples: 3, filter: tent}",
+    "glass": "{samples: 4}",
     "still": "{samples: 2, points: {}, normal: least_squares, ambient_occlusion: {rays: 2}, bounces: 1,"
     " filter: tent}",
     "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
@@ -71,12 +73,15 @@ _MORE = {
     "paths": "lighting: {mode: path, bounces: 3, roulette: 1}\nenvironment: {name: studio}\n"
     "materials: {clay: {base: {color: [0.8, 0.5, 0.3], diffuse_roughness: 0.5, metalness: 0.2}, coat: {weight: 0.3},"
     " fuzz: {weight: 0.2}, emission: {luminance: 0.05}}}\nmaterial: {name: clay}\n",
+    "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
+    "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2}, transmission: {weight: 0.9, color: [0.6, 0.9, 0.8],"
+    " depth: 1, dispersion_scale: 0.5}}}\nmaterial: {name: glass}\n",
     "quaternion": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]\n",
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
 _LENSES = {"still": ", f_number: 0.5"}
 # Each adds something that the others do not have; the rest are more formulas.
-_BRIEF = ("trigonometric", "mandelbox", "still", "paths", "steps", "cloud", "inside", "coverage", "plane")
+_BRIEF = ("trigonometric", "mandelbox", "still", "paths", "glass", "steps", "cloud", "inside", "coverage", "plane")
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)

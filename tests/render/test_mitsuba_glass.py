@@ -26,7 +26,7 @@ EYE, FOV = [1.0, -3.6, 1.4], 17.0
 TOP, BOTTOM = [1.0, 0.3, 0.1], [0.1, 0.25, 0.8]
 BOUNCES = 24
 INDEX, ALPHA = 1.5, 0.06
-COLOR, DEPTH = [0.8, 0.5, 0.2], 1.0
+COLOR, DEPTH = [0.9, 0.7, 0.5], 1.5
 _THEIRS = """
 import json, sys
 import mitsuba as mi

@@ -1,0 +1,160 @@
+"""Paths through sets of glass: nothing is lost on the way, media absorb by Beer and Lambert's law, and colours spread."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import yaml
+
+import clfractal
+from clfractal.device.select import choose
+from clfractal.errors import SceneError
+from clfractal.renderers.plan import make_plan
+from clfractal.renderers.surface import program_texts
+from clfractal.scene.model import Scene
+from tests.portability.pictures import picture
+from tests.render.test_paths import BALL, GREY, path, scene_of, seen
+
+Floats = npt.NDArray[np.float64]
+
+
+def ball(roughness: float, ior: float = 1.5, *, bounces: int = 48, **sections: Any) -> Scene:
+    """A ball of radius 1 of glass; `transmission` has more of it."""
+    clear = {"weight": 1, **sections.pop("transmission", {})}
+    material = {"base": {"color": [1, 1, 1]}, "specular": {"roughness": roughness, "ior": ior}}
+    return scene_of(
+        materials={"glass": {**material, "transmission": clear}},
+        material={"name": "glass"},
+        lighting=path(bounces),
+        **{"background": GREY, **sections},
+    )
+
+
+@pytest.mark.parametrize("roughness", [0, 0.3, 0.7, 1])
+@pytest.mark.parametrize("weight", [1, 0.5])
+def test_glass_before_white_is_not_seen(roughness: float, weight: float) -> None:
+    colors = seen(ball(roughness, transmission={"weight": weight}), 64)[0]
+    assert abs(colors.mean() - 1) < 0.01
+
+
+@pytest.mark.parametrize(
+    "formula",
+    [
+        {"name": "mandelbulb", "iterations": 4},
+        {"name": "menger_sponge", "iterations": 2},
+        {"name": "hast", "iterations": 12},
+    ],
+)
+@pytest.mark.parametrize("search", ["distance", "steps"])
+def test_sets_of_glass_keep_light(formula: dict[str, Any], search: str) -> None:
+    """However rough the set and whichever way its surface is found."""
+    scene = ball(0.1, bounces=64, formula=formula, camera={"position": [1.4, -2.6, 1.1], "fov": 40})
+    renderer = scene.surface.model_copy(update={"search": search})
+    colors = seen(scene.model_copy(update={"renderer": renderer}), 16)[0]
+    assert len(colors) > 200
+    assert abs(colors.mean() - 1) < 0.015
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_media_absorb_along_the_chord(precision: str) -> None:
+    """Glass that bends nothing: each pixel has what Beer and Lambert's law leaves of white on its chord through the ball."""
+    color, depth = np.array([0.9, 0.5, 0.1]), 0.8
+    scene = ball(0, 1.0, transmission={"color": list(color), "depth": depth})
+    scene = scene.model_copy(update={"renderer": scene.surface.model_copy(update={"samples": 16})})
+    channels = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z")
+    film = clfractal.render(scene, channels=channels, precision=precision)
+    whole = np.asarray(film["A"]) == 1
+    found, normals = (
+        np.stack([film[name][whole] for name in names], axis=-1).astype(np.float64)
+        for names in (channels[:3], channels[4:])
+    )
+    toward = normals - np.array([0, -4, 0])
+    toward /= np.linalg.norm(toward, axis=1, keepdims=True)
+    chord = -2 * (normals * toward).sum(axis=1)
+    expected = color ** (chord[:, None] / depth)
+    inner = chord > 0.6
+    assert inner.sum() > 300
+    assert np.abs(found[inner] - expected[inner]).max() < 0.03
+    assert abs((found[inner] / expected[inner]).mean() - 1) < 0.005
+
+
+def test_without_a_depth_boundaries_are_tinted() -> None:
+    """Twice on the way through a ball whose index is that of the air."""
+    color = np.array([0.9, 0.5, 0.2])
+    colors = seen(ball(0, 1.0, transmission={"color": list(color)}), 16)[0]
+    assert np.abs(np.median(colors, axis=0) - color**2).max() < 0.005
+
+
+def test_colours_spread_and_are_white_together() -> None:
+    """Under a grey gradient: without dispersion all is grey; with it red and blue come from elsewhere, but white stays white."""
+    grey = {"top": [1, 1, 1], "bottom": [0, 0, 0]}
+    plain = seen(ball(0, background=grey), 16)[0]
+    assert np.abs(plain[:, 0] - plain[:, 2]).max() < 1e-4
+    spread: dict[str, Any] = {"dispersion_scale": 1, "dispersion_abbe_number": 5}
+    colors = seen(ball(0, background=grey, transmission=spread), 256)[0]
+    apart = colors[:, 0] - colors[:, 2]
+    half = len(apart) // 2
+    # The picture is upside down: above, blue, which is bent more, comes from deeper.
+    assert apart[:half].mean() > 0.01
+    assert apart[half:].mean() < -0.01
+    white = seen(ball(0, transmission=spread), 256)[0]
+    assert np.abs(white.mean(axis=0) - 1).max() < 0.01
+
+
+def test_a_sun_shines_through_rough_glass() -> None:
+    """A light of one direction is asked for where paths leave the glass: behind a ball it is seen."""
+    dark = {"top": [0, 0, 0], "bottom": [0, 0, 0]}
+    scene = ball(0.6, background=dark, lights=[{"direction": [0, -1, 0]}])
+    colors = seen(scene, 64)[0]
+    assert colors.mean() > 0.05
+    smooth = scene_of(background=dark, lights=[{"direction": [0, -1, 0]}], lighting=path(8))
+    assert seen(smooth, 4)[0].mean() < 0.01
+
+
+def test_lanes_do_not_matter() -> None:
+    """Paths are noise that small differences stir: the mean of a packet's picture is that of a lane's."""
+    device = choose()
+    one = picture(device, "glass", "float32", (32, 24), lanes=1)
+    packet = picture(device, "glass", "float32", (32, 24), lanes=8)
+    same = np.isclose(one, packet, rtol=1e-3, atol=1e-4)
+    assert same.mean() > 0.8
+    assert abs(one[:3].mean() - packet[:3].mean()) < 0.01 * one[:3].mean()
+
+
+def test_scenes_without_glass_do_not_know_it() -> None:
+    """No program, no state: a material whose transmission has no weight has the texts of one without transmission."""
+    scenes = [
+        scene_of(lighting=path(2), materials={"m": {"transmission": values}}, material={"name": "m"})
+        for values in ({}, {"color": [0.5, 0.6, 0.7], "depth": 2, "dispersion_scale": 1})
+    ]
+    texts = []
+    for scene in scenes:
+        plan = make_plan(scene, precision="float32", lanes=4, channels=("R", "G", "B"))
+        found = program_texts(scene, plan)
+        assert [text.name for text in found] == ["rays", "surface"]
+        assert all("bsdf_glass" not in text.flat.text for text in found)
+        texts.append([dataclasses.replace(text).flat.text for text in found])
+    assert texts[0] == texts[1]
+
+
+@pytest.mark.parametrize(
+    ("transmission", "message"),
+    [
+        ({"wait": 1}, "materials.m.transmission: unknown key 'wait'; did you mean 'weight'?"),
+        ({"weight": 1.5}, "materials.m.transmission.weight: must be at most 1, got 1.5"),
+        ({"depth": -1}, "materials.m.transmission.depth: must be at least 0, got -1"),
+        (
+            {"dispersion_abbe_number": 0},
+            "materials.m.transmission.dispersion_abbe_number: must be at least 1, got 0",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told(transmission: dict[str, Any], message: str) -> None:
+    values = {"version": 1, "formula": BALL, "camera": {}, "materials": {"m": {"transmission": transmission}}}
+    with pytest.raises(SceneError) as caught:
+        clfractal.load_scene(yaml.safe_dump(values))
+    assert message in str(caught.value)
