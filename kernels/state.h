@@ -66,6 +66,15 @@ typedef struct {
     vec normal;
 } plane_face;
 
+#if HAS_PARTS
+// What a shot knows of its layers before its end.
+typedef struct {
+    color albedo;     // of the first surface
+    color emission;   // what the path had seen before any light was reflected ...
+    color once;       // ... and before any was reflected twice
+} glance;
+#endif
+
 #define COLORING_PER_POINT \
     (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
 // Numbers that are kept of an aim, and of a spot.
@@ -80,7 +89,13 @@ typedef struct {
 #define STATE_PATH (STATE_TALLY + NUMBERS_OF(tally))
 #define STATE_CARRIED (STATE_PATH + NUMBERS_OF(path))
 #define STATE_AIR (STATE_CARRIED + (HAS_PATHS ? NUMBERS_OF(carried) : 0))
-#define STATE_SUMS (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0))
+#define STATE_PARTS (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0))
+#if HAS_PARTS
+#define STATE_GLANCE (STATE_PARTS + NUMBERS_OF(parts))
+#define STATE_SUMS (STATE_GLANCE + NUMBERS_OF(glance))
+#else
+#define STATE_SUMS STATE_PARTS
+#endif
 // Of the first spot, and of the one after the last bounce.
 #define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))
 #define STATE_FACE (STATE_SPOT(1) + NUMBERS_OF(spot))

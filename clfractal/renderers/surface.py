@@ -21,7 +21,7 @@ from clfractal.renderers.kernel import (
     flat_text,
 )
 from clfractal.renderers.materials import PBR, material_records, scattering_defines
-from clfractal.renderers.passes import pass_defines
+from clfractal.renderers.passes import has_parts, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
@@ -59,6 +59,8 @@ NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangl
 POLISH = 5
 # Numbers of a pixel in `kernels/state.h`, without its normals.
 STATE_NUMBERS = 120
+# More of them where the picture has layers: sums, and what one shot knows of them.
+_PARTS_NUMBERS = 15 + 9
 
 Floats = npt.NDArray[np.float32]
 
@@ -129,7 +131,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "ADAPTIVE": 0,
         "POINTS": several_points(scene),
         "NORMAL_COUNT": 1,
-        "STATE_NUMBERS": state_numbers(scene),
+        "STATE_NUMBERS": state_numbers(scene, plan),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
@@ -144,9 +146,9 @@ def normal_count(scene: Scene) -> int:
     return counts.get(renderer.normal, 1)
 
 
-def state_numbers(scene: Scene) -> int:
+def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    return STATE_NUMBERS + 4 * normal_count(scene)
+    return STATE_NUMBERS + 4 * normal_count(scene) + (_PARTS_NUMBERS if has_parts(plan) else 0)
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
@@ -176,7 +178,7 @@ class SurfaceKernel(TileKernel):
         return surface_stages(self.scene, self.plan, samples)
 
     def wave_needs(self) -> WaveNeeds:
-        return WaveNeeds(state_numbers(self.scene), most_turns(self.scene))
+        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene))
 
     @property
     def footprint(self) -> int:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import dist
 
 from clfractal.errors import SceneError, Where
+from clfractal.files.channels import LIGHT_LAYERS, NOISY, SURFACE_LAYERS
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
@@ -32,6 +33,8 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
         _check_volume(scene, scene.renderer)
     _check_planes(scene)
     check_lighting(scene)
+    if scene.layout is None:
+        check_layers(scene, scene.output.channels, "output.channels")
     if scene.stereo is not None:
         _check_eyes(scene)
         if whole:
@@ -41,6 +44,23 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
     if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
         # (A grid from a file is not the formula's solid, so its lights may be anywhere.)
         _check_lights(scene)
+
+
+def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:
+    """Raises SceneError, at `where`, for a channel that a view's renderer does not know."""
+    surface = isinstance(scene.renderer, SurfaceRenderer)
+    for name in names:
+        if name in NOISY and not scene.output.denoise:
+            raise SceneError(f"{name} is what was denoised; it needs output.denoise: true", Where(path=where))
+        if name in NOISY and not {"R", "G", "B"} <= set(names):
+            raise SceneError(f"{name} is what was denoised; it needs the channels R, G, B", Where(path=where))
+        if name in SURFACE_LAYERS and not surface:
+            raise SceneError(
+                f"{name} is known of surfaces only, not with renderer.type {scene.renderer.type}",
+                Where(path=where),
+            )
+        if name in LIGHT_LAYERS and not isinstance(scene.lighting, PathLighting):
+            raise SceneError(f"{name} needs lighting: {{mode: path}}", Where(path=where))
 
 
 def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
