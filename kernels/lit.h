@@ -177,7 +177,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     const color past = color_add(result.of_light.albedo, color_scale(layers.behind, R(1.0) - comes));
     result.of_light.albedo = color_add(layers.front, color_scale(past, layers.front_through));
 #endif
-    result.of_light.normal = vec_scale(result.normal, pick(result.hit, result.coverage, R(0.0)));
+    result.of_light.normal = vec_pick(result.hit, vec_scale(result.normal, result.coverage), result.of_light.normal);
 #endif
     return result;
 }

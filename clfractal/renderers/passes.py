@@ -39,8 +39,8 @@ STATISTICS = ("rays", "hits", "steps", "iterations", "bad_distances", "waits")
 PASS_KEEP = 1  # what pixels have so far is kept for a later pass
 PASS_ADD = 2  # statistics are added to those of the launch before
 
-# Numbers of a pixel that are kept between passes, in the order of `pixel` and `parts` in `kernels/pixel.h`, and the channels
-# that need them; with none they are always kept.
+# Numbers of a pixel that are kept between passes, in the order of `pixel` and `parts` in `kernels/pixel.h`, and the
+# channels that need them; with none they are always kept.
 _DATA = ("Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 _OF_NOISE = ("brightness", "brightness_square", "coverage_square")
 _KEPT: dict[str, tuple[str, ...]] = {
@@ -56,7 +56,7 @@ _KEPT: dict[str, tuple[str, ...]] = {
     **{f"point_{axis.lower()}": (f"P.{axis}",) for axis in "XYZ"},
     "smooth": ("iterations",),
     "steps": ("steps",),
-    **{name.replace(".", "_").lower(): (name,) for name in SURFACE_LAYERS},
+    **{f"layer_{name.replace('.', '_').lower()}": (name,) for name in SURFACE_LAYERS},
 }
 
 
