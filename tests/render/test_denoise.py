@@ -27,15 +27,14 @@ Floats = npt.NDArray[np.float32]
 COLORS = ("R", "G", "B")
 
 
-def bulb(samples: int = 4, **output: Any) -> Scene:
-    """A bulb that a small sun and a sky light, 96 x 64."""
+def bulb(samples: int = 2, **output: Any) -> Scene:
+    """A bulb under a white sky, 96 x 64."""
     return scene_of(
-        formula={"name": "mandelbulb", "iterations": 5},
-        camera={"position": [1.3, -2.4, 0.9], "fov": 50},
+        formula={"name": "mandelbulb", "iterations": 4},
+        camera={"position": [1.3, -2.4, 0.9], "fov": 36},
         image={"width": 96, "height": 64},
         lighting=path(3),
-        lights=[{"direction": [-1, 0.4, -0.7], "intensity": 2, "angular_size": 4}],
-        background={"top": [0.4, 0.5, 0.8], "bottom": [0.3, 0.3, 0.3]},
+        background={"top": [1, 1, 1], "bottom": [0.1, 0.1, 0.1]},
         renderer={"samples": samples},
         output=output,
     )
@@ -51,16 +50,16 @@ def error(picture: Floats, truth: Floats) -> float:
 
 
 def test_a_denoised_picture_is_nearer_to_the_truth(device: Device) -> None:
-    """Its error is less than half of that of what the rays found, which the file keeps bit for bit."""
+    """Its error is less than 0.3 of that of what the rays found, which the file keeps bit for bit."""
     engine = engine_of(device)
     clean = engine.render(bulb(denoise=True, channels=["R", "G", "B", "A", *NOISY]))
     noisy = engine.render(bulb(channels=["R", "G", "B", "A"]))
-    truth = colors(engine.render(bulb(400)))
+    truth = colors(engine.render(bulb(300)))
     assert np.array_equal(colors(clean, NOISY), colors(noisy))
     assert np.array_equal(clean["A"], noisy["A"])
     assert clean.channels == ("R", "G", "B", "A", *NOISY)
-    assert error(colors(noisy), truth) > 1e-3
-    assert error(colors(clean), truth) < 0.5 * error(colors(noisy), truth)
+    assert error(colors(noisy), truth) > 0.01
+    assert error(colors(clean), truth) < 0.3 * error(colors(noisy), truth)
     assert clean.header["denoised"] == "Open Image Denoise"
     assert "denoised" not in noisy.header
     again = engine.render(bulb(denoise=True))
