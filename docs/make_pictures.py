@@ -17,7 +17,8 @@ Keys of the table:
       set       dotted key: value, replaced in every panel
       panels    one mapping of dotted keys to values for each panel. With `show: samples` a panel shows that channel
                 instead of the colours: from none, dark, to `renderer.samples`, light. With `show: left` or `right`
-                it shows what that eye sees of an anaglyph through its filter
+                it shows what that eye sees of an anaglyph through its filter; with `albedo`, `direct` or
+                `indirect` that layer
       columns   panels in a row; all of them if not given
       size      width and height of a panel, pixels
       zoom      each pixel of a panel is shown as a square of so many; 1 if not given
@@ -50,7 +51,8 @@ from clfractal.scene.palettes import table as table_of
 DOCS = Path(__file__).resolve().parent
 TABLE = DOCS / "pictures.yaml"
 GAP = 6  # pixels between panels
-Show = Literal["samples", "left", "right"]
+Show = Literal["samples", "left", "right", "albedo", "direct", "indirect"]
+LAYERS = ("albedo", "direct", "indirect")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,8 @@ class Panel:
     """A scene, and what of it is shown."""
 
     scene: Scene
-    # `samples`: how many each pixel took, instead of its colour; `left`, `right`: through that eye's filter.
+    # `samples`: how many each pixel took, instead of its colour; `left`, `right`: through that eye's filter;
+    # or a layer of its light.
     show: Show | None
 
 
@@ -112,7 +115,7 @@ def _picture(name: str, row: Mapping[str, Any], scenes: Mapping[str, Any]) -> Pi
 
 def _panel(base: Mapping[str, Any], values: dict[str, Any]) -> Panel:
     show = values.pop("show", None)
-    if show not in (None, "samples", "left", "right"):
+    if show not in (None, "samples", "left", "right", *LAYERS):
         raise ValueError(f"{TABLE.name}: a panel cannot show {show!r}")
     # JSON is YAML, and has no line breaks or bare words that the shell form of a value could trip over.
     scene = load_scene(
@@ -131,10 +134,13 @@ def make_picture(picture: Picture) -> None:
     whole = Image.new("RGBA", picture.size)
     seconds = 0.0
     for index, panel in enumerate(picture.panels):
-        film = render(panel.scene, channels=["R", "G", "B", "A", "samples"])
+        layer = [f"{panel.show}.{part}" for part in "RGB"] if panel.show in LAYERS else []
+        film = render(panel.scene, channels=["R", "G", "B", "A", "samples", *layer])
         seconds += film.header["seconds"]
         if panel.show == "samples":
             shown = Image.fromarray(_heat(film["samples"] / np.float32(panel.scene.renderer.samples)))
+        elif layer:
+            shown = Image.fromarray(encode8(np.stack([film[name] for name in layer], axis=-1)))
         elif panel.show is not None:
             colors = np.stack([film[name] for name in "RGB"], axis=-1)
             assert panel.scene.stereo is not None

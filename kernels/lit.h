@@ -120,17 +120,52 @@ INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real
     send_clipped(s, 0, r, R(0.0), mask_of(so_far->on_path), w);
 }
 
+#if HAS_PARTS
+// A shot's layers: of what its path has seen in all, `comes` is in the picture.
+INLINE parts parts_of(glance look, color seen, real coverage, real comes) {
+    parts found;
+    found.albedo = color_scale(look.albedo, coverage);
+    found.emission = color_scale(look.emission, comes);
+    found.direct = color_scale(color_add(look.once, color_scale(look.emission, R(-1.0))), comes);
+    found.indirect = color_scale(color_add(seen, color_scale(look.once, R(-1.0))), comes);
+    found.normal = vec_of(R(0.0), R(0.0), R(0.0));
+    return found;
+}
+
+// Keeps what the first spot reflects, white where it is a light, and the light seen so far.
+INLINE void glance_begin(stage s, mask surface, color albedo, color seen) {
+    const glance look = {color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0))), seen, seen};
+    STATE_KEEP(s, look, STATE_GLANCE);
+}
+
+// Keeps the light seen so far as that which was reflected once at most.
+INLINE void glance_once(stage s, color seen) {
+    glance look;
+    STATE_RECALL(s, look, STATE_GLANCE);
+    look.once = seen;
+    STATE_KEEP(s, look, STATE_GLANCE);
+}
+#endif
+
 // The shot at its end: what its path has seen, over the background; and what it has found first.
 INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, world w) {
     sighting first;
     STATE_RECALL(s, first, STATE_SIGHTING);
     spot found = *here;
     if (s.bounce > 0) found = spot_kept(s.state, 0, s.stride);
+#if HAS_PARTS
+    glance look;
+    STATE_RECALL(s, look, STATE_GLANCE);
+    const color in_all = seen;
+#endif
     shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
 #if PLANES > 0
     plane_face face;
     STATE_RECALL(s, face, STATE_FACE);
     const mask bare = mask_of(face.bare);
+#if HAS_PARTS
+    look.albedo = color_pick(bare, face.tint, look.albedo);
+#endif
     seen = color_pick(bare, face.tint, seen);
     result.hit |= bare;
     result.coverage = pick(bare, R(1.0), result.coverage);
@@ -143,7 +178,8 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #if HAS_FOG
     const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
     const color mist = color_splat(w.material->fog_color);
-    seen = color_mix(seen, mist, R(1.0) - exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material)));
+    const real passes = exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material));
+    seen = color_mix(seen, mist, R(1.0) - passes);
     if (w.material->fog_background) {
         background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
     }
@@ -168,13 +204,53 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
+#if HAS_PARTS
+    real comes = result.coverage;
+#if HAS_FOG
+    comes *= passes;
+#endif
+    result.of_light = parts_of(look, in_all, result.coverage, comes);
+#endif
 #if PLANES > 0
     plane_layers layers;
     STATE_RECALL(s, layers, STATE_LAYERS);
     result = planes_into(result, seen, background, layers, a.time, w.view);
 #endif
+#if HAS_PARTS
+#if PLANES > 0
+    const color past = color_add(result.of_light.albedo, color_scale(layers.behind, R(1.0) - comes));
+    result.of_light.albedo = color_add(layers.front, color_scale(past, layers.front_through));
+#endif
+    result.of_light.normal = vec_pick(result.hit, vec_scale(result.normal, result.coverage), result.of_light.normal);
+#endif
     return result;
 }
+
+#if HAS_PARTS
+// The sums of layers before this sample; see `sums_before`.
+INLINE parts parts_before(stage s, const place_in_pass *here) {
+    parts sum = {0};
+    if (s.sample > s.span.first) {
+        STATE_RECALL(s, sum, STATE_PARTS);
+    } else if (s.span.first > 0) {
+        kept_parts(here->kept, s.span.slots + CHANNEL_COUNT, 0, &sum);
+    }
+    return sum;
+}
+
+// Adds the shots' layers to their pixels' sums, which are kept or written as those are.
+INLINE void end_parts(stage s, const place_in_pass *here, parts more, mask wanted, real shots) {
+    parts sum = parts_before(s, here);
+    parts_add(&sum, more, wanted);
+    if (s.sample + 1 < s.span.end) {
+        STATE_KEEP(s, sum, STATE_PARTS);
+        return;
+    }
+    const pass span = s.span;
+    parts_write(span.film + here->tile * span.channel_count * TILE_PIXELS, span.slots, here->at.place, &sum, shots);
+    if (span.mode & PASS_KEEP) kept_parts(here->kept, span.slots + CHANNEL_COUNT, 1, &sum);
+}
+#endif
 
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.
 INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
@@ -183,6 +259,9 @@ INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, 
     const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);
     pixel p = sums_before(s, &at);
     sample_add(&p, found, wanted, a.offset);
+#if HAS_PARTS
+    end_parts(s, &at, found.of_light, wanted, p.shots);
+#endif
     const mask hit = wanted & less(R(0.0), found.coverage);
     pass_count(&at, (s.span.mode & PASS_ADD) || s.sample > s.span.first, a.wanted, number_of(hit), cost);
     if (s.sample + 1 < s.span.end) {

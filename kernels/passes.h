@@ -40,6 +40,14 @@ INLINE void kept_pixel(__global scalar *kept, __global const int *slots, int wri
     FOR_NUMBERS(NUMBERS_OF(pixel), KEPT_NUMBER)
 }
 
+#if HAS_PARTS
+// Likewise; their numbers follow those of `pixel`.
+INLINE void kept_parts(__global scalar *kept, __global const int *slots, int write, parts *sum) {
+#define KEPT_PART(i) kept_number(kept, slots, NUMBERS_OF(pixel) + i, write, (real *)sum + i);
+    FOR_NUMBERS(NUMBERS_OF(parts), KEPT_PART)
+}
+#endif
+
 // A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
 typedef struct {
     int tile, packet;

@@ -92,6 +92,9 @@ STAGE(scatter_paths) {
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
+#if HAS_PARTS
+    color reflects = color_of(R(1.0), R(1.0), R(1.0));
+#endif
     if (any_lane(lands)) {
 #if !COLORING_PER_POINT
         found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
@@ -105,6 +108,9 @@ STAGE(scatter_paths) {
         outward = vec_pick(mask_of(with.inside), vec_scale(outward, R(-1.0)), outward);
 #endif
         so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(color_scale(p.emission_color, p.emission_luminance), so_far.through)), so_far.seen);
+#if HAS_PARTS
+        reflects = pbr_albedo(&p, w.albedos);
+#endif
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
         so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), outward);
         with.total = weight_of_all(so_far.origin, w);
@@ -124,6 +130,10 @@ STAGE(scatter_paths) {
         so_far.footprint = found.cone;
         so_far.spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, a.time, w.view), found.cone);
     }
+#if HAS_PARTS
+    if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen);
+    if (bounce == 1) glance_once(s, so_far.seen);
+#endif
     with.awaited = color_pick(lands, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));
     STATE_KEEP(s, so_far, STATE_PATH);
     STATE_KEEP(s, with, STATE_CARRIED);
@@ -185,6 +195,9 @@ STAGE(end_paths) {
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
+#if HAS_PARTS
+    if (bounce == 1) glance_once(s, so_far.seen);
+#endif
     const spot first_spot = spot_kept(s.state, 0, s.stride);
     end_shots(s, a, so_far.seen, &first_spot, cost, w);
 }

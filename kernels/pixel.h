@@ -1,6 +1,15 @@
 // The sums over the samples of a pixel, for every renderer.
 #include "memory.h"
 
+#if HAS_PARTS
+// What a shot knows of the first surface, and of its light by how often that was reflected; or sums over shots. Normals count as
+// much as they cover.
+typedef struct {
+    color albedo, emission, direct, indirect;
+    vec normal;
+} parts;
+#endif
+
 // The results of one sample.
 typedef struct {
     color radiance;       // over the background; premultiplied where that is transparent
@@ -9,6 +18,9 @@ typedef struct {
     real depth;           // along the view axis
     vec normal, point;
     real smooth, steps;   // escape count; evaluations
+#if HAS_PARTS
+    parts of_light;
+#endif
 } shot;
 
 // What rays cost: distance evaluations (of a volume: places looked at), formula applications, and steps that ended inside.
@@ -84,5 +96,19 @@ INLINE void pixel_write(__global float *film, __global const int *slots, const i
     real value = ((const real *)p)[number_of_channel(i)];             \
     if (i <= CHANNEL_A) value *= share;                               \
     write_channel(film, slots[i], place, value);
-    FOR_NUMBERS(CHANNEL_COUNT, WRITE_CHANNEL)
+    FOR_NUMBERS(RAY_CHANNELS, WRITE_CHANNEL)
 }
+
+#if HAS_PARTS
+INLINE void parts_add(parts *sum, parts more, mask active) {
+#define ADD_PART(i) ((real *)sum)[i] += pick(active, ((const real *)&more)[i], R(0.0));
+    FOR_NUMBERS(NUMBERS_OF(parts), ADD_PART)
+}
+
+// Writes their means, of this many shots; their channels follow those that every renderer has.
+INLINE void parts_write(__global float *film, __global const int *slots, const int *place, const parts *sum, real shots) {
+    const real share = R(1.0) / fmax(shots, R(1.0));
+#define WRITE_PART(i) write_channel(film, slots[RAY_CHANNELS + i], place, ((const real *)sum)[i] * share);
+    FOR_NUMBERS(NUMBERS_OF(parts), WRITE_PART)
+}
+#endif

@@ -71,6 +71,15 @@ typedef struct {
     vec normal;
 } plane_face;
 
+#if HAS_PARTS
+// What a shot knows of its layers before its end.
+typedef struct {
+    color albedo;     // of the first surface
+    color emission;   // what the path had seen before any light was reflected ...
+    color once;       // ... and before any was reflected twice
+} glance;
+#endif
+
 #define COLORING_PER_POINT \
     (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
 // Numbers that are kept of an aim, and of a spot.
@@ -88,7 +97,13 @@ typedef struct {
 // What the formula was asked for the present spot's material.
 #define STATE_ASKED(i) (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0) + (i))
 #define STATE_GLOW STATE_ASKED(ASKED)
-#define STATE_SUMS (STATE_GLOW + (HAS_GLOW ? NUMBERS_OF(color) : 0))
+#define STATE_PARTS (STATE_GLOW + (HAS_GLOW ? NUMBERS_OF(color) : 0))
+#if HAS_PARTS
+#define STATE_GLANCE (STATE_PARTS + NUMBERS_OF(parts))
+#define STATE_SUMS (STATE_GLANCE + NUMBERS_OF(glance))
+#else
+#define STATE_SUMS STATE_PARTS
+#endif
 // Of the first spot, and of the one after the last bounce.
 #define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))
 #define STATE_FACE (STATE_SPOT(1) + NUMBERS_OF(spot))

@@ -173,6 +173,9 @@ STAGE(light_spots) {
 #endif
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
     }
+#if HAS_PARTS
+    if (bounce == 0) glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)));
+#endif
     const int last = bounce == settings->bounces;
     path_add(s, &so_far, direction, a.y, &found, gathered, last, w);
     if (!last) {

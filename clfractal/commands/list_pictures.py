@@ -9,6 +9,7 @@ import typer
 
 from clfractal.commands.options import (
     ClusterOption,
+    Denoise,
     DeviceOption,
     DevicesOption,
     Overrides,
@@ -52,6 +53,7 @@ def render(
     ] = None,
     samples: Samples = None,
     quality: Quality = None,
+    denoise: Denoise = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the work kept in OUTPUT.partial.")
     ] = False,
@@ -77,6 +79,7 @@ def render(
         resume=resume,
         stats=stats,
         quality=quality,
+        denoise=denoise,
     )
     shell = shell_of(context, quiet=quiet, verbose=verbose)
     return lambda: render_scene(order, shell)
@@ -106,6 +109,7 @@ def animate(
     overrides: Overrides = None,
     samples: Samples = None,
     quality: Quality = None,
+    denoise: Denoise = False,
     resume: Annotated[
         bool, typer.Option("--resume", help="Keep frames that are there, and continue the one in work.")
     ] = False,
@@ -151,6 +155,7 @@ def animate(
         overrides=tuple(overrides or ()),
         samples=samples,
         quality=quality,
+        denoise=denoise,
         resume=resume,
         stats=stats,
     )

@@ -80,6 +80,12 @@ Quality = Annotated[
         help="draft, good, final or print: samples, noise and detail together; other options win.",
     ),
 ]
+Denoise = Annotated[
+    bool,
+    typer.Option(
+        "--denoise", help="Take the noise out of the finished picture by Open Image Denoise (extra denoise)."
+    ),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Show more: statistics, causes of errors, drivers' messages.")

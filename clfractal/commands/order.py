@@ -32,6 +32,7 @@ class Order:
     streamed: Path | None = None
     """The output that stands for standard output."""
     quality: str | None = None
+    denoise: bool = False
     cluster: str | None = None
 
 

@@ -143,6 +143,8 @@ def ordered_scene(order: Order) -> Scene:
         given["renderer.samples"] = ("--samples", str(order.samples))
     if order.precision is not None:
         given["renderer.precision"] = ("--precision", json.dumps(order.precision))
+    if order.denoise:
+        given["output.denoise"] = ("--denoise", "true")
     overrides = [*order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
         scene = load_scene(Path(order.scene), overrides=overrides, folder=order.folder)

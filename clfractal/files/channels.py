@@ -27,6 +27,15 @@ class Channel:
     description: str
 
 
+def _layer(name: str, parts: str, description: str) -> tuple[Channel, ...]:
+    """The channels of a layer, such as `albedo.R`."""
+    words = {"R": "red", "G": "green", "B": "blue"}
+    return tuple(
+        Channel(f"{name}.{part}", "color", "half", 0.0, f"{description}; {words.get(part, part.lower())}")
+        for part in parts
+    )
+
+
 _TABLE = (
     Channel("R", "color", "half", 0.0, "red, linear Rec. 709"),
     Channel("G", "color", "half", 0.0, "green, linear Rec. 709"),
@@ -42,10 +51,35 @@ _TABLE = (
     Channel("iterations", "data", "float", 0.0, "smooth escape count"),
     Channel("steps", "data", "float", 0.0, "distance evaluations of the ray"),
     Channel("samples", "data", "float", 0.0, "samples of the pixel"),
+    *_layer("albedo", "RGB", "what the first surface reflects of white light, 0 to 1"),
+    *_layer("emission", "RGB", "light that the first thing seen gives off itself"),
+    *_layer("direct", "RGB", "light that was reflected once before it came to the eye"),
+    *_layer("indirect", "RGB", "light that was reflected more than once"),
+    *_layer("normal", "XYZ", "mean of the surface normals of all samples, times coverage"),
+    *_layer("noisy", "RGB", "the picture before it was denoised"),
 )
 
 CHANNELS: dict[str, Channel] = {channel.name: channel for channel in _TABLE}
 """Every channel by name, in the order in which pictures list them."""
+
+
+def layer(name: str) -> tuple[str, ...]:
+    """The names of a layer's channels, such as those of `albedo`."""
+    return tuple(channel for channel in CHANNELS if channel.startswith(f"{name}."))
+
+
+NORMAL: tuple[str, ...] = layer("normal")
+ALBEDO: tuple[str, ...] = layer("albedo")
+LIGHT_LAYERS: tuple[str, ...] = (*layer("emission"), *layer("direct"), *layer("indirect"))
+"""Parts of the picture by how often light was reflected; only paths know them."""
+SURFACE_LAYERS: tuple[str, ...] = (*ALBEDO, *LIGHT_LAYERS, *NORMAL)
+"""Channels that only surfaces have, in the order of `parts` in `kernels/pixel.h`."""
+NOISY: tuple[str, ...] = layer("noisy")
+"""The picture before it was denoised: made when all else is finished, never rendered."""
+RAY_CHANNELS: tuple[str, ...] = tuple(
+    name for name in CHANNELS if name not in SURFACE_LAYERS and name not in NOISY
+)
+"""The channels that every renderer makes."""
 
 DEFAULT_CHANNELS: tuple[str, ...] = ("R", "G", "B", "A", "Z")
 """The channels of a picture unless the scene's `output.channels` names others."""

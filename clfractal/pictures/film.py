@@ -208,6 +208,14 @@ class Film:
             self._planes[name][:] = planes[name]
         self._done[:] = True
 
+    def with_planes(self, planes: Mapping[str, Floats]) -> Film:
+        """The same picture with other channels: of each float32 of shape (height, width)."""
+        film = Film(tuple(planes), self.display, self.region, lambda: self.header)
+        film.fill(planes)
+        film._done[:] = self.done
+        film.makers, film.prober, film.inputs, film.stage = self.makers, self.prober, self.inputs, self.stage
+        return film
+
     def take(self, other: Film) -> None:
         """Copies another film of the same region."""
         for name in self.channels:

@@ -30,7 +30,7 @@ from clfractal.renderers.maps import (
     mapped_materials,
 )
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
-from clfractal.renderers.passes import pass_defines
+from clfractal.renderers.passes import has_parts, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
@@ -73,6 +73,8 @@ POLISH = 5
 SEARCH_INSIDE = 2
 # Numbers of a pixel in `kernels/state.h`, without its normals.
 STATE_NUMBERS = 120
+# More of them where the picture has layers: sums, and what one shot knows of them.
+_PARTS_NUMBERS = 15 + 9
 
 Floats = npt.NDArray[np.float32]
 
@@ -144,7 +146,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "ADAPTIVE": 0,
         "POINTS": several_points(scene),
         "NORMAL_COUNT": 1,
-        "STATE_NUMBERS": state_numbers(scene),
+        "STATE_NUMBERS": state_numbers(scene, plan),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
@@ -176,9 +178,10 @@ def normal_count(scene: Scene) -> int:
     return counts.get(renderer.normal, 1)
 
 
-def state_numbers(scene: Scene) -> int:
+def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    return STATE_NUMBERS + 4 * normal_count(scene) + len(asked_maps(scene))
+    parts = _PARTS_NUMBERS if has_parts(plan) else 0
+    return STATE_NUMBERS + 4 * normal_count(scene) + len(asked_maps(scene)) + parts
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
@@ -208,7 +211,7 @@ class SurfaceKernel(TileKernel):
         return surface_stages(self.scene, self.plan, samples)
 
     def wave_needs(self) -> WaveNeeds:
-        return WaveNeeds(state_numbers(self.scene), most_turns(self.scene))
+        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene))
 
     @property
     def footprint(self) -> int:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import dist
 
 from clfractal.errors import SceneError, Where
+from clfractal.files.channels import LIGHT_LAYERS, NOISY, SURFACE_LAYERS
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
@@ -36,6 +37,8 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
             f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
         )
     check_lighting(scene)
+    if scene.layout is None:
+        check_layers(scene, scene.output.channels, "output.channels")
     if scene.stereo is not None:
         _check_eyes(scene)
         if whole:
@@ -62,6 +65,23 @@ def _check_places(scene: Scene) -> None:
         from clfractal.scene.places import places_of
 
         places_of(scene, number)
+
+
+def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:
+    """Raises SceneError, at `where`, for a channel that a view's renderer does not know."""
+    surface = isinstance(scene.renderer, SurfaceRenderer)
+    for name in names:
+        if name in NOISY and not scene.output.denoise:
+            raise SceneError(f"{name} is what was denoised; it needs output.denoise: true", Where(path=where))
+        if name in NOISY and not {"R", "G", "B"} <= set(names):
+            raise SceneError(f"{name} is what was denoised; it needs the channels R, G, B", Where(path=where))
+        if name in SURFACE_LAYERS and not surface:
+            raise SceneError(
+                f"{name} is known of surfaces only, not with renderer.type {scene.renderer.type}",
+                Where(path=where),
+            )
+        if name in LIGHT_LAYERS and not isinstance(scene.lighting, PathLighting):
+            raise SceneError(f"{name} needs lighting: {{mode: path}}", Where(path=where))
 
 
 def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:

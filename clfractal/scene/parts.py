@@ -187,6 +187,9 @@ class Output(Section):
         default_factory=dict,
         description="half or float for those channels of an EXR that are not stored as by default",
     )
+    denoise: bool = Field(
+        False, description="whether Open Image Denoise takes the noise out of the finished picture"
+    )
     png_bits: Literal[8, 16] = Field(8, description="bits per channel of a PNG")
 
     quality: int = Field(

@@ -64,6 +64,8 @@ def prepared(
         exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
     """
     channels = ("R", "G", "B", "A") if colors else None
+    if colors:
+        scene = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
     look = Look(executor.device, Cancellable(executor, token))
     if exposed_in is not None and isinstance(scene.output.exposure, str):
         scene = with_exposure(scene, measured_exposure(exposed_in, look))

@@ -15,6 +15,7 @@ from clfractal import arguments
 from clfractal.device.cancel import CancelToken
 from clfractal.device.forked import use_opencl
 from clfractal.errors import ClfractalError, SceneError, Where
+from clfractal.pictures.denoise import check_installed
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.work.job import Job
@@ -81,9 +82,13 @@ class AnyEngine(ABC):
         Raises:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
             DeviceError, KernelBuildError: the quick look that this takes failed.
+            FileError: the picture is to be denoised, and the package for it is not installed.
         """
         asked = {"precision": precision, "samples": samples, "region": region, "channels": channels}
-        return self._prepared(scene, asked, quality)
+        job = self._prepared(scene, asked, quality)
+        if job.denoises:
+            check_installed()
+        return job
 
     @abstractmethod
     def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:

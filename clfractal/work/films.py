@@ -11,6 +11,7 @@ from clfractal.pictures.develop import Development
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Picture
 from clfractal.work.comfort import comfort_of_films
+from clfractal.work.denoising import finished
 from clfractal.work.job import Job
 from clfractal.work.probing import FilmProber
 from clfractal.work.remarks import remarks_of
@@ -56,14 +57,16 @@ class JobFilms:
         """
         composed = len(self.films) != 1
         return self._whole(
-            self.job.picture(self.films, self.header if composed else None), took, FilmProber(self.job)
+            self.job.picture(finished(self.job, self.films), self.header if composed else None),
+            took,
+            FilmProber(self.job),
         )
 
     def eyes(self, took: Took | None = None) -> dict[Side, Film]:
         """Each eye's picture; `took` as for `picture`: both films have the statistics of the pair."""
         return {
             side: self._whole(picture, took, FilmProber(self.job, side))
-            for side, picture in self.job.eyes(self.films).items()
+            for side, picture in self.job.eyes(finished(self.job, self.films)).items()
         }
 
     def _whole(self, picture: Picture, took: Took | None, prober: FilmProber) -> Film:

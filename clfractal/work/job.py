@@ -17,6 +17,7 @@ from clfractal.files.channels import CHANNELS
 from clfractal.files.document import write_document
 from clfractal.optics.view import scene_view, seen_by
 from clfractal.pictures.compose import APART, Composed, Side
+from clfractal.pictures.denoise import NAME
 from clfractal.pictures.film import Film
 from clfractal.pictures.makers import lines_of
 from clfractal.pictures.paste import Pasted
@@ -97,7 +98,7 @@ class Job:
         scene: what is shown; of a stereo scene with the screen's place and the eyes' separation decided.
         views: what is rendered, each by itself.
         composition: how one picture is made of them.
-        channels: those of the views.
+        channels: those of the finished picture; views also have what denoising needs.
         device: the device for which the decisions were made.
         remark: a line for the user, or empty.
         others: devices of other kinds that help. What they make may differ in the last bits from what `device` makes.
@@ -121,6 +122,11 @@ class Job:
                 views = tuple(replace(view, plan=replace(view.plan, lanes=lanes)) for view, lanes in pairs)
                 return replace(self, views=views, device=device, others=())
         return None
+
+    @property
+    def denoises(self) -> bool:
+        """Whether the views' pictures are denoised when their rays are done."""
+        return self.scene.output.denoise and {"R", "G", "B"} <= set(self.channels)
 
     @property
     def region(self) -> Region:
@@ -190,6 +196,7 @@ class Job:
             "exposure": scene.output.stops,
             "tone": scene.output.tone,
             "transparent": scene.background == "transparent",
+            **({"denoised": NAME} if self.denoises else {}),
             "worldToCamera": camera.world_to_camera(),
             "worldToNDC": camera.world_to_ndc(),
         }

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.select import Device
-from clfractal.files.channels import CHANNELS
+from clfractal.files.channels import RAY_CHANNELS
 from clfractal.optics.view import View, scene_view
 from clfractal.pictures.film import Film
 from clfractal.pictures.tiles import Region
@@ -87,7 +87,7 @@ class Look:
         Raises:
             DeviceError, KernelBuildError: as of a render.
         """
-        plan = replace(view.plan, samples=1, region=Region(x, y, 1, 1), channels=tuple(CHANNELS), divider=1)
+        plan = replace(view.plan, samples=1, region=Region(x, y, 1, 1), channels=RAY_CHANNELS, divider=1)
         closed = replace(view, scene=_with_closed_lens(view.scene), plan=plan)
         film = self._rendered(job, closed)
         return {name: float(film[name][0, 0]) for name in film}
@@ -95,7 +95,7 @@ class Look:
     def _planned(self, scene: Scene, eye: Eye) -> tuple[Job, PlannedView]:
         """The view of any eye, with a job for it."""
         closed = _with_closed_lens(scene)
-        alone: dict[str, Any] = {}
+        alone: dict[str, Any] = {"output": scene.output.model_copy(update={"denoise": False})}
         if scene.stereo is not None:
             alone["stereo"] = scene.stereo.model_copy(update={"mode": "left", "fit": None})
         job = prepare(closed.model_copy(update=alone), self.device, samples=1, channels=_CHANNELS)

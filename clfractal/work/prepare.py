@@ -9,7 +9,7 @@ from clfractal import arguments
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.errors import Where
-from clfractal.files.channels import check_channels
+from clfractal.files.channels import ALBEDO, NOISY, NORMAL, check_channels
 from clfractal.optics.view import seen_by, shown_views
 from clfractal.pictures.compose import Side, composed_channels, eye_regions
 from clfractal.pictures.modes import picture_size
@@ -17,9 +17,11 @@ from clfractal.pictures.tiles import Region
 from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region
 from clfractal.renderers.shutter import shutter_of
+from clfractal.scene.checks import check_layers
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
+from clfractal.scene.surface import SurfaceRenderer
 from clfractal.work.job import Composition, Identity, Job, Paste, StereoPair
 
 MAX_SAMPLES = 65_536
@@ -57,9 +59,10 @@ def prepare(
     if region is not None:
         x, y, width, height = arguments.numbers("region", region, 4, "x, y, width, height in pixels")
         region = (x, y, width, height)
-    names = scene.output.channels
+    names, where = scene.output.channels, "output.channels"
     if channels is not None:
-        names = check_channels(arguments.words("channels", channels), Where(path="channels"))
+        where = "channels"
+        names = check_channels(arguments.words("channels", channels), Where(path=where))
     chooser = _Chooser(device, precision, on_start)
     # One number type for both eyes, chosen for the view of the eye between them.
     chosen = [chooser.number_type(view, eye) for view, eye, _ in shown_views(scene)]
@@ -73,7 +76,9 @@ def prepare(
             if needed is None:
                 continue
             used, lanes = chosen[number]
-            plan = Plan(used, lanes, samples if samples is not None else view.renderer.samples, needed, names)
+            check_layers(view, names, where)
+            shots = samples if samples is not None else view.renderer.samples
+            plan = Plan(used, lanes, shots, needed, _rendered(view, names))
             numbers.append(len(views))
             places.append(place)
             planned = PlannedView(view, plan, own_eye, number)
@@ -98,6 +103,14 @@ def prepare(
         }
         composition = StereoPair(stereo, eyes, image, whole)
     return Job(scene, tuple(views), composition, names, device.info, chooser.remark)
+
+
+def _rendered(view: Scene, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The channels that rays are sent for: those asked for, and what denoising needs."""
+    found = [name for name in names if name not in NOISY]
+    if view.output.denoise and {"R", "G", "B"} <= set(names) and isinstance(view.renderer, SurfaceRenderer):
+        found += [name for name in (*ALBEDO, *NORMAL) if name not in found]
+    return tuple(found)
 
 
 class _Chooser:

@@ -10,6 +10,7 @@ from typing import Any
 from clfractal.device.activity import doing
 from clfractal.pictures.outputs import output_files, save_outputs, save_views
 from clfractal.pictures.tiled import Picture
+from clfractal.work.denoising import finished
 from clfractal.work.job import Job
 
 
@@ -33,6 +34,7 @@ def _save(
     job: Job, stores: Sequence[Picture], paths: Sequence[str | Path], header: Mapping[str, Any]
 ) -> None:
     output = job.scene.output
+    stores = finished(job, stores)
     save = partial(save_outputs, half=output.half_channels, bits=output.png_bits, quality=output.quality)
     if not job.stays_apart:
         save(job.picture(stores, header), paths)

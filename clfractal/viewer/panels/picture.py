@@ -19,5 +19,6 @@ def draw(ui: Ui) -> None:
     w.field(ui, "output.tone", words={"agx": "AgX"})
     w.group(ui, "Files")
     w.fields(ui, "image", ("width", "height"), width={"unit": " px"}, height={"unit": " px"})
+    w.field(ui, "output.denoise")
     w.field(ui, "output.png_bits", segmented=True)
     w.field(ui, "output.quality")

@@ -1,0 +1,216 @@
+"""Layers of pictures: albedo, emission, direct and indirect light, against the picture, closed forms and each other."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import clfractal
+from clfractal.device.select import Device
+from clfractal.errors import SceneError
+from clfractal.files.channels import ALBEDO, LIGHT_LAYERS, NORMAL, RAY_CHANNELS, SURFACE_LAYERS
+from clfractal.pictures.film import Film
+from clfractal.renderers.passes import kept_numbers
+from clfractal.scene.model import Scene
+from tests.render.shots import engine_of, plan_of, shoot
+from tests.render.test_paths import BLACK, path, scene_of
+
+Floats = npt.NDArray[np.float64]
+
+SHINES = (0.5, 0.25, 0.0)
+CLAY: dict[str, Any] = {"base": {"color": [0.6, 0.3, 0.1]}, "specular": {"weight": 0}}
+GLOWING: dict[str, Any] = {**CLAY, "emission": {"luminance": 0.5, "color": [1, 0.5, 0]}}
+SKY = {"top": [0.3, 0.4, 0.5], "bottom": [0.1, 0.1, 0.1]}
+SUN = {"direction": [-1, 1, -1], "intensity": 2}
+# Menger's sponge: light goes on from wall to wall.
+HOLLOW = {"name": "menger_sponge", "iterations": 3}
+
+
+def rendered(material: dict[str, Any], *, samples: int = 8, **sections: Any) -> Film:
+    """The picture with all channels, of `scene_of` with a material."""
+    renderer = {"samples": samples, **sections.pop("renderer", {})}
+    values = {"lighting": path(3), "lights": [SUN], "renderer": renderer, **sections}
+    scene = scene_of(materials={"m": material}, material={"name": "m"}, **values)
+    return clfractal.render(scene, channels=[*RAY_CHANNELS, *SURFACE_LAYERS])
+
+
+def layer(film: Film, name: str, parts: str = "RGB") -> Floats:
+    """A layer, shape (height, width, 3); the picture itself if the name is empty."""
+    names = [f"{name}.{part}" if name else part for part in parts]
+    return np.stack([film[each] for each in names], axis=-1).astype(np.float64)
+
+
+def light(film: Film) -> Floats:
+    """The sum of the three layers of light."""
+    return layer(film, "emission") + layer(film, "direct") + layer(film, "indirect")
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("formula", [None, HOLLOW])
+def test_the_layers_of_light_are_the_picture(formula: dict[str, Any] | None, precision: str) -> None:
+    """To rounding, in every pixel, where nothing else is in the picture."""
+    more = {} if formula is None else {"formula": formula, "camera": {"position": [2, -3, 1.5], "fov": 40}}
+    film = rendered(GLOWING, background="transparent", renderer={"precision": precision}, **more)
+    whole = layer(film, "")
+    assert whole.max() > 0.5
+    assert np.abs(light(film) - whole).max() < 2e-6 * whole.max()
+    indirect = layer(film, "indirect")
+    assert indirect.min() >= 0
+    assert layer(film, "direct").min() >= 0
+    if formula is not None:
+        assert indirect.max() > 0.05
+
+
+def test_the_rest_is_the_background() -> None:
+    film = rendered(GLOWING, background={"top": [0.3, 0.4, 0.5], "bottom": [0.3, 0.4, 0.5]})
+    rest = layer(film, "") - light(film)
+    assert np.allclose(rest, (1 - film["A"][..., None]) * [0.3, 0.4, 0.5], atol=2e-6)
+    assert 0 < film["A"].mean() < 1
+
+
+def test_fog_dims_the_layers_like_the_picture() -> None:
+    """Black fog takes light away and brings none."""
+    film = rendered(GLOWING, background="transparent", fog={"color": [0, 0, 0], "density": 0.4})
+    clear = rendered(GLOWING, background="transparent")
+    assert np.allclose(light(film), layer(film, ""), atol=2e-6)
+    full = film["A"] == 1
+    assert (light(film)[full].sum(axis=-1) < 0.6 * light(clear)[full].sum(axis=-1)).all()
+
+
+def test_layers_change_no_bit_of_the_picture() -> None:
+    film = rendered(GLOWING, background=SKY)
+    scene = scene_of(
+        materials={"m": GLOWING},
+        material={"name": "m"},
+        lighting=path(3),
+        lights=[SUN],
+        background=SKY,
+        renderer={"samples": 8},
+    )
+    plain = clfractal.render(scene, channels=RAY_CHANNELS)
+    for name in RAY_CHANNELS:
+        np.testing.assert_array_equal(film[name], plain[name])
+
+
+def test_emission_is_what_the_material_shines_with() -> None:
+    film = rendered(GLOWING, background=BLACK, lights=[])
+    full = film["A"] == 1
+    assert np.allclose(layer(film, "emission")[full], SHINES, rtol=1e-6)
+    # A ball lights nothing of itself.
+    assert not layer(film, "direct")[full].any()
+
+
+def test_direct_light_of_a_sun_is_lamberts() -> None:
+    """A matt ball under one sun: colour x intensity x cosine, and nothing more."""
+    film = rendered(CLAY, background=BLACK, samples=1)
+    toward = np.array([1, -1, 1]) / math.sqrt(3)
+    cosine = np.clip(layer(film, "N", "XYZ") @ toward, 0, None)
+    full = (film["A"] == 1) & (cosine > 0.05)
+    wanted = 2 * cosine[..., None] * [0.6, 0.3, 0.1]
+    assert full.sum() > 200
+    assert np.allclose(layer(film, "direct")[full], wanted[full], rtol=2e-3)
+    assert not layer(film, "emission").any()
+
+
+def test_what_a_sky_brings_is_direct() -> None:
+    """A white sky lights a matt ball as brightly from everywhere: its colour. Found by chance, at the next spot."""
+    white = {"top": [1, 1, 1], "bottom": [1, 1, 1]}
+    film = rendered(CLAY, background=white, lights=[], lighting=path(0), samples=64)
+    full = film["A"] == 1
+    assert np.allclose(layer(film, "direct")[full].mean(axis=0), [0.6, 0.3, 0.1], rtol=5e-3)
+    assert not layer(film, "indirect")[full].any()
+
+
+@pytest.mark.parametrize(
+    ("material", "albedo"),
+    [
+        (CLAY, (0.6, 0.3, 0.1)),
+        ({"base": {"color": [0.9, 0.6, 0.3], "metalness": 1, "weight": 0.5}}, (0.45, 0.3, 0.15)),
+        (
+            {"base": {"color": [0.8, 0.8, 0.8]}, "coat": {"weight": 0.5, "color": [1, 0.5, 0]}},
+            (0.8, 0.6, 0.4),
+        ),
+    ],
+)
+def test_albedo_is_the_materials(material: dict[str, Any], albedo: tuple[float, float, float]) -> None:
+    film = rendered(material, background=SKY, samples=4)
+    cover = film["A"][..., None]
+    assert np.allclose(layer(film, "albedo"), cover * albedo, atol=1e-5)
+    assert cover.max() == 1
+
+
+def test_albedo_without_paths_is_the_surfaces_colour() -> None:
+    for coloring in ({}, {"by": "normal"}):
+        scene = scene_of(material={"color": [0.8, 0.5, 0.2]}, coloring=coloring, renderer={"samples": 1})
+        film = clfractal.render(scene, channels=["A", "N.X", "N.Y", "N.Z", *ALBEDO, *NORMAL])
+        full = film["A"] == 1
+        found = layer(film, "albedo")[full]
+        if coloring:
+            assert found.std(axis=0).max() > 0.1
+        else:
+            assert np.allclose(found, [0.8, 0.5, 0.2], atol=1e-6)
+        assert np.array_equal(layer(film, "normal", "XYZ"), layer(film, "N", "XYZ"))
+
+
+def test_a_lamp_that_is_seen_is_emission_and_white() -> None:
+    lamp = {"type": "sphere", "position": [0, -2.5, 0], "radius": 0.3, "intensity": 3}
+    film = rendered(CLAY, background=BLACK, lights=[lamp], samples=4)
+    middle = (24, 24)
+    assert np.allclose(layer(film, "emission")[middle], 3, rtol=1e-5)
+    assert np.allclose(layer(film, "albedo")[middle], 1)
+    assert not layer(film, "direct")[middle].any()
+
+
+def test_layers_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
+    names = [*SURFACE_LAYERS]
+    scene = scene_of(
+        materials={"m": GLOWING},
+        material={"name": "m"},
+        lighting=path(3),
+        lights=[SUN],
+        background=SKY,
+        renderer={"samples": 8},
+    )
+    whole = shoot(scene, device, channels=names)
+    *_, last = engine_of(device).refine(scene, channels=names)
+    part = shoot(scene, device, channels=names, region=(8, 12, 20, 16))
+    single = shoot(scene, device, channels=names, lanes=1)
+    for name in names:
+        np.testing.assert_array_equal(last[name], whole[name])
+        np.testing.assert_array_equal(part[name], whole[name][12:28, 8:28])
+        # Compilers round differently for packets.
+        assert np.mean(np.abs(single[name] - whole[name]) > 1e-3) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("names", "sections", "message"),
+    [
+        (("direct.R",), {}, "direct.R needs lighting: {mode: path}"),
+        (("albedo.G",), {"renderer": {"type": "volume"}}, "albedo.G is known of surfaces only"),
+        (("R", "noisy.R"), {}, "noisy.R is what was denoised; it needs output.denoise: true"),
+    ],
+)
+def test_channels_that_a_scene_cannot_have(
+    names: tuple[str, ...], sections: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(SceneError, match=re.escape(message)) as caught:
+        clfractal.render(scene_of(**sections), channels=names)
+    assert caught.value.where.path == "channels"
+
+
+def test_light_layers_are_paths_alone() -> None:
+    assert set(LIGHT_LAYERS) < set(SURFACE_LAYERS)
+    scene: Scene = scene_of(lighting=path(1), output={"channels": ["R", "G", "B", "direct.R"]})
+    assert scene.output.channels[-1] == "direct.R"
+
+
+def test_every_number_of_a_pixel_is_kept_under_its_own_name(device: Device) -> None:
+    """18 numbers of a pixel and the 15 of its layers, in the order of the kernels' structs."""
+    plan = plan_of(scene_of(lighting=path(1)), device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS))
+    renderer = scene_of(renderer={"samples": 8, "noise": 0.01}).renderer
+    assert len(kept_numbers(plan, renderer)) == 33
