@@ -159,12 +159,12 @@ STAGE(scatter_paths) {
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     if (any_lane(lands)) {
 #if !COLORING_PER_POINT
-        found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
+        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
 #endif
         const pbr p = pbr_at(&found, w);
         so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(p.emission, so_far.through)), so_far.seen);
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
-        so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), found.normal);
+        so_far.origin = vec_along(found.point, lift_of(&found, w), found.normal);
         with.total = weight_of_all(so_far.origin, w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
@@ -182,7 +182,7 @@ STAGE(scatter_paths) {
     with.awaited = color_pick(lands, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));
     STATE_KEEP(s, so_far, STATE_PATH);
     STATE_KEEP(s, with, STATE_CARRIED);
-    send_clipped(s, 0, asks, R(0.0), lands & less(R(0.0), asks.far), w);
+    send_clipped(s, 0, asks, R(0.0), WHETHER, lands & less(R(0.0), asks.far), w);
 }
 
 // Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
@@ -209,7 +209,7 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
-    send_clipped(s, 0, r, R(0.0), mask_of(so_far.on_path), w);
+    send_clipped(s, 0, r, R(0.0), WHICH, mask_of(so_far.on_path), w);
 }
 
 // Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would

@@ -16,8 +16,9 @@ typedef struct {
     plane_set planes;
     __constant const struct Pbr *materials;
     __global const float *albedos;
+    __global const struct Object *objects;
 } world;
-#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos}
+#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, objects}
 
 // A work-item's packet.
 typedef struct {

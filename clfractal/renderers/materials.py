@@ -70,8 +70,13 @@ def used_material(scene: Scene) -> PbrMaterial:
 
 
 def material_records(scene: Scene, precision: Precision) -> Record:
-    """The materials, one record each."""
-    return PBR.array(precision, [material_values(used_material(scene))])
+    """The set's material, then each object's."""
+    own = used_material(scene)
+    used = [
+        own,
+        *(scene.materials[each.material] if each.material else own for each in scene.objects.values()),
+    ]
+    return PBR.array(precision, [material_values(each) for each in used])
 
 
 def material_values(material: PbrMaterial) -> dict[str, object]:

@@ -14,6 +14,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.materials import PBR
+from clfractal.renderers.objects import OBJECT, mirrors
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
 from clfractal.scene.base import unit
@@ -85,6 +86,7 @@ MARCH = Struct(
         Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("object_count", "int", 0, "number of objects"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
         Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
         Field("map_rays", "int", 0, "rays into the hemisphere, spread like the environment's light"),
@@ -166,7 +168,7 @@ MATERIAL = Struct(
     ],
 )
 
-STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR)
+STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR, OBJECT)
 
 LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
 LIGHT_DEFINES = {f"LIGHT_{kind.upper()}": number for kind, number in LIGHT_KINDS.items()}
@@ -282,6 +284,7 @@ def march_record(
         "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,
         "environment_weight": environment_weight(scene, environment),
         "light_count": len(scene.lights),
+        "object_count": len(scene.objects),
         "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
         "map_rays": rays.map,
@@ -310,7 +313,7 @@ def bounces(scene: Scene) -> int:
     """Most mirror reflections of a path, or its bounces."""
     if isinstance(scene.lighting, PathLighting):
         return scene.lighting.bounces
-    return scene.surface.bounces if scene.material.reflection > 0 else 0
+    return scene.surface.bounces if scene.material.reflection > 0 or mirrors(scene) else 0
 
 
 def light_rays(scene: Scene) -> int:

@@ -12,6 +12,8 @@ from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
 from clfractal.renderers.kernel import (
+    OBJECT_NUMBERS,
+    RAY_NUMBERS,
     STATE_PADDING,
     KernelArgument,
     ProgramText,
@@ -21,6 +23,7 @@ from clfractal.renderers.kernel import (
     flat_text,
 )
 from clfractal.renderers.materials import PBR, material_records, scattering_defines
+from clfractal.renderers.objects import object_defines, object_records
 from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
@@ -77,6 +80,7 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         # Rays are marched as they were sent.
         "HAS_LENS": 0,
         "HAS_MOTION": 0,
+        "HAS_OBJECTS": 0,
     }
 
 
@@ -132,6 +136,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_NUMBERS": state_numbers(scene),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
+        **object_defines(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
     }
@@ -146,7 +151,7 @@ def normal_count(scene: Scene) -> int:
 
 def state_numbers(scene: Scene) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    return STATE_NUMBERS + 4 * normal_count(scene)
+    return STATE_NUMBERS + 4 * normal_count(scene) + 2 * bool(scene.objects)
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
@@ -176,7 +181,8 @@ class SurfaceKernel(TileKernel):
         return surface_stages(self.scene, self.plan, samples)
 
     def wave_needs(self) -> WaveNeeds:
-        return WaveNeeds(state_numbers(self.scene), most_turns(self.scene))
+        ray = RAY_NUMBERS + OBJECT_NUMBERS * bool(self.scene.objects)
+        return WaveNeeds(state_numbers(self.scene), most_turns(self.scene), ray)
 
     @property
     def footprint(self) -> int:
@@ -210,6 +216,7 @@ class SurfaceKernel(TileKernel):
                 else [np.zeros(4, np.float32)] * 2
             ),
             *self._materials(),
+            object_records(self.scene, self.precision),
         ]
 
     def _materials(self) -> list[KernelArgument]:

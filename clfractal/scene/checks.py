@@ -9,6 +9,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.model import Scene
+from clfractal.scene.object_checks import check_objects
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
@@ -32,6 +33,7 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
         _check_volume(scene, scene.renderer)
     _check_planes(scene)
     check_lighting(scene)
+    check_objects(scene)
     if scene.stereo is not None:
         _check_eyes(scene)
         if whole:
