@@ -35,7 +35,8 @@ def test_shadow_of_a_ball_on_a_plane(device: Device, mode: str, lanes: int | Non
         lighting={"mode": mode, **({"bounces": 0} if mode == "path" else {})},
         background=[0, 0, 0],
     )
-    film = shoot(scene, device, **({"lanes": lanes} if lanes else {}))
+    shots: dict[str, Any] = {"lanes": lanes} if lanes else {}
+    film = shoot(scene, device, **shots)
     toward = -way / np.linalg.norm(way)
     origin, direction, _ = rays(scene)
     t, normal, number = met(scene, origin, direction)
@@ -188,9 +189,11 @@ def test_fog_before_an_object(device: Device) -> None:
 @pytest.mark.parametrize("kind", ["box", "sphere", "cylinder"])
 def test_a_closed_room_keeps_its_energy(device: Device, kind: str) -> None:
     """Walls that shine E and scatter the part r of light: after n bounces E (1 - r^(n + 1)) / (1 - r) everywhere."""
-    size = {"box": {"size": [3, 2, 2]}, "sphere": {"radius": 1.5}, "cylinder": {"radius": 1.4, "height": 2}}[
-        kind
-    ]
+    sizes: dict[str, dict[str, Any]] = {
+        "box": {"size": [3, 2, 2]},
+        "sphere": {"radius": 1.5},
+        "cylinder": {"radius": 1.4, "height": 2},
+    }
     wall = {
         "base": {"color": [0.5, 0.5, 0.5]},
         "specular": {"weight": 0},
@@ -200,7 +203,7 @@ def test_a_closed_room_keeps_its_energy(device: Device, kind: str) -> None:
         NOWHERE,
         {"position": [0.1, -0.2, 0.1], "target": [1, 1, 0.3], "fov": 90},
         (32, 32),
-        objects={"room": {"type": kind, "material": "wall", **size}},
+        objects={"room": {"type": kind, "material": "wall", **sizes[kind]}},
         materials={"wall": wall},
         lights=[],
         lighting={"mode": "path", "bounces": 7, "roulette": 64},

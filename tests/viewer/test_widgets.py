@@ -58,6 +58,7 @@ def test_every_field_of_every_section_is_understood() -> None:
         "cut_planes",
         "bookmarks",
         "materials",
+        "objects",
         "inline",
         "parameters",
         "live",

@@ -76,6 +76,7 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Specular.ior": (1, 3),
     "Coat.ior": (1, 3),
     "Emission.luminance": (0, 4),
+    "Waves.spread": (0, 90),
     "Environment.intensity": (0, 4),
     "Environment.rotation": (-180, 180),
     "Environment.rays": (0, 64),
