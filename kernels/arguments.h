@@ -17,13 +17,14 @@
         __global const float *palette, __global const float *environment, __global const struct CutPlane *planes,          \
         __global const float *plane_palettes, __constant const struct Pbr *materials, __global const float *albedos,            \
         __global const struct Map *maps, __global const float *tables, __global const scalar *set_lights,                       \
+        __global const struct Object *objects,                                                                                 \
         __global scalar *restrict state, __global scalar *restrict rays, __global scalar *restrict met,                         \
         PASS_SPAN, int first_tile, int wave, int queue_stride, int turns, int slice, int next_turns, int goal, int bounce, int sample
 // The head of a stage's kernel, whose work-item is number ITEM along the first dimension and ROW along the second.
 #ifdef DIRECT_BUILT_INS
 #define STAGE_GIVEN                                                                                                         \
     film, kept, statistics, places, view, sampling, settings, orbit, k, material, lights, palette, environment, planes,     \
-        plane_palettes, materials, albedos, maps, tables, set_lights, state, rays, met, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode,     \
+        plane_palettes, materials, albedos, maps, tables, set_lights, objects, state, rays, met, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode,     \
         first_tile, wave, queue_stride, turns, slice, next_turns, goal, bounce, sample
 #define STAGE(name)                                                                                                        \
     CALLED void name##_item(int ITEM, int ROW, STAGE_ARGUMENTS);                                                           \

@@ -1,4 +1,5 @@
 // Rays from the eye.
+#include "objects.h"
 
 // The sums of the packet's pixels before this sample.
 INLINE pixel sums_before(stage s, const place_in_pass *here) {
@@ -26,7 +27,7 @@ INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
 }
 
 // Sends a ray for the part of its way that cutting planes and the bounding sphere leave, from `free` on: nothing should be before.
-INLINE void send_clipped(stage s, int turn, ray r, real free, mask wanted, world w) {
+INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world w) {
     real face;
     wanted &= planes_cut(&r, &face, w.planes);
     wanted &= ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
@@ -34,6 +35,32 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, mask wanted, world
     r.near = fmax(r.near, free);
     queue_send(s.q, turn, s.slot, r, wanted);
 }
+
+// What has to be known of a ray: which surface it meets, or only whether it meets one.
+#define WHICH R(0.0)
+#define WHETHER ((real)(REAL_LARGEST))
+
+// Sends a ray for all that it may meet. The march ends at the nearest object, and is left out where that is nearer than `enough`.
+INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask wanted, world w) {
+#if HAS_OBJECTS
+    real number;
+    __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
+    const real met = pick(wanted, objects_met(&r, w.objects, w.settings->object_count, &number), (real)(REAL_LARGEST));
+    lanes_store(met, at + RAY_OBJECT * s.q.stride);
+    lanes_store(number, at + RAY_OBJECT_NUMBER * s.q.stride);
+    r.far = fmin(r.far, met);
+    wanted &= less_equal(enough, met);
+#endif
+    send_to_set(s, turn, r, free, wanted, w);
+}
+
+#if HAS_OBJECTS && POINTS > 1
+// Sends a ray that looks for the set alone.
+INLINE void send_past_objects(stage s, int turn, ray r, real free, mask wanted, world w) {
+    lanes_store((real)(REAL_LARGEST), s.q.rays + RAY_OBJECT * s.q.stride + turn * s.q.wave + s.slot);
+    send_to_set(s, turn, r, free, wanted, w);
+}
+#endif
 
 // The ray that finds the next spot: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
 INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {

@@ -2,11 +2,11 @@
 
 // The light that one light ray adds, for every normal of the spot.
 INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open, vec to_viewer,
-                    __constant const struct Light *light, __constant const struct Material *material) {
+                    __constant const struct Light *light, look l) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < TURNS(facet_count(s.bounce)); ++i) {
         const facet f = facet_of(s, here, i);
-        const color one = phong(here->tint, f.normal, to_viewer, in, lit, open, light, material);
+        const color one = shaded(here->tint, f.normal, to_viewer, in, lit, open, light, l);
         sum = color_add(sum, color_scale(one, f.weight));
     }
     return sum;
@@ -30,6 +30,7 @@ INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, in
 // The light that the spot's rays have brought.
 INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
+    const look l = look_of(here, w);
     real open = R(1.0);
     int turn = 0;
 #if HAS_AMBIENT
@@ -37,7 +38,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     for (; turn < hemisphere_turns(w); ++turn) {
         const encounter met = queue_met(s.q, turn, s.slot);
         tally_met(cost, met, 0);
-        gathered = color_add(gathered, ambient_light(s, here, turn, met, w, &open));
+        gathered = color_add(gathered, ambient_light(s, here, turn, met, surround_of(l), w, &open));
     }
     gathered = limited(gathered, w.settings);
 #endif
@@ -57,9 +58,12 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
         if (light_is_seen(light)) in = light_along(light, here->point, in.toward);
-        const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, w.material);
+        const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }
+#if HAS_OBJECTS
+    gathered = color_add(gathered, l.emission);
+#endif
     return gathered;
 }
 
@@ -90,7 +94,8 @@ INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, wo
 }
 
 // Adds the light of the path's present spot, or of the sky past it, to what the path has seen.
-INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const spot *here, color gathered, int last, world w) {
+INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const spot *here, color gathered, color mirrored,
+                      int last, world w) {
     mask on_path = mask_of(so_far->on_path);
     const mask found = mask_of(here->found);
     if (s.bounce > 0) {
@@ -98,26 +103,31 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
         so_far->seen = color_pick(on_path & ~found, color_add(so_far->seen, missed), so_far->seen);
     }
     on_path &= found;
-    const real own = last ? R(1.0) : R(1.0) - (real)(w.material->reflection);
-    color added = color_mul(gathered, color_scale(so_far->through, own));
+    color own = color_of(R(1.0), R(1.0), R(1.0));
+    if (!last) own = color_of(R(1.0) - mirrored.r, R(1.0) - mirrored.g, R(1.0) - mirrored.b);
+    color added = color_mul(gathered, color_mul(so_far->through, own));
     if (s.bounce > 0) added = limited(added, w.settings);
     so_far->seen = color_pick(on_path, color_add(so_far->seen, added), so_far->seen);
     so_far->on_path = number_of(on_path);
 }
 
 // Goes on along the mirrored ray.
-INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const spot *here, world w) {
+INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const spot *here, color mirrored, world w) {
     spot seen_first = *here;
     if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
-    so_far->through = color_scale(so_far->through, (real)(w.material->reflection));
-    so_far->origin = vec_along(here->point, here->cone * (real)(w.settings->shadow_lift), here->normal);
+    so_far->through = color_mul(so_far->through, mirrored);
+    so_far->origin = vec_along(here->point, lift_of(here, w), here->normal);
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);
     so_far->footprint = here->cone;
     so_far->spread = from_eye.spread + (from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone));
+#if HAS_OBJECTS
+    const color left = so_far->through;
+    so_far->on_path = number_of(mask_of(so_far->on_path) & less(R(0.0), fmax(fmax(left.r, left.g), left.b)));
+#endif
     STATE_KEEP(s, *so_far, STATE_PATH);
     ray r = {so_far->origin, so_far->direction, R(0.0), (real)(REAL_LARGEST), so_far->footprint, so_far->spread,
              RAY_NOTHING_KNOWN};
-    send_clipped(s, 0, r, R(0.0), mask_of(so_far->on_path), w);
+    send_clipped(s, 0, r, R(0.0), WHICH, mask_of(so_far->on_path), w);
 }
 
 #if HAS_PARTS

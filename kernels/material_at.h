@@ -1,13 +1,16 @@
 // The material of a spot: what paths scatter by.
-#if !HAS_MAPS
+#if !HAS_MAPS && MATERIALS == 1
 INLINE pbr pbr_at(stage s, const spot *here, world w) { return pbr_of(w.materials, here->tint); }
 #else
+#if HAS_MAPS
 #include "maps.h"
+#endif
 
 // One of the materials that have layers, with its maps.
 CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     __constant const struct Pbr *material = w.materials + number;
     pbr p = pbr_of(material, here->tint);
+#if HAS_MAPS
     real *numbers = (real *)&p;
     for (int i = 0; i < material->map_count; ++i) {
         __global const struct Map *m = w.maps + material->first_map + i;
@@ -17,11 +20,24 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
         numbers[m->number + 1] = found.g;
         numbers[m->number + 2] = found.b;
     }
+#endif
     // Of a blend's parts what they reflect and shine is mixed, not the factors of it.
     p.base_color = color_scale(p.base_color, p.base_weight);
     p.emission_color = color_scale(p.emission_color, p.emission_luminance);
     p.base_weight = p.emission_luminance = R(1.0);
     return p;
+}
+
+// The number of a spot's material.
+INLINE real spot_material(const spot *here, world w) {
+    real number = (real)((scalar)SET_MATERIAL);
+#if HAS_OBJECTS
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask there = equal(here->object, (real)((scalar)(i + 1)));
+        number = pick(there, (real)((scalar)w.objects[i].material), number);
+    }
+#endif
+    return number;
 }
 
 INLINE pbr pbr_at(stage s, const spot *here, world w) {
@@ -30,22 +46,25 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
 #else
     // The share of each material. Blends come before their parts, and pass theirs on to them.
     real shares[MATERIALS];
-    for (int i = 0; i < MATERIALS; ++i) shares[i] = i == 0 ? R(1.0) : R(0.0);
+    const real root = spot_material(here, w);
+    for (int i = 0; i < MATERIALS; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
     pbr sum;
     real *sums = (real *)&sum;
     for (int i = 0; i < NUMBERS_OF(pbr); ++i) sums[i] = R(0.0);
     for (int i = 0; i < MATERIALS; ++i) {
         if (!any_of(shares[i])) continue;
         __constant const struct Pbr *material = w.materials + i;
+#if HAS_MAPS
         if (material->blend[0] >= 0) {
             const real second = map_at(s, here, w.maps + material->mask, w).r;
             shares[material->blend[0]] += shares[i] * (R(1.0) - second);
             shares[material->blend[1]] += shares[i] * second;
-        } else {
-            const pbr part = pbr_mapped(s, here, i, w);
-            const real *numbers = (const real *)&part;
-            for (int j = 0; j < NUMBERS_OF(pbr); ++j) sums[j] += shares[i] * numbers[j];
+            continue;
         }
+#endif
+        const pbr part = pbr_mapped(s, here, i, w);
+        const real *numbers = (const real *)&part;
+        for (int j = 0; j < NUMBERS_OF(pbr); ++j) sums[j] += shares[i] * numbers[j];
     }
     sum.base_weight = sum.emission_luminance = R(1.0);
     return sum;

@@ -97,7 +97,7 @@ STAGE(scatter_paths) {
 #endif
     if (any_lane(lands)) {
 #if !COLORING_PER_POINT
-        found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
+        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
 #endif
         pbr p = pbr_at(s, &found, w);
         vec outward = found.normal;
@@ -112,7 +112,7 @@ STAGE(scatter_paths) {
         reflects = pbr_albedo(&p, w.albedos);
 #endif
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
-        so_far.origin = vec_along(found.point, found.cone * (real)(w.settings->shadow_lift), outward);
+        so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
         with.total = weight_of_all(so_far.origin, w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
@@ -137,7 +137,7 @@ STAGE(scatter_paths) {
     with.awaited = color_pick(lands, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));
     STATE_KEEP(s, so_far, STATE_PATH);
     STATE_KEEP(s, with, STATE_CARRIED);
-    send_clipped(s, 0, asks, R(0.0), lands & less(R(0.0), asks.far), w);
+    send_clipped(s, 0, asks, R(0.0), WHETHER, lands & less(R(0.0), asks.far), w);
 }
 
 // Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
@@ -165,11 +165,12 @@ STAGE(gather_paths) {
     STATE_KEEP(s, so_far, STATE_PATH);
     const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS
+    // Within the set there are no objects.
     const mask within = mask_of(with.inside);
-    send_clipped(s, 1, r, R(0.0), mask_of(so_far.on_path) & within, w);
+    send_to_set(s, 1, r, R(0.0), mask_of(so_far.on_path) & within, w);
     so_far.on_path = pick(within, R(0.0), so_far.on_path);
 #endif
-    send_clipped(s, 0, r, R(0.0), mask_of(so_far.on_path), w);
+    send_clipped(s, 0, r, R(0.0), WHICH, mask_of(so_far.on_path), w);
 }
 
 // Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would

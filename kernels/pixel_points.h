@@ -10,7 +10,7 @@ typedef struct {
     real count;                 // points that found the surface
     real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
     vec point, base, normal;    // base: where it is shaded
-    real smooth;
+    real smooth, object;
     color tint;                 // sum over the points
 #if GEOMETRIC
     vec reference, right, up, toward;
@@ -36,7 +36,7 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
     p.point = pixel_ray.origin;
     p.base = pixel_ray.origin;
     p.normal = pixel_ray.direction;
-    p.smooth = R(0.0);
+    p.smooth = p.object = R(0.0);
     p.tint = color_of(R(0.0), R(0.0), R(0.0));
 #if GEOMETRIC
     p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
@@ -62,7 +62,8 @@ INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed,
         ray r = camera_ray(a.x + across, a.y + below, a.lens_x, a.lens_y, a.time, w.view);
         r.near = fmax(touched.t - (real)(w.settings->point_start) * cone, R(0.0));
         r.known = touched.t;
-        send_clipped(s, turn, r, R(0.0), mask_of(touched.touched), w);
+        const real free = pick(mask_of(touched.touched), R(0.0), (real)(REAL_LARGEST));
+        send_clipped(s, turn, r, free, WHICH, mask_of(a.wanted), w);
     }
 }
 
@@ -83,7 +84,7 @@ INLINE void points_place(pixel_points *p, int turn, mask found, vec point) {
 }
 #endif
 
-INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, world w) {
+INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, real object, world w) {
     const mask found = mask_of(met.hit);
     const vec point = vec_along(r.origin, met.t, r.direction), base = vec_along(r.origin, met.touch, r.direction);
     p->count += met.hit;
@@ -96,8 +97,9 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
     p->base = vec_pick(nearer, base, p->base);
     p->normal = vec_pick(nearer, met.normal, p->normal);
     p->smooth = pick(nearer, met.smooth, p->smooth);
+    p->object = pick(nearer, object, p->object);
 #if COLORING_PER_POINT
-    const color tint = surface_color(met.normal, met.smooth, w.material, w.palette);
+    const color tint = spot_color(met.normal, met.smooth, object, w);
     p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
 #endif
 #if GEOMETRIC
@@ -141,6 +143,9 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     here.point = p->base;
     here.seen = p->point;
     here.smooth = p->smooth;
+#if HAS_OBJECTS
+    here.object = p->object;
+#endif
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);
     here.normal = p->normal;

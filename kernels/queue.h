@@ -23,6 +23,9 @@ typedef struct {
 // where it began before a cone took it farther.
 #define RAY_STRENGTH NUMBERS_OF(ray)
 #define RAY_START NUMBERS_OF(ray)
+// With objects two more: how far the first one on the ray is, or the largest number; and which one, see objects.h.
+#define RAY_OBJECT (NUMBERS_OF(ray) + 1)
+#define RAY_OBJECT_NUMBER (NUMBERS_OF(ray) + 2)
 #define ENCOUNTER_STEPS 1
 #define ENCOUNTER_COUNT 2
 #define ENCOUNTER_T 3
@@ -49,6 +52,9 @@ INLINE void queue_skip(queue q, int turn, int first) {
     __global scalar *at = q.rays + turn * q.wave + first;
     lanes_store(R(0.0), at + RAY_NEAR * q.stride);
     lanes_store(R(-1.0), at + RAY_FAR * q.stride);
+#if HAS_OBJECTS
+    lanes_store((real)(REAL_LARGEST), at + RAY_OBJECT * q.stride);
+#endif
 }
 
 INLINE ray queue_ray(queue q, int turn, int first) {
@@ -68,5 +74,20 @@ INLINE encounter queue_met(queue q, int turn, int first) {
     e.steps = pick(sent, e.steps, R(0.0));
     e.count = pick(sent, e.count, R(0.0));
     e.bad = pick(sent, e.bad, R(0.0));
+#if HAS_OBJECTS
+    const real object = lanes_load(q.rays + RAY_OBJECT * q.stride + turn * q.wave + first);
+    const mask nearer = less(object, pick(mask_of(e.hit), e.t, (real)(REAL_LARGEST)));
+    e.hit = pick(nearer, R(1.0), e.hit);
+    e.t = pick(nearer, object, e.t);
+#endif
     return e;
 }
+
+#if HAS_OBJECTS
+// The object that a ray has met, or 0.
+INLINE real queue_object(queue q, int turn, int first, encounter met) {
+    __global const scalar *at = q.rays + turn * q.wave + first;
+    const mask here = mask_of(met.hit) & equal(met.t, lanes_load(at + RAY_OBJECT * q.stride));
+    return pick(here, lanes_load(at + RAY_OBJECT_NUMBER * q.stride), R(0.0));
+}
+#endif

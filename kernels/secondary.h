@@ -51,8 +51,8 @@ INLINE __global scalar *ambient_strength(stage s, int turn) {
     return s.q.rays + RAY_STRENGTH * s.q.stride + turn * s.q.wave + s.slot;
 }
 
-// The light that the ray brings from the environment; the ray also counts towards the open part of the hemisphere.
-INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, world w, real *open) {
+// The light that the ray brings from the environment to a surface that scatters the part `diffuse` of it; the ray also counts towards the open part of the hemisphere.
+INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, real diffuse, world w, real *open) {
     if (turn < w.settings->cosine_rays) {
         const mask near = mask_of(met.hit) & less(met.t, (real)(w.settings->occlusion_distance));
         *open += pick(near, R(0.0), (real)(w.settings->occlusion_share));
@@ -60,7 +60,7 @@ INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, w
 #if HAS_ENVIRONMENT
     const real strength = lanes_load(ambient_strength(s, turn));
     const color bright = environment_color(queue_ray(s.q, turn, s.slot).direction, w.material, w.environment);
-    const real share = pick(mask_of(met.hit), R(0.0), strength * (real)(w.material->diffuse));
+    const real share = pick(mask_of(met.hit), R(0.0), strength * diffuse);
     return color_of(bright.r * here->tint.r * share, bright.g * here->tint.g * share, bright.b * here->tint.b * share);
 #else
     return color_of(R(0.0), R(0.0), R(0.0));
@@ -117,15 +117,16 @@ INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, i
         }
         wanted &= faces(s, here, in.toward);
         ray r;
-        // Leave the surface far enough for the ray not to meet the very bump it starts from.
-        r.origin = vec_along(here->point, here->cone * (real)(w.settings->shadow_lift), here->normal);
+        r.origin = vec_along(here->point, lift_of(here, w), here->normal);
         r.direction = in.toward;
         r.near = R(0.0);
         r.far = in.distance;
         r.footprint = here->cone * (real)(w.settings->shadow_detail);
         r.spread = R(0.0);
         r.known = RAY_NOTHING_KNOWN;
-        send_clipped(s, turn, r, R(0.0), wanted, w);
+        // How near an obstacle is matters for the open part of the hemisphere.
+        const int measured = turn < w.settings->cosine_rays && w.settings->occlusion_share > S(0.0);
+        send_clipped(s, turn, r, R(0.0), measured ? (real)(w.settings->occlusion_distance) : WHETHER, wanted, w);
 #if HAS_AMBIENT && HAS_ENVIRONMENT
         if (turn < hemisphere_turns(w)) lanes_store(in.strength, ambient_strength(s, turn));
 #endif

@@ -33,7 +33,10 @@ STAGE(find_faces) {
     face.count = R(0.0);
     face.tint = color_of(R(0.0), R(0.0), R(0.0));
     face.normal = vec_of(R(0.0), R(0.0), R(0.0));
-    const mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
+    mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
+#if HAS_OBJECTS
+    bare &= less(face.t, lanes_load(s.q.rays + RAY_OBJECT * s.q.stride + s.slot));
+#endif
     face.bare = number_of(bare);
     STATE_KEEP(s, face, STATE_FACE);
     __global scalar *far = s.q.rays + RAY_FAR * s.q.stride + s.slot;

@@ -61,18 +61,30 @@ INLINE real highlight_of(real x, scalar shininess) {
     return power;
 }
 
+// How a surface faces a light: N.L, whether that lights it, and R.V if it is above 0, with R = 2 (N.L) N - L, the light's direction
+// mirrored at the normal.
+typedef struct {
+    real facing, toward_viewer;
+    mask front;
+} attitude;
+
+INLINE attitude attitude_to(incidence in, vec normal, vec to_viewer, mask lit) {
+    attitude a;
+    a.facing = vec_dot(normal, in.toward);
+    a.front = lit & less(R(0.0), a.facing);
+    const vec mirrored = vec_sub(vec_scale(normal, R(2.0) * a.facing), in.toward);
+    a.toward_viewer = fmax(vec_dot(mirrored, to_viewer), R(0.0));
+    return a;
+}
+
 // The light that one light adds. `lit` is s of Eq. 5; `open` is the unblocked part of the hemisphere, a factor on the ambient part;
 // `to_viewer` has length 1.
 INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
                    __constant const struct Light *light, __constant const struct Material *material) {
-    const real facing = vec_dot(normal, in.toward);
-    const mask front = lit & less(R(0.0), facing);
-    const real diffuse = pick(front, (real)(material->diffuse) * facing, R(0.0));
-    // R = 2 (N.L) N - L, the light's direction mirrored at the normal.
-    const vec mirrored = vec_sub(vec_scale(normal, R(2.0) * facing), in.toward);
-    const real toward_viewer = fmax(vec_dot(mirrored, to_viewer), R(0.0));
-    const real highlight = (real)(material->specular) * highlight_of(toward_viewer, material->shininess);
-    const real specular = pick(front & less(R(0.0), toward_viewer), highlight, R(0.0));
+    const attitude a = attitude_to(in, normal, to_viewer, lit);
+    const real diffuse = pick(a.front, (real)(material->diffuse) * a.facing, R(0.0));
+    const real highlight = (real)(material->specular) * highlight_of(a.toward_viewer, material->shininess);
+    const real specular = pick(a.front & less(R(0.0), a.toward_viewer), highlight, R(0.0));
     const real body = (real)(material->ambient) * open + diffuse;
     return color_of(in.strength * (real)(light->color[0]) * (body * surface.r + specular),
                     in.strength * (real)(light->color[1]) * (body * surface.g + specular),

@@ -19,8 +19,52 @@ INLINE mask faces(stage s, const spot *here, vec direction) {
     return any_normal;
 }
 
+// The colour of a spot: the set's, or that of the object with this number.
+INLINE color spot_color(vec normal, real quantity, real object, world w) {
+    color found = surface_color(normal, quantity, w.material, w.palette);
+#if HAS_OBJECTS
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask here = equal(object, (real)((scalar)(i + 1)));
+        if (any_lane(here)) found = color_pick(here, color_splat(w.objects[i].color), found);
+    }
+#endif
+    return found;
+}
+
+// What a ray for a spot has met: the set, or the object with this number.
+INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
+    encounter met = queue_met(s.q, turn, s.slot);
+    *object = R(0.0);
+#if HAS_OBJECTS
+    *object = queue_object(s.q, turn, s.slot, met);
+    const mask here = less(R(0.0), *object);
+    if (any_lane(here)) {
+        const vec point = vec_along(r.origin, met.t, r.direction);
+        const vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count);
+        met.normal = vec_pick(here, normal, met.normal);
+        met.touch = pick(here, met.t, met.touch);
+        met.smooth = pick(here, R(0.0), met.smooth);
+        met.more_steps = pick(here, R(0.0), met.more_steps);
+        met.more_count = pick(here, R(0.0), met.more_count);
+    }
+#endif
+    return met;
+}
+
+// How far over a spot rays leave it: far enough from the set not to meet the very bump that they start from. An object has none.
+INLINE real lift_of(const spot *here, world w) {
+    const real over_set = here->cone * (real)(w.settings->shadow_lift);
+#if HAS_OBJECTS
+    const real far_out = fmax(fmax(fabs(here->point.x), fabs(here->point.y)), fabs(here->point.z));
+    const real over_object = R(0.05) * here->cone + R(64.0) * (real)(REAL_EPSILON) * far_out;
+    return pick(less(R(0.0), here->object), over_object, over_set);
+#else
+    return over_set;
+#endif
+}
+
 // The spot where one ray has met the surface.
-INLINE spot spot_of_ray(ray r, encounter met, world w) {
+INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
     spot here;
     here.found = met.hit;
     here.point = vec_along(r.origin, met.touch, r.direction);
@@ -30,17 +74,21 @@ INLINE spot spot_of_ray(ray r, encounter met, world w) {
     here.smooth = met.smooth;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-    here.tint = surface_color(met.normal, met.smooth, w.material, w.palette);
+    here.tint = spot_color(met.normal, met.smooth, object, w);
+#if HAS_OBJECTS
+    here.object = object;
+#endif
     return here;
 }
 
 #if HAS_GLASS
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.
-INLINE encounter met_within(queue q, int slot, encounter met) {
+INLINE encounter met_within(queue q, int slot, encounter met, real *object) {
     const ray second = queue_ray(q, 1, slot);
     const mask within = less(second.near, second.far);
     const encounter other = queue_met(q, 1, slot);
     for (int i = 0; i < NUMBERS_OF(encounter); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
+    *object = pick(within, R(0.0), *object);
     return met;
 }
 #endif

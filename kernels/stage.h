@@ -19,8 +19,9 @@ typedef struct {
     __global const struct Map *maps;
     __global const float *tables;
     __global const scalar *set_lights;
+    __global const struct Object *objects;
 } world;
-#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, maps, tables, set_lights}
+#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, maps, tables, set_lights, objects}
 
 // A work-item's packet.
 typedef struct {

@@ -33,9 +33,18 @@ typedef struct {
     real cone;               // the pixel's footprint there
     real smooth;             // escape count
     color tint;
+#if HAS_OBJECTS
+    real object;             // the number of the object, from 1; 0: the set
+#endif
     real quantity;           // what chooses the colour, where that is not known at once
     real residual;           // distance of the pixel's points from their plane, in footprints
 } spot;
+
+#if HAS_OBJECTS
+#define OBJECT_OF(here) ((here).object)
+#else
+#define OBJECT_OF(here) R(0.0)
+#endif
 
 // One of the normals over which shading is averaged.
 typedef struct {

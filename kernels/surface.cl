@@ -28,6 +28,7 @@
 #if HAS_SHAFTS
 #include "air.h"
 #endif
+#include "look.h"
 #include "lit.h"
 #if HAS_PATHS
 #include "bsdf.h"
@@ -70,7 +71,12 @@ STAGE(begin_shots) {
     ray r = eye_ray(&a, view);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
-    send_clipped(s, 0, r, begin.t, mask_of(a.wanted), w);
+#if HAS_OBJECTS && POINTS > 1
+    // Its points look for objects on their own rays.
+    send_past_objects(s, 0, r, begin.t, mask_of(a.wanted), w);
+#else
+    send_clipped(s, 0, r, begin.t, WHICH, mask_of(a.wanted), w);
+#endif
 }
 
 #if POINTS > 1
@@ -99,10 +105,12 @@ INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, real
     first->steps = cost->steps;
     pixel_points points = points_begin(pixel_ray, time, touched, points_seed(at, s.sample, w), w);
     for (int turn = 0; turn < POINTS; ++turn) {
-        const encounter met = queue_met(s.q, turn, s.slot);
+        const ray r = queue_ray(s.q, turn, s.slot);
+        real object;
+        const encounter met = surface_met(s, turn, r, &object, w);
         tally_met(cost, met, 1);
         first->steps += met.steps;
-        points_add(s, &points, turn, queue_ray(s.q, turn, s.slot), met, w);
+        points_add(s, &points, turn, r, met, object, w);
     }
     first->coverage = points.count * (R(1.0) / (real)(POINTS));
     return points_spot(s, &points, w);
@@ -128,14 +136,15 @@ STAGE(find_spots) {
     } else
 #endif
     {
-        encounter met = queue_met(s.q, 0, s.slot);
+        real object;
+        encounter met = surface_met(s, 0, r, &object, w);
 #if HAS_GLASS
-        if (bounce > 0) met = met_within(s.q, s.slot, met);
+        if (bounce > 0) met = met_within(s.q, s.slot, met, &object);
 #endif
         tally_met(&cost, met, 1);
         at_first.coverage = met.hit;
         at_first.steps = met.steps;
-        found = spot_of_ray(r, met, w);
+        found = spot_of_ray(r, met, object, w);
     }
     if (bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
     STATE_KEEP(s, cost, STATE_TALLY);
@@ -169,7 +178,7 @@ STAGE(light_spots) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT
-        found.tint = surface_color(found.normal, found.quantity, w.material, w.palette);
+        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
 #endif
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
     }
@@ -177,10 +186,11 @@ STAGE(light_spots) {
     if (bounce == 0) glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)));
 #endif
     const int last = bounce == settings->bounces;
-    path_add(s, &so_far, direction, a.y, &found, gathered, last, w);
+    const color mirrored = mirrored_at(&found, direction, w);
+    path_add(s, &so_far, direction, a.y, &found, gathered, mirrored, last, w);
     if (!last) {
         STATE_KEEP(s, cost, STATE_TALLY);
-        path_mirror(s, &so_far, direction, eye_ray(&a, view), a.time, &found, w);
+        path_mirror(s, &so_far, direction, eye_ray(&a, view), a.time, &found, mirrored, w);
         return;
     }
     end_shots(s, a, so_far.seen, &found, cost, w);

@@ -24,8 +24,8 @@ from clfractal.renderers.resources import Resources
 KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 
 
-# Numbers of a sent ray, and of what it met (`kernels/queue.h`).
-RAY_NUMBERS, MET_NUMBERS = 12, 13
+# Numbers of a sent ray, of what it met, and of the object that it met (`kernels/queue.h`).
+RAY_NUMBERS, MET_NUMBERS, OBJECT_NUMBERS = 12, 13, 2
 # Numbers between two columns of what is kept between stages: a power of 2 apart, all would lie in one place of a cache.
 STATE_PADDING = 80
 BLOCK = 8
@@ -66,10 +66,11 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class WaveNeeds:
-    """What is kept of each pixel of a launch while it goes from stage to stage: numbers of its state, and rays."""
+    """What is kept of each pixel of a launch between its stages: numbers of its state, rays, and numbers of a ray."""
 
     state: int
     turns: int
+    ray: int = RAY_NUMBERS
 
 
 class TileKernel(ABC):

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
-from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_material
+from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
 from clfractal.scene.base import unit
 from clfractal.scene.blends import Blends, blends_of
 from clfractal.scene.light_paths import PathLighting
@@ -55,7 +55,7 @@ class MappedMaterials:
     @cached_property
     def blends(self) -> Blends:
         """All materials, in the order of their records."""
-        return blends_of([used_material(self.scene)], self.scene.materials)
+        return blends_of(used_materials(self.scene), self.scene.materials)
 
     @cached_property
     def _own(self) -> list[list[tuple[str, Map]]]:
@@ -176,13 +176,14 @@ def has_glass(scene: Scene) -> bool:
 
 def map_defines(scene: Scene) -> dict[str, object]:
     """The defines of programs that may read maps."""
-    found = mapped_materials(scene)
-    if found is None:
-        return {"HAS_MAPS": 0, "ASKED": 0}
+    if not isinstance(scene.lighting, PathLighting):
+        return {"HAS_MAPS": 0, "ASKED": 0, "MATERIALS": 1, "SET_MATERIAL": 0}
+    found = MappedMaterials(scene)
     return {
-        "HAS_MAPS": 1,
+        "HAS_MAPS": int(bool(found.maps)),
         "ASKED": len(found.asked),
         "MATERIALS": len(found.blends.materials),
+        "SET_MATERIAL": found.blends.roots[0],
         **MAP_DEFINES,
     }
 

@@ -123,6 +123,13 @@ def used_material(scene: Scene) -> PbrMaterial:
     return scene.materials[name] if name is not None else of_phong(scene.material)
 
 
+def used_materials(scene: Scene) -> list[PbrMaterial]:
+    """The set's material, then each object's."""
+    own = used_material(scene)
+    named = [each.material for each in scene.objects.values()]
+    return [own, *(scene.materials[name] if name is not None else own for name in named)]
+
+
 def material_values(material: PbrMaterial) -> dict[str, object]:
     """The fields of a record."""
     values: dict[str, object] = {}

@@ -15,6 +15,7 @@ from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.maps import MAP, asked_maps
 from clfractal.renderers.materials import PBR
+from clfractal.renderers.objects import OBJECT, mirrors
 from clfractal.renderers.passes import SAMPLING
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.set_lights import SetLights, SingleLight, march_fields, single_lights
@@ -90,6 +91,7 @@ MARCH = Struct(
         Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("object_count", "int", 0, "number of objects"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
         Field("set_count", "int", 0, "number of balls of lights on the set"),
         Field("set_cells", "int", 0, "cells of their probabilities along an edge of their cube"),
@@ -187,7 +189,7 @@ MATERIAL = Struct(
     ],
 )
 
-STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR, MAP)
+STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR, MAP, OBJECT)
 
 TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
@@ -309,6 +311,7 @@ def march_record(
         "environment_weight": environment_weight(scene, environment),
         "light_count": len(single_lights(scene)),
         **march_fields(on_set),
+        "object_count": len(scene.objects),
         "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
         "map_rays": rays.map,
@@ -337,7 +340,7 @@ def bounces(scene: Scene) -> int:
     """Most mirror reflections of a path, or its bounces."""
     if isinstance(scene.lighting, PathLighting):
         return scene.lighting.bounces
-    return scene.surface.bounces if scene.material.reflection > 0 else 0
+    return scene.surface.bounces if scene.material.reflection > 0 or mirrors(scene) else 0
 
 
 def light_rays(scene: Scene) -> int:

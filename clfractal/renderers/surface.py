@@ -13,6 +13,8 @@ from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
 from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
+    OBJECT_NUMBERS,
+    RAY_NUMBERS,
     STATE_PADDING,
     KernelArgument,
     ProgramText,
@@ -30,6 +32,7 @@ from clfractal.renderers.maps import (
     mapped_materials,
 )
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
+from clfractal.renderers.objects import object_defines, object_records
 from clfractal.renderers.passes import has_parts, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
@@ -93,6 +96,7 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         # Rays are marched as they were sent.
         "HAS_LENS": 0,
         "HAS_MOTION": 0,
+        "HAS_OBJECTS": 0,
     }
 
 
@@ -149,6 +153,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_NUMBERS": state_numbers(scene, plan),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
+        **object_defines(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
@@ -180,8 +185,8 @@ def normal_count(scene: Scene) -> int:
 
 def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    parts = _PARTS_NUMBERS if has_parts(plan) else 0
-    return STATE_NUMBERS + 4 * normal_count(scene) + len(asked_maps(scene)) + parts
+    more = len(asked_maps(scene)) + 2 * bool(scene.objects) + (_PARTS_NUMBERS if has_parts(plan) else 0)
+    return STATE_NUMBERS + 4 * normal_count(scene) + more
 
 
 def coloring_defines(coloring: Coloring) -> dict[str, object]:
@@ -211,7 +216,8 @@ class SurfaceKernel(TileKernel):
         return surface_stages(self.scene, self.plan, samples)
 
     def wave_needs(self) -> WaveNeeds:
-        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene))
+        ray = RAY_NUMBERS + OBJECT_NUMBERS * bool(self.scene.objects)
+        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray)
 
     @property
     def footprint(self) -> int:
@@ -247,6 +253,7 @@ class SurfaceKernel(TileKernel):
             ),
             *self._materials(),
             set_light_data(on_set, precision),
+            object_records(self.scene, self.precision),
         ]
 
     def _materials(self) -> list[KernelArgument]:

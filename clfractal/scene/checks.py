@@ -10,6 +10,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, SetLight
 from clfractal.scene.model import Scene
+from clfractal.scene.object_checks import check_objects
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
@@ -37,6 +38,7 @@ def check_parts(scene: Scene, *, whole: bool = True) -> None:
             f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
         )
     check_lighting(scene)
+    check_objects(scene)
     if scene.layout is None:
         check_layers(scene, scene.output.channels, "output.channels")
     if scene.stereo is not None:

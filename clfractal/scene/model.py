@@ -23,6 +23,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
+from clfractal.scene.objects import Objects
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stance import Extent
@@ -73,13 +74,16 @@ class Scene(Section):
     renderer: Renderer = Field(default_factory=dict, validate_default=True)
     lighting: Lighting = Field(default_factory=dict, validate_default=True)
     lights: Lights = Field(default_factory=lambda: [{}], validate_default=True)
-    materials: Materials = Field({}, description="materials by name, for `lighting: {mode: path}`")
+    materials: Materials = Field(
+        {}, description="materials by name, for objects, and for the set with `lighting: {mode: path}`"
+    )
     material: Material = Field(default_factory=dict, validate_default=True)
     coloring: Coloring = Field(default_factory=dict, validate_default=True)
     background: Background = Field(default_factory=dict, validate_default=True)
     environment: Environment | None = None
     fog: Fog | None = None
     glow: Glow | None = None
+    objects: Objects = Field({}, description="planes, water, spheres, boxes and cylinders by name")
     cut_planes: CutPlanes = Field(
         (), description="planes that are shown in the picture or cut the object open"
     )
@@ -305,8 +309,8 @@ class Scene(Section):
                 )
             own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}
             if isinstance(view.renderer, CutPlaneRenderer):
-                # The scene's planes belong to pictures of its object; a cut_plane renderer shows no object.
-                own["cut_planes"] = ()
+                # The scene's planes and objects belong to pictures of its set; a cut_plane renderer shows none.
+                own |= {"cut_planes": (), "objects": {}}
             found.append((self.model_copy(update={**own, **view.changes()}), place))
         return found
 

@@ -12,6 +12,7 @@ from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
+from clfractal.scene.objects import BoxObject, CylinderObject, Solid, SphereObject, Waves
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane, Transform
 from clfractal.scene.stereo import StereoPlane
@@ -35,6 +36,11 @@ _SCALES: tuple[tuple[type[Section], frozenset[str]], ...] = (
     (Plane, frozenset({"width", "height"})),
     (Transform, frozenset({"scale"})),
     (StereoPlane, frozenset({"width", "height"})),
+    (Solid, frozenset({"scale"})),
+    (SphereObject, frozenset({"radius"})),
+    (BoxObject, frozenset({"size"})),
+    (CylinderObject, frozenset({"radius", "height"})),
+    (Waves, frozenset({"length"})),
 )
 _DIRECTIONS = frozenset({"direction", "normal", "up"})
 _PLACES = frozenset({"position", "target", "center", "julia"})
@@ -44,6 +50,8 @@ _WHOLE: tuple[tuple[type[Section], str], ...] = (
     (CutPlaneRenderer, "iterations"),
     (CutPlane, "iterations"),
 )
+# Mappings of sections, and what they hold.
+_NAMED = {"objects": "object", "materials": "material"}
 # Sections that say what a film is, and not what is in its pictures.
 _FIXED: Mapping[str, str] = {
     "version": "is the version of the file",
@@ -122,6 +130,8 @@ def _below(value: Any, path: Sequence[str], depth: int) -> Any:
             raise SceneError(_unknown(part, shown, _keys_of(value)))
         return getattr(value, part)
     if isinstance(value, Mapping):
+        if shown in _NAMED and part not in value:
+            raise SceneError(unknown_name(_NAMED[shown], part, tuple(value)))
         return value.get(part)  # whether there is such a parameter the formula tells
     if isinstance(value, tuple):
         if not (part.isdecimal() and part == str(int(part)) and int(part) < len(value)):

@@ -300,6 +300,8 @@ class SceneDeeds:
                 changes["coloring.by"] = "solid"
         if kind == "cut_plane":
             changes["cut_planes"] = []
+        if kind != "surface" and scene.objects:
+            changes["objects"] = {}
         if not self._edit(changes):
             self.studio.tell(self.studio.problems.get("renderer", "not possible"), wrong=True)
 

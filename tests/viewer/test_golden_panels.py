@@ -34,6 +34,15 @@ def opened(*keys: str) -> Callable[[Ui], None]:
     return prepare
 
 
+def with_objects(ui: Ui) -> None:
+    opened("objects")(ui)
+    ball = {"type": "sphere", "position": [0, 0, -1.5], "radius": 0.4, "material": "steel"}
+    sea = {"type": "water", "position": [0, 0, -1.3]}
+    steel = {"base": {"color": [0.6, 0.6, 0.65], "metalness": 1}}
+    assert ui.studio.edit({"materials.steel": steel, "objects": {"sea": sea, "ball": ball}})
+    ui.memory["object"] = "ball"
+
+
 def with_help(ui: Ui) -> None:
     ui.show.add("help")
 
@@ -47,6 +56,7 @@ CASES: dict[str, tuple[str, Callable[[Ui], None], Callable[[Ui], None] | None]] 
     "colouring": ("stereo_bulb", scene_dock.draw, opened("coloring", "material")),
     "lights": ("mandelbulb", scene_dock.draw, opened("lights", "camera")),
     "cut_planes": ("figure9", scene_dock.draw, opened("cut_planes", "stereo")),
+    "objects": ("mandelbulb", scene_dock.draw, with_objects),
     "volume": ("volume_jade", scene_dock.draw, opened("volume", "renderer")),
     "help": ("mandelbulb", draw_help, with_help),
 }

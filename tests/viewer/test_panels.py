@@ -32,6 +32,7 @@ from clfractal.viewer.motion import Motion
 from clfractal.viewer.panels import (
     cut_planes,
     differences,
+    objects,
     palette_editor,
     renderer,
     scene_dock,
@@ -411,6 +412,24 @@ def test_a_plane_is_rotated_by_its_buttons(axis: str) -> None:
     wanted = rotated(before, axis, 5.0).placed  # type: ignore[arg-type]
     for name in ("center", "normal", "up"):
         assert getattr(after, name) == pytest.approx(getattr(wanted, name), abs=1e-12)
+
+
+def test_objects_are_added_given_a_material_and_removed() -> None:
+    ui = opened("scenes/mandelbulb.yaml")
+    ui.size = (1280, 4000)
+    for kind in ("plane", "water", "sphere", "box", "cylinder", "sphere"):
+        objects._add(ui, kind, {"type": kind})
+    assert list(ui.studio.scene.objects) == ["plane", "water", "sphere", "box", "cylinder", "sphere 2"]
+    assert ui.studio.edit({"materials.red": {"base": {"color": [0.7, 0, 0]}}, "objects.box.material": "red"})
+    ui.memory["object"] = "box"
+    before = ui.studio.scene
+    Stage(ui, scene_dock.draw, window=False)
+    assert ui.studio.scene is before
+    # What another renderer cannot show comes back with the surface.
+    assert renderer.switch(ui, "volume")
+    assert not ui.studio.scene.objects
+    assert renderer.switch(ui, "surface")
+    assert ui.studio.scene.objects == before.objects
 
 
 def test_the_cut_alone_and_back() -> None:

@@ -60,6 +60,7 @@ def test_every_field_of_every_section_is_understood() -> None:
         "materials",
         "blend",
         "curve",
+        "objects",
         "inline",
         "parameters",
         "live",

@@ -79,6 +79,7 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Emission.luminance": (0, 4),
     "Map.layer": (1, 64),
     "Map.scale": (0.01, 10),
+    "Waves.spread": (0, 90),
     "Environment.intensity": (0, 4),
     "Environment.rotation": (-180, 180),
     "Environment.rays": (0, 64),

@@ -49,7 +49,11 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
     scene = ui.studio.scene
     now = plain(scene.renderer)
     kept = ui.memory.setdefault("renderer.kept", {})
-    kept[now["type"]] = {"renderer": now, "cut_planes": plain(scene.cut_planes)}
+    kept[now["type"]] = {
+        "renderer": now,
+        "cut_planes": plain(scene.cut_planes),
+        "objects": {name: plain(each) for name, each in scene.objects.items()},
+    }
     known = kept.get(kind, {})
     first: dict[str, Any] = {"type": kind, **({"resolution": _FIRST_RESOLUTION} if kind == "volume" else {})}
     common = {name: now[name] for name in Sampled.model_fields}
@@ -58,6 +62,10 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
         edits["cut_planes"] = []
     elif now["type"] == "cut_plane" and not scene.cut_planes and known.get("cut_planes"):
         edits["cut_planes"] = known["cut_planes"]
+    if kind != "surface" and scene.objects:
+        edits["objects"] = {}
+    elif kind == "surface" and not scene.objects and known.get("objects"):
+        edits["objects"] = known["objects"]
     if kind == "volume" and scene.coloring.by not in ("solid", "normal"):
         edits["coloring.by"] = "solid"
     done = ui.studio.edit({**edits, **(changes or {})})

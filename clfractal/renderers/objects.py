@@ -1,0 +1,172 @@
+"""A scene's objects as kernels read them (`kernels/objects.h`), and their materials in Phong's light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.device.orbit import Record
+from clfractal.device.structs import Field, Precision, Struct
+from clfractal.renderers.maps import MappedMaterials
+from clfractal.renderers.water import WAVES, frame_of, wave_set
+from clfractal.scene.base import Vector
+from clfractal.scene.maps import Map
+from clfractal.scene.materials import WHITE, PbrMaterial
+from clfractal.scene.model import Scene
+from clfractal.scene.objects import AnyObject, Solid, WaterObject
+
+OBJECT_KINDS = {"plane": 0, "water": 1, "sphere": 2, "box": 3, "cylinder": 4}
+# Roughness up to which a material mirrors sharply in Phong's light, and from which on it does not.
+MIRRORS, DULL = 0.1, 0.4
+_LARGEST_EXPONENT = 1e5
+
+OBJECT = Struct(
+    "Object",
+    [
+        Field("kind", "int", 0, "one of OBJECT_KINDS"),
+        Field("material", "int", 0, "the number of its material along paths"),
+        Field("middle", "real", 3, "of a solid; a point of a plane, scene units"),
+        Field("own_x", "real", 3, "from scene units to its own ones: of the ball or cube of radius 1,"),
+        Field("own_y", "real", 3, "or of a plane, whose own z is its normal"),
+        Field("own_z", "real", 3, ""),
+        Field("color", "real", 3, "linear Rec. 709"),
+        Field("ambient", "real", 0, "Eq. 5's coefficients"),
+        Field("diffuse", "real", 0, ""),
+        Field("surround", "real", 0, "the same as `diffuse`, of light from the environment"),
+        Field("specular", "real", 3, "with a tint"),
+        Field("shininess", "real", 0, ""),
+        Field("sharp", "real", 0, "part of what it reflects that is mirrored sharply"),
+        Field("mirror", "real", 3, "part that is mirrored sharply, straight on"),
+        Field("mirror_edge", "real", 3, "what is mirrored more at grazing angles"),
+        Field("emission", "real", 3, "radiance, linear Rec. 709"),
+        Field("wave_x", "real", WAVES, "changes of phase, radians by scene unit"),
+        Field("wave_y", "real", WAVES, ""),
+        Field("wave_height", "real", WAVES, "scene units"),
+        Field("wave_phase", "real", WAVES, "radians"),
+        Field("wave_sharp", "real", 0, "part of the second harmonic"),
+        Field("wave_reach", "real", 0, "no wave is higher or deeper, scene units"),
+        Field("wave_slope", "real", 0, "no wave is steeper"),
+    ],
+)
+
+
+def object_defines(scene: Scene) -> dict[str, object]:
+    """The defines of all programs that send rays, or read what is kept between stages."""
+    return {
+        "HAS_OBJECTS": int(bool(scene.objects)),
+        "HAS_WATER": int(any(isinstance(each, WaterObject) for each in scene.objects.values())),
+        "WAVES": WAVES,
+        **{f"OBJECT_{kind.upper()}": number for kind, number in OBJECT_KINDS.items()},
+    }
+
+
+def object_records(scene: Scene, precision: Precision) -> Record:
+    """The objects in their order; one unused record where there are none, since no buffer is empty."""
+    numbers = MappedMaterials(scene).blends.roots[1:]
+    rows = [
+        {"material": number, **_place(each), **_look(scene, each)}
+        for number, each in zip(numbers, scene.objects.values(), strict=True)
+    ]
+    return OBJECT.array(precision, rows) if rows else np.zeros(1, OBJECT.dtype(precision))
+
+
+def mirrors(scene: Scene) -> bool:
+    """Whether any object mirrors in Phong's light."""
+    looks = [_look(scene, each) for each in scene.objects.values()]
+    return any(np.any(look["mirror"]) or np.any(look["mirror_edge"]) for look in looks)
+
+
+def _place(each: AnyObject) -> dict[str, object]:
+    """Where it is, and its waves."""
+    nothing = (0.0,) * WAVES
+    row: dict[str, object] = {
+        "kind": OBJECT_KINDS[each.type],
+        "middle": each.position,
+        **dict.fromkeys(("wave_x", "wave_y", "wave_height", "wave_phase"), nothing),
+        **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
+    }
+    if isinstance(each, Solid):
+        # The axes stand at right angles: each one's own number is the product with it by its square.
+        axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
+    else:
+        axes = [np.array(axis) for axis in frame_of(each.normal)]
+    row.update(zip(("own_x", "own_y", "own_z"), axes, strict=True))
+    if isinstance(each, WaterObject):
+        waves = wave_set(each)
+        row.update(
+            wave_x=waves.x,
+            wave_y=waves.y,
+            wave_height=waves.height,
+            wave_phase=waves.phase,
+            wave_sharp=waves.sharp,
+            wave_reach=waves.reach,
+            wave_slope=waves.slope,
+        )
+    return row
+
+
+def _look(scene: Scene, each: AnyObject) -> dict[str, Any]:
+    """How it looks in Phong's light."""
+    phong = scene.material
+    if each.material is None:
+        return {
+            "color": phong.color,
+            "ambient": phong.ambient,
+            "diffuse": phong.diffuse,
+            "surround": phong.diffuse,
+            "specular": (phong.specular,) * 3,
+            "shininess": phong.shininess,
+            "sharp": 0.0,
+            "mirror": (phong.reflection,) * 3,
+            "mirror_edge": (0.0,) * 3,
+            "emission": (0.0,) * 3,
+        }
+    return {"ambient": phong.ambient, **phong_of(scene.materials[each.material], phong.color)}
+
+
+def phong_of(material: PbrMaterial, color: Vector) -> dict[str, Any]:
+    """A layered material in Phong's light: its body, and one boundary, by their values straight on.
+
+    GGX with alpha is about as wide in R.V as cos^n with n = 1/(2 alpha^2) - 2, since R turns twice as far as the half
+    vector; and a lobe that reflects f in all is f (n + 2)/2 high beside a white body (Walter and others 2007, equation 30).
+    What is smoother than DULL is mirrored instead, by Schlick's approximation of Fresnel's equations.
+
+    Args:
+        color: of the body where the material has none of its own. Where a value differs from place to place, which
+            this light cannot show, it is what materials have by themselves.
+    """
+    base, specular, shine = material.base, material.specular, material.emission
+    body = _color(base.color, color)
+    weight, metal = _number(base.weight, 1), _number(base.metalness, 0)
+    rough, strength = _number(specular.roughness, 0.3), _number(specular.weight, 1)
+    ior, tint = _number(specular.ior, 1.5), _color(specular.color, WHITE)
+    glass = strength * ((ior - 1) / (ior + 1)) ** 2 * tint
+    mirrored = metal * weight * body + (1 - metal) * glass
+    edge = metal * (tint * strength - weight * body).clip(0)
+    edge = edge + (1 - metal) * (strength * tint - glass).clip(0)
+    sharp = min(max((DULL - rough) / (DULL - MIRRORS), 0.0), 1.0)
+    alpha = max(rough**2, 1e-3)
+    shininess = min(max(1 / (2 * alpha**2) - 2, 1.0), _LARGEST_EXPONENT)
+    highlight = mirrored * (shininess + 2) / 2 if rough > 0 else np.zeros(3)
+    return {
+        "color": body,
+        "diffuse": weight * (1 - metal),
+        # Rough metals mirror all that is around: about as a white body of their colour does.
+        "surround": weight * (1 - metal * sharp),
+        "specular": highlight,
+        "shininess": shininess,
+        "sharp": sharp,
+        "mirror": mirrored * sharp,
+        "mirror_edge": edge * sharp,
+        "emission": _number(shine.luminance, 0) * _color(shine.color, WHITE),
+    }
+
+
+def _number(value: float | Map, otherwise: float) -> float:
+    return otherwise if isinstance(value, Map) else value
+
+
+def _color(value: Vector | Map | None, otherwise: Vector) -> npt.NDArray[np.float64]:
+    return np.array(otherwise if value is None or isinstance(value, Map) else value)

@@ -1,0 +1,201 @@
+"""Objects beside the set: planes, water, spheres, boxes and cylinders, by name."""
+
+from typing import Annotated, Literal, Self, TypeAlias
+
+from pydantic import AfterValidator, Field, Tag, model_validator
+
+from clfractal.scene.base import (
+    Amount,
+    Angle,
+    Coordinate,
+    Fraction,
+    Length,
+    Position,
+    Section,
+    Vector,
+    chosen_by,
+    cross,
+    length,
+    problem,
+    unit,
+)
+from clfractal.scene.materials import MAX_NAME, MaterialName
+from clfractal.scene.plane import turn
+
+MAX_OBJECTS = 64
+AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+Angles = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
+Sides = Annotated[tuple[Length, Length, Length], Field(strict=False)]
+
+
+class ObjectBase(Section):
+    """Keys that every object has."""
+
+    material: MaterialName | None = Field(
+        None, description="one of `materials`; null: as `material`, in its colour"
+    )
+    position: Position = Field((0.0, 0.0, 0.0), description="its middle, or a point of a plane; scene units")
+
+
+class Level(ObjectBase):
+    """A surface without an end, seen from both sides."""
+
+    normal: Position = Field((0.0, 0.0, 1.0), description="direction that it faces")
+
+    @model_validator(mode="after")
+    def _faces_somewhere(self) -> Self:
+        if length(self.normal) < 1e-12:
+            raise problem("must not be zero", "normal")
+        return self
+
+
+class PlaneObject(Level):
+    """A plane without an end."""
+
+    tag = "plane"
+    type: Literal["plane"] = "plane"
+
+
+class Waves(Section):
+    """Waves of many lengths, which travel as on deep water; `time` moves them."""
+
+    height: Amount = Field(
+        0.1, description="mean of the highest third of waves, from trough to crest, scene units; 0: flat"
+    )
+    length: Length = Field(1.0, description="about the distance between the largest crests, scene units")
+    direction: Position = Field((1.0, 0.0, 0.0), description="where they travel to; not along the normal")
+    spread: float = Field(30.0, ge=0, le=180, description="how far their directions differ from it, degrees")
+    choppiness: Fraction = Field(0.5, description="0: crests are as round as troughs; 1: they are sharper")
+    seed: int = Field(0, ge=0, le=2**31 - 1, description="chooses the waves")
+    time: Coordinate = Field(0.0, description="seconds, if scene units are metres")
+
+
+class WaterObject(Level):
+    """A plane without an end, on which waves travel."""
+
+    tag = "water"
+    type: Literal["water"] = "water"
+    waves: Waves = Field(default_factory=dict, validate_default=True, description="its waves")
+
+    @model_validator(mode="after")
+    def _travels_somewhere(self) -> Self:
+        way = self.waves.direction
+        if length(way) < 1e-12:
+            raise problem("must not be zero", "waves.direction")
+        if length(cross(unit(way), unit(self.normal))) < 1e-6:
+            raise problem("must not be along the normal", "waves.direction")
+        return self
+
+
+class Solid(ObjectBase):
+    """A body with an inside."""
+
+    rotation: Angles = Field(
+        (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
+    )
+    scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
+
+    @property
+    def half_sides(self) -> Vector:
+        """Of the box around it, along its own axes, before `scale`."""
+        raise NotImplementedError
+
+    @property
+    def axes(self) -> tuple[Vector, Vector, Vector]:
+        """From its middle to the ends of its own three axes, scene units."""
+        found = []
+        for axis, half, factor in zip(AXES, self.half_sides, self.scale, strict=True):
+            for about, degrees in zip(AXES, self.rotation, strict=True):
+                axis = turn(axis, about, degrees)
+            x, y, z = axis
+            found.append((x * half * factor, y * half * factor, z * half * factor))
+        return found[0], found[1], found[2]
+
+    def own_place(self, point: Vector) -> Vector:
+        """A point in units of `axes` from its middle."""
+        offset = [p - q for p, q in zip(point, self.position, strict=True)]
+        x, y, z = (
+            sum(o * a for o, a in zip(offset, axis, strict=True)) / sum(a * a for a in axis)
+            for axis in self.axes
+        )
+        return (x, y, z)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        raise NotImplementedError
+
+
+class SphereObject(Solid):
+    """A ball, or with `scale` an ellipsoid."""
+
+    tag = "sphere"
+    type: Literal["sphere"] = "sphere"
+    radius: Length = Field(0.5, description="scene units")
+
+    @property
+    def half_sides(self) -> Vector:
+        """As of every solid."""
+        return (self.radius, self.radius, self.radius)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        return length(self.own_place(point)) < 1
+
+
+class BoxObject(Solid):
+    """A box."""
+
+    tag = "box"
+    type: Literal["box"] = "box"
+    size: Sides = Field((1.0, 1.0, 1.0), description="its sides, scene units")
+
+    @property
+    def half_sides(self) -> Vector:
+        """As of every solid."""
+        x, y, z = self.size
+        return (x / 2, y / 2, z / 2)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        return max(abs(x) for x in self.own_place(point)) < 1
+
+
+class CylinderObject(Solid):
+    """A cylinder with lids; its axis is z before it is rotated."""
+
+    tag = "cylinder"
+    type: Literal["cylinder"] = "cylinder"
+    radius: Length = Field(0.25, description="scene units")
+    height: Length = Field(1.0, description="from lid to lid, scene units")
+
+    @property
+    def half_sides(self) -> Vector:
+        """As of every solid."""
+        return (self.radius, self.radius, self.height / 2)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        x, y, z = self.own_place(point)
+        return x * x + y * y < 1 and abs(z) < 1
+
+
+AnyObject: TypeAlias = PlaneObject | WaterObject | SphereObject | BoxObject | CylinderObject
+SceneObject = Annotated[
+    Annotated[PlaneObject, Tag("plane")]
+    | Annotated[WaterObject, Tag("water")]
+    | Annotated[SphereObject, Tag("sphere")]
+    | Annotated[BoxObject, Tag("box")]
+    | Annotated[CylinderObject, Tag("cylinder")],
+    chosen_by("type", "sphere"),
+]
+
+
+def _fitting(name: str) -> str:
+    if not name.isprintable() or name.isspace() or "." in name:
+        raise problem("an object's name must be printable text on one line, without a dot")
+    return name
+
+
+ObjectName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME), AfterValidator(_fitting)]
+Objects = Annotated[dict[ObjectName, SceneObject], Field(max_length=MAX_OBJECTS)]

@@ -1,0 +1,132 @@
+"""Objects beside the set: a list, and all settings of the one that is chosen, with its material."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.scene.objects import MAX_OBJECTS, AnyObject
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.metadata import plain
+from clfractal.viewer.panels.ui import Ui
+
+# No name that a material may have.
+PHONG, NEW = "", " "
+_IN_A_ROW = 3
+_KINDS = {"plane": "Plane", "water": "Water", "sphere": "Sphere", "box": "Box", "cylinder": "Cylinder"}
+
+
+def summary(ui: Ui) -> str:
+    """For the heading."""
+    count = len(ui.studio.scene.objects)
+    return str(count) if count else ""
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel."""
+    objects = ui.studio.scene.objects
+    if w.filtering(ui):
+        for name in objects:
+            _object(ui, name)
+        return
+    chosen = ui.memory.get("object")
+    if chosen not in objects:
+        chosen = next(iter(objects), None)
+    for name, each in objects.items():
+        if _line(name, each, name == chosen):
+            chosen = name
+    ui.memory["object"] = chosen
+    if not isinstance(ui.studio.scene.renderer, SurfaceRenderer):
+        w.hint(ui, "The surface renderer shows objects.")
+        return
+    _buttons(ui, chosen)
+    w.problem(ui, "objects")
+    chosen = ui.memory["object"]
+    if chosen in ui.studio.scene.objects:
+        _object(ui, chosen)
+
+
+def _line(name: str, each: AnyObject, chosen: bool) -> bool:
+    """One object of the list; whether it was clicked."""
+    corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
+    wide = imgui.get_content_region_avail().x
+    clicked = imgui.invisible_button(f"##object {name}", imgui.ImVec2(wide, height))
+    draw = imgui.get_window_draw_list()
+    if chosen or imgui.is_item_hovered():
+        back = theme.ACCENT_FAINT if chosen else theme.FRAME
+        far = imgui.ImVec2(corner.x + wide, corner.y + height)
+        draw.add_rect_filled(corner, far, theme.packed(back), 5.0)
+    y = corner.y + (height - imgui.get_font_size()) / 2
+    text = _KINDS[each.type]
+    right = corner.x + wide - imgui.calc_text_size(text).x - 8
+    draw.push_clip_rect(corner, imgui.ImVec2(right - 6, corner.y + height), True)
+    draw.add_text(imgui.ImVec2(corner.x + 11, y), theme.packed(theme.TEXT), name)
+    draw.pop_clip_rect()
+    draw.add_text(imgui.ImVec2(right, y), theme.packed(theme.DIM), text)
+    return bool(clicked)
+
+
+def _buttons(ui: Ui, chosen: str | None) -> None:
+    objects = ui.studio.scene.objects
+    room = len(objects) < MAX_OBJECTS
+    center, radius = ui.studio.scene.bounds
+    place = [float(f"{x:.4g}") for x in (center[0], center[1], center[2] - radius)]
+    size = float(f"{radius / 3:.2g}")
+    first: dict[str, dict[str, Any]] = {
+        "plane": {"position": place},
+        "water": {"position": place, "waves": {"height": size / 6, "length": 2 * size}},
+        "sphere": {"position": place, "radius": size},
+        "box": {"position": place, "size": [2 * size] * 3},
+        "cylinder": {"position": place, "radius": size, "height": 4 * size},
+    }
+    for number, (kind, values) in enumerate(first.items()):
+        if number % _IN_A_ROW:
+            w.in_row(4)
+        else:
+            imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        about = "Add water with waves" if kind == "water" else f"Add a {kind}"
+        if w.button(_KINDS[kind], icon=theme.PLUS, enabled=room, about=about):
+            _add(ui, kind, {"type": kind, **values})
+    w.in_row(4)
+    if w.icon_button(theme.TRASH, "Remove", enabled=chosen is not None):
+        left = {name: plain(each) for name, each in objects.items() if name != chosen}
+        ui.studio.edit({"objects": left})
+
+
+def _add(ui: Ui, kind: str, values: dict[str, Any]) -> None:
+    known = ui.studio.scene.objects
+    name = next(name for name in (kind, *(f"{kind} {n}" for n in range(2, 1000))) if name not in known)
+    if ui.studio.edit({f"objects.{name}": values}):
+        ui.memory["object"] = name
+
+
+def _object(ui: Ui, name: str) -> None:
+    path, each = f"objects.{name}", ui.studio.scene.objects[name]
+    _material(ui, path, each)
+    keys = [key for key in type(each).model_fields if key not in ("type", "material", "waves")]
+    step = 0.01 * ui.studio.scene.bounds[1]
+    w.fields(ui, path, keys, position={"step": step}, rotation={"unit": "°"})
+    if each.type == "water":
+        w.fields(ui, f"{path}.waves", tuple(type(each.waves).model_fields), spread={"unit": "°"})
+    if each.material in ui.studio.scene.materials:
+        w.group(ui, f"Material {each.material}")
+        w.section(ui, f"materials.{each.material}")
+
+
+def _material(ui: Ui, path: str, each: AnyObject) -> None:
+    scene = ui.studio.scene
+    width = w.row(ui, "Material", path=f"{path}.material", tip=w.value_tip(ui, f"{path}.material"))
+    if width is None:
+        return
+    words = {PHONG: "The set's", **{name: name for name in scene.materials}, NEW: "New material"}
+    found = w.choose(f"{path}.material", words, each.material or PHONG, width)
+    if found == NEW:
+        made = next(name for name in (f"material {n}" for n in range(1, 1000)) if name not in scene.materials)
+        color = list(scene.material.color)
+        ui.studio.edit({f"materials.{made}": {"base": {"color": color}}, f"{path}.material": made})
+    elif found is not None:
+        ui.studio.edit({f"{path}.material": None if found == PHONG else found})
+    w.problem(ui, f"{path}.material")

@@ -1,0 +1,73 @@
+// How spots look in Phong's light: by the scene's material, or an object's own (see clfractal/renderers/objects.py).
+#if HAS_OBJECTS
+typedef struct {
+    real ambient, diffuse, surround, shininess, sharp;
+    color specular, mirror, mirror_edge, emission;
+} look;
+
+INLINE look look_of(const spot *here, world w) {
+    __constant const struct Material *m = w.material;
+    const color none = color_of(R(0.0), R(0.0), R(0.0));
+    const real specular = (real)(m->specular), mirror = (real)(m->reflection);
+    look found = {(real)(m->ambient), (real)(m->diffuse), (real)(m->diffuse), (real)(m->shininess), R(0.0),
+                  color_of(specular, specular, specular), color_of(mirror, mirror, mirror), none, none};
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask there = equal(here->object, (real)((scalar)(i + 1)));
+        if (!any_lane(there)) continue;
+        __global const struct Object *o = w.objects + i;
+        found.ambient = pick(there, (real)(o->ambient), found.ambient);
+        found.diffuse = pick(there, (real)(o->diffuse), found.diffuse);
+        found.surround = pick(there, (real)(o->surround), found.surround);
+        found.shininess = pick(there, (real)(o->shininess), found.shininess);
+        found.sharp = pick(there, (real)(o->sharp), found.sharp);
+        found.specular = color_pick(there, color_splat(o->specular), found.specular);
+        found.mirror = color_pick(there, color_splat(o->mirror), found.mirror);
+        found.mirror_edge = color_pick(there, color_splat(o->mirror_edge), found.mirror_edge);
+        found.emission = color_pick(there, color_splat(o->emission), found.emission);
+    }
+    return found;
+}
+
+INLINE real surround_of(look l) { return l.surround; }
+
+// Eq. 5 with a look. What a light with a size shows in a mirror is its picture there, and no highlight.
+INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
+                    __constant const struct Light *light, look l) {
+    const attitude a = attitude_to(in, normal, to_viewer, lit);
+    const real diffuse = pick(a.front, l.diffuse * a.facing, R(0.0));
+    const mask shines = a.front & less(R(0.0), a.toward_viewer);
+    real highlight = pick(shines, pow(pick(shines, a.toward_viewer, R(1.0)), l.shininess), R(0.0));
+    if (light_is_seen(light)) highlight *= R(1.0) - l.sharp;
+    const color body = color_scale(surface, l.ambient * open + diffuse);
+    const color brings = color_add(body, color_scale(l.specular, highlight));
+    return color_scale(color_mul(brings, color_splat(light->color)), in.strength);
+}
+
+// The part of the surroundings that a spot mirrors sharply, to a ray that came along `direction` (Schlick 1994).
+INLINE color mirrored_at(const spot *here, vec direction, world w) {
+    const look l = look_of(here, w);
+    const real grazing = clamp(R(1.0) + vec_dot(direction, here->normal), R(0.0), R(1.0)), square = grazing * grazing;
+    return color_add(l.mirror, color_scale(l.mirror_edge, square * square * grazing));
+}
+#else
+typedef struct {
+    __constant const struct Material *material;
+} look;
+
+INLINE look look_of(const spot *here, world w) {
+    const look found = {w.material};
+    return found;
+}
+
+INLINE real surround_of(look l) { return (real)(l.material->diffuse); }
+
+INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
+                    __constant const struct Light *light, look l) {
+    return phong(surface, normal, to_viewer, in, lit, open, light, l.material);
+}
+
+INLINE color mirrored_at(const spot *here, vec direction, world w) {
+    const real part = (real)(w.material->reflection);
+    return color_of(part, part, part);
+}
+#endif

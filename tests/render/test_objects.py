@@ -1,0 +1,251 @@
+"""Objects beside the set: where rays meet them, against their equations; order, hiding, points and films."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.renderers.surface import program_texts
+from clfractal.scene.movement import movement_of
+from tests.render.objects_oracle import NOWHERE, met
+from tests.render.shots import (
+    BALL,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    QUICK_BALL,
+    normals_of,
+    plan_of,
+    points_of,
+    rays,
+    scene_of,
+    shoot,
+    stacked,
+    view_of,
+)
+
+CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
+TURNED = {"rotation": [20, -35, 50], "position": [0.1, 0.2, -0.1]}
+OBJECTS: dict[str, dict[str, Any]] = {
+    "plane": {"type": "plane", "position": [0, 0, -0.4], "normal": [0.3, -0.2, 2]},
+    "sphere": {"type": "sphere", "radius": 0.8, **TURNED},
+    "ellipsoid": {"type": "sphere", "radius": 0.6, "scale": [0.5, 1.8, 1.1], **TURNED},
+    "box": {"type": "box", "size": [1.2, 0.5, 0.9], "scale": [1, 2, 1], **TURNED},
+    "cylinder": {"type": "cylinder", "radius": 0.4, "height": 1.3, **TURNED},
+    "flat cylinder": {"type": "cylinder", "radius": 0.4, "scale": [2, 1, 0.5], **TURNED},
+}
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize(
+    ("precision", "lanes", "error"),
+    [("float32", None, 5e-6), ("float32", 1, 5e-6), ("float64", 4, 1e-6)],
+    ids=["float32", "one lane", "float64"],
+)
+@pytest.mark.parametrize("name", OBJECTS)
+def test_an_object_is_where_its_equation_is_zero(
+    device: Device, name: str, camera: str, precision: Precision, lanes: int | None, error: float
+) -> None:
+    # (Channels are float32, whatever the rays are.)
+    scene = scene_of(NOWHERE, CAMERAS[camera], (48, 40), objects={name: OBJECTS[name]}, background=[0, 0, 0])
+    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    origin, direction, _ = rays(scene)
+    t, normal, number = met(scene, origin, direction)
+    hit = film["A"] == 1
+    # At a rim a ray may round to either side.
+    assert (hit != (number == 1)).sum() <= 1
+    both = hit & (number == 1)
+    assert both.sum() > 100
+    view = view_of(scene)
+    points = origin + np.where(both, t, 0)[..., None] * direction
+    facing = np.abs((normal * direction).sum(-1))[both]
+    off = np.abs((points - view.origin) @ view.axis - film["Z"])[both]
+    assert (off * facing).max() < error
+    assert np.linalg.norm(points_of(film)[both] - points[both], axis=-1).max() < 50 * error
+    turned = np.linalg.norm(normals_of(film)[both] - normal[both], axis=-1)
+    # At an edge both faces are right.
+    assert (turned > 1e-3).sum() <= 3
+    assert (film["iterations"][hit] == 0).all()
+
+
+def test_from_inside_a_solid_its_walls_are_seen(device: Device) -> None:
+    camera = {"position": [0.1, -0.2, 0.1], "target": [1, 1, 0.3], "fov": 100}
+    for name, size in (("box", {"size": [3, 2, 2]}), ("cylinder", {"radius": 1.5, "height": 2})):
+        scene = scene_of(NOWHERE, camera, (40, 32), objects={name: {"type": name, **size}})
+        film = shoot(scene, device)
+        origin, direction, _ = rays(scene)
+        t, normal, _ = met(scene, origin, direction)
+        assert (film["A"] == 1).all()
+        np.testing.assert_allclose(points_of(film), origin + t[..., None] * direction, atol=2e-5)
+        assert (np.linalg.norm(normals_of(film) - normal, axis=-1) > 1e-3).sum() <= 3
+
+
+@pytest.mark.parametrize(("precision", "lanes"), [("float32", None), ("float32", 1), ("float64", 4)])
+@pytest.mark.parametrize("choppiness", [0.0, 1.0])
+def test_water_is_its_sum_of_waves(
+    device: Device, precision: Precision, lanes: int | None, choppiness: float
+) -> None:
+    waves = {"height": 0.3, "length": 0.9, "choppiness": choppiness, "seed": 3, "time": 1.7}
+    sea = {"type": "water", "position": [0.1, 0, -0.2], "normal": [0.1, 0.05, 1], "waves": waves}
+    camera = {**PERSPECTIVE, "position": [1.5, -2.5, 0.7]}
+    scene = scene_of(NOWHERE, camera, (40, 32), objects={"sea": sea})
+    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    origin, direction, _ = rays(scene)
+    t, normal, _ = met(scene, origin, direction)
+    near = np.isfinite(t) & (t < 6)
+    assert near.sum() > 600
+    assert (film["A"][near] == 1).all()
+    points = origin + np.where(near, t, 0)[..., None] * direction
+    off = np.linalg.norm(points_of(film) - points, axis=-1)[near]
+    # A crest that a ray only just meets may be thinner than what either search sees.
+    assert (off > 1e-4).mean() < 0.004
+    turned = np.linalg.norm(normals_of(film) - normal, axis=-1)[near]
+    assert (turned > 2e-3).mean() < 0.006
+    assert np.median(turned) < 2e-5
+
+
+def test_significant_height_and_movement_of_waves() -> None:
+    from clfractal.renderers.water import GRAVITY, wave_set
+    from clfractal.scene.objects import WaterObject
+    from tests.render.objects_oracle import heights
+
+    def water(**waves: Any) -> WaterObject:
+        return WaterObject.checked({"type": "water", "waves": {"height": 0.2, "length": 1.5, **waves}})
+
+    random = np.random.default_rng(1)
+    u, v = random.uniform(-300, 300, (2, 200_000))
+    still = water(choppiness=1.0)
+    height, along, across = heights(still, u, v)
+    assert 4 * height.std() == pytest.approx(0.2, rel=0.02)
+    assert np.abs(height).max() < wave_set(still).reach
+    assert np.hypot(along, across).max() < wave_set(still).slope
+    # Crests are higher than troughs are deep.
+    assert (height**3).mean() > 0.1 * height.std() ** 3
+    assert np.abs((heights(water(choppiness=0.0), u, v)[0] ** 3).mean()) < 0.05 * height.std() ** 3
+    # Deep water: a wave of number k has moved by sqrt(g / k) after a second.
+    before, after = wave_set(water()), wave_set(water(time=1.0))
+    number = np.hypot(before.x, before.y)
+    turned = np.exp(1j * (before.phase - after.phase))
+    np.testing.assert_allclose(turned, np.exp(1j * np.sqrt(GRAVITY * number)), atol=1e-12)
+
+
+def _crowd(order: list[str]) -> dict[str, Any]:
+    known = {
+        "floor": {"type": "plane", "position": [0, 0, -1.05], "material": "red"},
+        "left": {"type": "sphere", "position": [-0.9, -0.6, -0.6], "radius": 0.4, "material": "grey"},
+        "right": {"type": "box", "position": [0.9, 0.3, -0.3], "size": [0.5, 0.7, 1.2]},
+        "through": {"type": "cylinder", "radius": 0.3, "height": 3, "rotation": [60, 20, 0]},
+    }
+    return {name: known[name] for name in order}
+
+
+MATERIALS = {
+    "red": {"base": {"color": [0.8, 0.1, 0.1]}},
+    "grey": {"base": {"color": [0.4, 0.4, 0.4], "metalness": 1.0}, "specular": {"roughness": 0.1}},
+}
+
+
+@pytest.mark.parametrize("mode", ["direct", "path"])
+def test_the_order_of_objects_changes_nothing(device: Device, mode: str) -> None:
+    found = []
+    for order in (["floor", "left", "right", "through"], ["through", "right", "floor", "left"]):
+        scene = scene_of(
+            BALL,
+            PERSPECTIVE,
+            (48, 40),
+            objects=_crowd(order),
+            materials=MATERIALS,
+            lighting={"mode": mode},
+        )
+        found.append(stacked(shoot(scene, device)))
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+@pytest.mark.parametrize("search", ["distance", "steps"])
+@pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "scalar rule"])
+def test_what_is_nearer_is_seen(device: Device, formula: dict[str, Any], search: str) -> None:
+    """The ball and what goes through it, hides it and is hidden: the least of the depths of each alone."""
+    settings = {"search": search}
+    objects = _crowd(["floor", "left", "right", "through"])
+    alone = shoot(scene_of(formula, PERSPECTIVE, (64, 48), renderer=settings), device)
+    beside = shoot(
+        scene_of(NOWHERE, PERSPECTIVE, (64, 48), objects=objects, materials=MATERIALS, renderer=settings),
+        device,
+    )
+    both = shoot(
+        scene_of(formula, PERSPECTIVE, (64, 48), objects=objects, materials=MATERIALS, renderer=settings),
+        device,
+    )
+    one, other, found = (np.minimum(film["Z"], 1e6) for film in (alone, beside, both))
+    assert (one < other).sum() > 300
+    assert (other < one).sum() > 300
+    # Where they meet, within a footprint, either is right.
+    close = np.abs(one - other) < 0.02
+    np.testing.assert_allclose(found[~close], np.minimum(one, other)[~close], atol=1e-5)
+    first = (one < other)[..., None]
+    np.testing.assert_allclose(
+        normals_of(both)[~close], np.where(first, normals_of(alone), normals_of(beside))[~close], atol=1e-5
+    )
+
+
+def test_points_of_a_pixel_find_objects_on_their_own_rays(device: Device) -> None:
+    points = {"pattern": "grid", "count": 9}
+    objects = {"ball": {"type": "sphere", "radius": 0.8}}
+    scene = scene_of(NOWHERE, PERSPECTIVE, (32, 32), objects=objects, renderer={"points": points})
+    film = shoot(scene, device)
+    expected = np.zeros((32, 32))
+    for x in (1 / 6, 1 / 2, 5 / 6):
+        for y in (1 / 6, 1 / 2, 5 / 6):
+            origin, direction, _ = rays(scene, x, y)
+            expected += np.isfinite(met(scene, origin, direction)[0]) / 9
+    assert ((expected > 0) & (expected < 1)).sum() > 30
+    assert (np.abs(film["A"] - expected) > 1e-5).sum() <= 1
+
+
+def test_an_object_hides_the_face_of_a_cut(device: Device) -> None:
+    plane = {"center": [0, 0, 0], "normal": [0, -1, 0]}
+    camera = {"position": [0, -4, 0], "target": [0, 0, 0], "fov": 40}
+    ball = {"type": "sphere", "position": [0.3, -1.5, 0.2], "radius": 0.3}
+    scene = scene_of(
+        QUICK_BALL,
+        camera,
+        (40, 40),
+        objects={"ball": ball},
+        cut_planes=[{"plane": plane, "cut": True, "opacity": 0}],
+    )
+    film = shoot(scene, device)
+    origin, direction, _ = rays(scene)
+    on_ball = np.isfinite(met(scene, origin, direction)[0])
+    view = view_of(scene)
+    depth = (points_of(film) - view.origin) @ view.axis
+    assert on_ball.sum() > 40
+    assert (depth[on_ball] < 2.6).all()
+    face = (film["A"] == 1) & ~on_ball
+    assert face.sum() > 200
+    np.testing.assert_allclose(film["Z"][face], 4, atol=0.05)
+
+
+def test_a_moving_object_keeps_its_program(device: Device) -> None:
+    tracks = {
+        "objects.ball.position": {
+            "keys": [{"frame": 0, "value": [0, 0, 0]}, {"frame": 9, "value": [1, 0, 1]}]
+        },
+        "objects.ball.radius": {"keys": [{"frame": 0, "value": 0.1}, {"frame": 9, "value": 0.4}]},
+        "objects.sea.waves.time": {"expression": "t"},
+    }
+    scene = scene_of(
+        BALL,
+        PERSPECTIVE,
+        objects={"ball": {"type": "sphere", "radius": 0.2}, "sea": {"type": "water", "position": [0, 0, -2]}},
+        animation={"fps": 10, "frames": 10, "tracks": tracks},
+    )
+    frames = [movement_of(scene).still(number) for number in (0, 9)]
+    texts = [[text.flat.text for text in program_texts(frame, plan_of(frame, device))] for frame in frames]
+    assert texts[0] == texts[1]
+    ball, sea = frames[1].objects.values()
+    assert ball.position == (1, 0, 1)
+    assert ball.radius == pytest.approx(0.4)  # type: ignore[union-attr]
+    assert sea.waves.time == pytest.approx(0.9)  # type: ignore[union-attr]

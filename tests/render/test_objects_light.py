@@ -1,0 +1,276 @@
+"""Light on objects and between them: shadows, mirrors, fog, energy along paths, and closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from tests.render.objects_oracle import NOWHERE, met
+from tests.render.shots import BALL, ORTHOGRAPHIC, PERSPECTIVE, points_of, rays, scene_of, shoot
+from tests.render.test_light_shapes import CASES
+from tests.render.test_surface_rays import colors
+
+WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
+FLOOR = {"type": "plane", "position": [0, 0, -0.5], "material": "white"}
+BALL_OBJECT = {"type": "sphere", "position": [0.2, -0.1, 0.3], "radius": 0.4, "material": "white"}
+DULL = {"ambient": 0, "diffuse": 1, "specular": 0}
+FROM_ABOVE = {**PERSPECTIVE, "position": [1.0, -1.8, 2.0]}
+
+
+@pytest.mark.parametrize("mode", ["direct", "path"])
+@pytest.mark.parametrize("lanes", [None, 1])
+def test_shadow_of_a_ball_on_a_plane(device: Device, mode: str, lanes: int | None) -> None:
+    way = np.array([0.5, 0.3, -1.0])
+    scene = scene_of(
+        NOWHERE,
+        FROM_ABOVE,
+        (48, 48),
+        objects={"floor": FLOOR, "ball": BALL_OBJECT},
+        materials={"white": WHITE},
+        material=DULL,
+        lights=[{"direction": way.tolist()}],
+        lighting={"mode": mode, **({"bounces": 0} if mode == "path" else {})},
+        background=[0, 0, 0],
+    )
+    shots: dict[str, Any] = {"lanes": lanes} if lanes else {}
+    film = shoot(scene, device, **shots)
+    toward = -way / np.linalg.norm(way)
+    origin, direction, _ = rays(scene)
+    t, normal, number = met(scene, origin, direction)
+    on_floor = number == 1
+    points = origin + np.where(on_floor, t, 1)[..., None] * direction
+    shadowed = np.isfinite(met(scene, points + 1e-6 * normal, np.broadcast_to(toward, points.shape))[0])
+    expected = np.where(shadowed, 0, toward[2])[on_floor]
+    assert (expected == 0).sum() > 100
+    assert (expected > 0).sum() > 500
+    assert (np.abs(colors(film)[on_floor][:, 0] - expected) > 1e-4).sum() <= 2
+    # The ball's own light: the cosine, and dark behind its terminator.
+    on_ball = number == 2
+    cosine = np.maximum((normal @ toward)[on_ball], 0)
+    np.testing.assert_allclose(colors(film)[on_ball][:, 0], cosine, atol=2e-4)
+    assert (cosine == 0).sum() > 10
+
+
+@pytest.mark.parametrize("mode", ["direct", "path"])
+def test_set_and_objects_shadow_each_other(device: Device, mode: str) -> None:
+    """A ball of the formula over a plane shadows as a ball among the objects does, and the other way round."""
+    common: dict[str, Any] = {
+        "materials": {"white": WHITE},
+        "material": {**DULL, "color": [1, 1, 1]},
+        "lights": [{"direction": [0.4, 0.2, -1]}],
+        "lighting": {"mode": mode, **({"bounces": 0} if mode == "path" else {})},
+        "background": [0, 0, 0],
+        "coloring": {"by": "solid"},
+        "renderer": {"detail": 0.05},
+    }
+    camera = {"position": [3, -5, 5], "target": [0, 0, 0], "fov": 40}
+    floor = {**FLOOR, "position": [0, 0, -1.2]}
+    above = {"type": "sphere", "position": [-0.7, -0.4, 2.0], "radius": 0.5, "material": "white"}
+    radius = 4.0 ** (2.0**-8)
+    as_object = {"type": "sphere", "radius": radius, "material": "white"}
+    one = shoot(scene_of(BALL, camera, (64, 64), objects={"floor": floor, "above": above}, **common), device)
+    objects = {"floor": floor, "above": above, "ball": as_object}
+    other = shoot(scene_of(NOWHERE, camera, (64, 64), objects=objects, **common), device)
+    a, b = colors(one)[..., 0], colors(other)[..., 0]
+    assert (b < 0.01).sum() > 200
+    # At rims, and at the rims of shadows, a ray may go to either side.
+    assert (np.abs(a - b) > 0.02).mean() < 0.01
+    assert np.median(np.abs(a - b)) < 1e-4
+
+
+@pytest.mark.parametrize(("light", "expected"), CASES, ids=["sphere", "rectangle", "spot"])
+@pytest.mark.parametrize("mode", ["direct", "path"])
+def test_a_plane_has_the_irradiance_of_closed_forms(
+    device: Device, light: dict[str, Any], expected: Any, mode: str
+) -> None:
+    visible = {} if light["type"] == "spot" else {"visible": False}
+    scene = scene_of(
+        NOWHERE,
+        {**ORTHOGRAPHIC, "position": [0.4, -2, 1.6]},
+        (48, 48),
+        objects={"floor": {**FLOOR, "position": [0, 0, 0]}},
+        materials={"white": WHITE},
+        lights=[{**light, **visible}],
+        material=DULL,
+        lighting={"mode": mode, **({"bounces": 0} if mode == "path" else {})},
+        renderer={"samples": 16 if mode == "direct" else 64},
+        background=[0, 0, 0],
+    )
+    film = shoot(scene, device)
+    found, right = colors(film)[..., 0], expected(points_of(film))
+    assert (film["A"] == 1).all()
+    assert found.mean() == pytest.approx(right.mean(), rel=0.01)
+
+
+def test_ambient_occlusion_of_a_ball_over_a_plane(device: Device) -> None:
+    """A ball above the horizon takes (R/d)^2 cos(angle) of the cosine-weighted hemisphere (Nusselt 1928)."""
+    scene = scene_of(
+        NOWHERE,
+        FROM_ABOVE,
+        (40, 40),
+        objects={
+            name: {**each, "material": None} for name, each in (("floor", FLOOR), ("ball", BALL_OBJECT))
+        },
+        material={"color": [1, 1, 1], "ambient": 1, "diffuse": 0, "specular": 0},
+        lights=[{"type": "directional"}],
+        renderer={"samples": 4, "ambient_occlusion": {"rays": 64, "distance": 50}},
+    )
+    film = shoot(scene, device)
+    points = points_of(film)
+    on_floor = (np.abs(points[..., 2] + 0.5) < 1e-4) & (film["A"] == 1)
+    way = np.array(BALL_OBJECT["position"]) - points[on_floor]
+    distance = np.linalg.norm(way, axis=-1)
+    covered = 0.4**2 / distance**2 * way[:, 2] / distance
+    error = colors(film)[on_floor][:, 0] - (1 - covered)
+    assert covered.max() > 0.2
+    assert abs(error.mean()) < 0.003
+    assert np.abs(error).mean() < 0.02
+
+
+def test_a_mirror_shows_what_the_mirrored_ray_meets(device: Device) -> None:
+    mirror = {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0}}
+    lamp = {
+        "base": {"color": [0, 0, 0]},
+        "specular": {"weight": 0},
+        "emission": {"luminance": 3, "color": [1, 0.5, 0]},
+    }
+    objects = {
+        "floor": {**FLOOR, "material": "mirror"},
+        "ball": {**BALL_OBJECT, "material": "lamp"},
+    }
+    for mode in ("direct", "path"):
+        scene = scene_of(
+            NOWHERE,
+            FROM_ABOVE,
+            (48, 48),
+            objects=objects,
+            materials={"mirror": mirror, "lamp": lamp},
+            lights=[],
+            lighting={"mode": mode},
+            renderer={"firefly_limit": None, "samples": 1},
+            background=[0, 0, 0],
+        )
+        film = shoot(scene, device)
+        origin, direction, _ = rays(scene)
+        t, normal, number = met(scene, origin, direction)
+        on_floor = number == 1
+        points = origin + np.where(on_floor, t, 1)[..., None] * direction
+        mirrored = direction * np.array([1, 1, -1])
+        seen = np.isfinite(met(scene, points + 1e-6 * normal, mirrored)[0])
+        assert (seen & on_floor).sum() > 60
+        expected = np.where(seen[..., None], [3, 1.5, 0], 0)[on_floor]
+        # (Along paths a mirror is a very narrow lobe, which rays at the rim may miss.)
+        wrong = (np.abs(colors(film)[on_floor] - expected) > 0.01).any(axis=-1)
+        assert wrong.sum() <= (3 if mode == "direct" else 12)
+        np.testing.assert_allclose(colors(film)[number == 2], [[3, 1.5, 0]] * (number == 2).sum(), rtol=1e-5)
+
+
+def test_fog_before_an_object(device: Device) -> None:
+    lamp = {"base": {"color": [0, 0, 0]}, "specular": {"weight": 0}, "emission": {"luminance": 2}}
+    scene = scene_of(
+        NOWHERE,
+        FROM_ABOVE,
+        (32, 32),
+        objects={"floor": {**FLOOR, "material": "lamp"}},
+        materials={"lamp": lamp},
+        lights=[],
+        fog={"density": 0.3, "color": [0.5, 0.6, 0.7]},
+    )
+    film = shoot(scene, device)
+    origin, direction, _ = rays(scene)
+    t, _, _ = met(scene, origin, direction)
+    passes = np.exp(-0.3 * t)[..., None]
+    np.testing.assert_allclose(colors(film), 2 * passes + (1 - passes) * np.array([0.5, 0.6, 0.7]), rtol=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["box", "sphere", "cylinder"])
+def test_a_closed_room_keeps_its_energy(device: Device, kind: str) -> None:
+    """Walls that shine E and scatter the part r of light: after n bounces E (1 - r^(n + 1)) / (1 - r) everywhere."""
+    sizes: dict[str, dict[str, Any]] = {
+        "box": {"size": [3, 2, 2]},
+        "sphere": {"radius": 1.5},
+        "cylinder": {"radius": 1.4, "height": 2},
+    }
+    wall = {
+        "base": {"color": [0.5, 0.5, 0.5]},
+        "specular": {"weight": 0},
+        "emission": {"luminance": 1},
+    }
+    scene = scene_of(
+        NOWHERE,
+        {"position": [0.1, -0.2, 0.1], "target": [1, 1, 0.3], "fov": 90},
+        (32, 32),
+        objects={"room": {"type": kind, "material": "wall", **sizes[kind]}},
+        materials={"wall": wall},
+        lights=[],
+        lighting={"mode": "path", "bounces": 7, "roulette": 64},
+        renderer={"samples": 4},
+        background=[9, 9, 9],
+    )
+    film = shoot(scene, device)
+    np.testing.assert_allclose(colors(film), (1 - 0.5**8) / 0.5, rtol=2e-3)
+
+
+def test_white_objects_under_a_white_sky_are_white(device: Device) -> None:
+    white = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 1, "roughness": 0.4}}
+    scene = scene_of(
+        NOWHERE,
+        FROM_ABOVE,
+        (24, 24),
+        objects={
+            "floor": {**FLOOR, "material": "white"},
+            "ball": {**BALL_OBJECT, "material": "white"},
+            "box": {
+                "type": "box",
+                "size": [0.4, 0.4, 1],
+                "position": [-0.8, 0.4, 0],
+                "rotation": [0, 0, 30],
+                "material": "white",
+            },
+        },
+        materials={"white": white},
+        lights=[],
+        lighting={"mode": "path", "bounces": 32, "roulette": 64},
+        renderer={"samples": 32},
+        background=[1, 1, 1],
+    )
+    assert colors(shoot(scene, device)).mean() == pytest.approx(1, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("name", "material"),
+    [
+        ("matte", {"base": {"color": [0.6, 0.3, 0.2]}, "specular": {"weight": 0}}),
+        ("glossy", {"base": {"color": [0.2, 0.3, 0.6]}, "specular": {"roughness": 0.4}}),
+        ("rough metal", {"base": {"color": [0.9, 0.6, 0.3], "metalness": 1}, "specular": {"roughness": 0.5}}),
+        ("mirror", {"base": {"color": [0.9, 0.6, 0.3], "metalness": 1}, "specular": {"roughness": 0}}),
+    ],
+)
+def test_both_modes_show_an_object_about_alike(device: Device, name: str, material: dict[str, Any]) -> None:
+    """Under one light and a background that mirrors show."""
+    found = []
+    for mode in ("direct", "path"):
+        scene = scene_of(
+            NOWHERE,
+            ORTHOGRAPHIC,
+            (32, 32),
+            objects={"ball": {"type": "sphere", "radius": 0.9, "material": "it"}},
+            materials={"it": material},
+            material={"ambient": 0},
+            lights=[{"direction": [0.2, 0.8, -1]}],
+            lighting={"mode": mode},
+            renderer={"samples": 64, "firefly_limit": None},
+            background={"top": [0, 0, 0], "bottom": [0, 0, 0]},
+        )
+        film = shoot(scene, device)
+        found.append(colors(film)[film["A"] == 1])
+    direct, path = found
+    if name == "mirror":
+        # Nothing is around it.
+        assert max(direct.max(), np.median(path)) < 1e-3
+        return
+    np.testing.assert_allclose(direct.mean(axis=0), path.mean(axis=0), rtol=0.2)
+    assert np.corrcoef(direct[:, 0], path[:, 0])[0, 1] > 0.95
