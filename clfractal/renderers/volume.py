@@ -222,7 +222,15 @@ def grid_key(scene: Scene, plan: Plan) -> str:
     settings, given = settings_of(scene), scene.given
     shown = settings.model_dump(
         mode="json",
-        exclude={*Sampled.model_fields, "transfer", "level", "step", "shadows", "opacity_limit", "anisotropy"},
+        exclude={
+            *Sampled.model_fields,
+            "transfer",
+            "level",
+            "step",
+            "shadows",
+            "opacity_limit",
+            "anisotropy",
+        },
     )
     solid = scene.formula.mapping() if given is None else given.digest
     seen = shows_outside(settings) if given is None else least_visible(settings, given)
@@ -321,7 +329,9 @@ def brick_bounds(scene: Scene, grid: Grid, ranges: Floats) -> Floats:
     most = np.where((table[:, 4:] > 0).any(axis=1), np.maximum(most, SHINING_RATE), most)
     # An entry further either way, for what rounding does to a place in the table.
     with np.errstate(invalid="ignore", over="ignore"):
-        places = (ranges.astype(np.float64) - float(record["low"])) * float(record["range"]) * (TRANSFER_SIZE - 1)
+        places = (
+            (ranges.astype(np.float64) - float(record["low"])) * float(record["range"]) * (TRANSFER_SIZE - 1)
+        )
     places = np.clip(np.nan_to_num(places, posinf=np.inf, neginf=-np.inf), 0, TRANSFER_SIZE - 1)
     first = np.maximum(np.floor(places[:, 0]).astype(int) - 1, 0)
     last = np.minimum(np.ceil(places[:, 1]).astype(int) + 1, TRANSFER_SIZE - 1)

@@ -52,9 +52,7 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
     return blocks
 
 
-def brick_ranges(
-    grid: Grid, on_compile: Callable[[str], None] | None = None
-) -> npt.NDArray[np.float32]:
+def brick_ranges(grid: Grid, on_compile: Callable[[str], None] | None = None) -> npt.NDArray[np.float32]:
     """The least and the largest sample of each slot, as samples are kept; shape (slots, 2), infinite where one is NaN.
 
     Raises:
@@ -66,9 +64,7 @@ def brick_ranges(
     ranges = device.buffer(RANGE_BYTES * grid.parts.slots, "the ranges of bricks")
     for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
         with device.failures("reading the grid's bricks"):
-            built.kernel.set_args(
-                ranges, values, np.int32(0), np.int32(after - first), np.int32(first)
-            )
+            built.kernel.set_args(ranges, values, np.int32(0), np.int32(after - first), np.int32(first))
         run_in_parts(
             device,
             built.kernel,

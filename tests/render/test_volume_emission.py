@@ -18,7 +18,11 @@ SIDE, VOXELS = 2.0, 20
 VOXEL = SIDE / VOXELS
 CORNER = np.full(3, -SIDE / 2)
 CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
-DARK: dict[str, Any] = {"material": {"color": [0, 0, 0], "specular": 0}, "lights": [], "background": "transparent"}
+DARK: dict[str, Any] = {
+    "material": {"color": [0, 0, 0], "specular": 0},
+    "lights": [],
+    "background": "transparent",
+}
 LIGHT = np.array([0.03, 0.2, 0.006])
 
 
@@ -30,7 +34,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def shown(folder: Path, device: Device, opacity: float, step: float, **sections: Any) -> tuple[Floats, Floats]:
+def shown(
+    folder: Path, device: Device, opacity: float, step: float, **sections: Any
+) -> tuple[Floats, Floats]:
     """The picture's light, and how long rays are in the cube, in voxels."""
     scene = load_scene(
         {
@@ -60,7 +66,7 @@ def shown(folder: Path, device: Device, opacity: float, step: float, **sections:
 @pytest.mark.parametrize("opacity", [0.0, 0.02, 0.3, 1.0])
 @pytest.mark.parametrize("step", [2.0, 0.5, 0.1])
 def test_a_cube_that_shines(device: Device, folder: Path, opacity: float, step: float) -> None:
-    """j (1 - exp(-sigma L)) / sigma, whatever the step; L is a whole number of steps, the last of which may go past the cube."""
+    """j (1 - exp(-sigma L)) / sigma, whatever the step; L is a whole number of steps."""
     light, length = shown(folder, device, opacity, step)
     steps = length / step
     # Where rounding may decide of a whole step.
