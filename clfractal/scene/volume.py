@@ -174,7 +174,7 @@ class VolumeRenderer(Sampled):
     )
     anisotropy: Annotated[float, Field(strict=True, ge=-0.95, le=0.95)] = Field(
         0.0,
-        description="where light is scattered to, with lighting.mode path: 0 all around, 0.95 nearly straight on, below 0 back",
+        description="where light is scattered to, with lighting.mode path: 0 all around, 0.95 straight on, below 0 back",
     )
     shadows: bool = Field(
         False, description="whether lights with `shadow: true` cast shadows inside the grid"
