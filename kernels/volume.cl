@@ -4,8 +4,10 @@
 // leaves out places, and never moves them. SURFACE shows the boundary where the value passes `level`; otherwise places are
 // composited from front to back, until the ray is opaque.
 #include "lanes.h"
-#if PLANES > 0
+#if PLANES > 0 || HAS_PATHS
 #include "numbers/real.h"
+#endif
+#if PLANES > 0
 #include "numbers/dual.h"
 #endif
 #include "vectors.h"

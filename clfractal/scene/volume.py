@@ -104,7 +104,7 @@ class Transfer(Section):
         """
         if self.opacity is None:
             return ()
-        values = sorted({stop.at for stop in (*self.opacity, *(self.emission or ()))})
+        values = sorted({*(stop.at for stop in self.opacity), *(stop.at for stop in self.emission or ())})
         return tuple((at, self.shows(at)) for at in values)
 
     def shows(self, value: float) -> bool:
@@ -174,7 +174,7 @@ class VolumeRenderer(Sampled):
     )
     anisotropy: Annotated[float, Field(strict=True, ge=-0.95, le=0.95)] = Field(
         0.0,
-        description="where light is scattered to, with lighting.mode path: 0 everywhere alike, 0.95 nearly straight on, below 0 back",
+        description="where light is scattered to, with lighting.mode path: 0 all around, 0.95 straight on, below 0 back",
     )
     shadows: bool = Field(
         False, description="whether lights with `shadow: true` cast shadows inside the grid"

@@ -238,7 +238,7 @@ def test_the_light_of_a_part_is_limited_and_told() -> None:
         ),
         (
             {"renderer": {"type": "volume"}, "lighting": path()},
-            "lighting.mode: must be direct for a volume, got path",
+            "lighting.mode: must be direct for a volume's surface, got path",
         ),
         (
             {"materials": {"m": {"specular": {"ior": 0.9}}}},

@@ -66,7 +66,7 @@ def shown(
 @pytest.mark.parametrize("opacity", [0.0, 0.02, 0.3, 1.0])
 @pytest.mark.parametrize("step", [2.0, 0.5, 0.1])
 def test_a_cube_that_shines(device: Device, folder: Path, opacity: float, step: float) -> None:
-    """j (1 - exp(-sigma L)) / sigma, whatever the step; L is a whole number of steps, the last of which may go past the cube."""
+    """j (1 - exp(-sigma L)) / sigma, whatever the step; L is a whole number of steps."""
     light, length = shown(folder, device, opacity, step)
     steps = length / step
     # Where rounding may decide of a whole step.

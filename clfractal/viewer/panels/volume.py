@@ -41,7 +41,10 @@ def draw(ui: Ui) -> None:
     w.group(ui, "Rays")
     w.field(ui, "renderer.interpolation", segmented=True)
     w.field(ui, "renderer.step", unit=" voxel")
-    w.field(ui, "renderer.shadows")
+    if ui.studio.scene.lighting.mode == "path":
+        w.field(ui, "renderer.anisotropy")
+    else:
+        w.field(ui, "renderer.shadows")
     if renderer.transfer.opacity is None:
         low, high = limits(ui)
         w.field(

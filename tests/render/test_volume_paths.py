@@ -1,0 +1,343 @@
+"""Light along paths through a medium, beside Beer's law, quadrature, and a Monte Carlo by NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clfractal.renderers.volume
+from clfractal.device.select import Device
+from clfractal.errors import SceneError
+from clfractal.renderers.volume import brick_bounds
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.voxels.blocks import brick_ranges
+from clfractal.voxels.dense import grid_from_dense
+from tests.render.shots import Floats, rays, shoot, stacked
+from tests.render.volumes import keep, middles, to_box, value_at
+from tests.scene.test_environment import write_map
+
+SIDE, VOXELS = 2.0, 20
+VOXEL = SIDE / VOXELS
+CORNER, SIDES = np.full(3, -SIDE / 2), np.full(3, SIDE)
+CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
+COLOR = np.array([0.9, 0.6, 0.2])
+OPACITY = 0.12
+SIGMA = -np.log(1 - OPACITY) / VOXEL  # per scene unit
+SUN = np.array([-0.5, 0.6, -0.8]) / np.linalg.norm([-0.5, 0.6, -0.8])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cube in which all voxels are 1, one whose values grow and fall, and a ball."""
+    path = tmp_path_factory.mktemp("media")
+    spacing = [VOXEL] * 3
+    keep(path / "cube.nrrd", np.ones((VOXELS,) * 3, np.float32), CORNER, spacing)
+    keep(path / "waves.nrrd", waves(), CORNER, spacing)
+    distance = np.linalg.norm(middles((VOXELS,) * 3, CORNER, spacing), axis=-1)
+    keep(path / "ball.nrrd", (distance < 0.85).astype(np.float32), CORNER, spacing)
+    return path
+
+
+def waves() -> Floats:
+    """From 0 to 1 and back within a brick."""
+    places = middles((VOXELS,) * 3, CORNER, [VOXEL] * 3)
+    found: Floats = np.clip(np.sin(7 * places[..., 0]) * np.cos(5 * places[..., 2] + places[..., 1]), 0, 1)
+    return found.astype(np.float32)
+
+
+def medium(
+    folder: Path, *, file: str = "cube.nrrd", bounces: int = 0, samples: int = 256, **given: Any
+) -> Scene:
+    """A scene of a medium; keys of the renderer's, or `transfer`'s, or sections."""
+    transfer: dict[str, Any] = {
+        "opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": OPACITY}],
+        "color": [{"at": 0, "color": COLOR.tolist()}],
+        **given.pop("transfer", {}),
+    }
+    return load_scene(
+        {
+            "version": 1,
+            "formula": {"name": "mandelbulb"},
+            "image": {"width": 24, "height": 24},
+            "camera": CAMERA,
+            "renderer": {
+                "type": "volume",
+                "file": file,
+                "samples": samples,
+                "anisotropy": given.pop("anisotropy", 0.0),
+                "seed": given.pop("seed", 0),
+                "filter_width": 0.1,
+                "transfer": transfer,
+            },
+            "lighting": {"mode": "path", "bounces": bounces, **given.pop("lighting", {})},
+            "lights": [],
+            "background": "transparent",
+            **given,
+        },
+        folder=folder,
+    )
+
+
+def light_of(scene: Scene, device: Device, **settings: Any) -> Floats:
+    return stacked(shoot(scene, device, **settings), "RGB").astype(float)
+
+
+def within(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
+    """Each pixel's ray: its origin, direction, and where it enters and leaves the cube."""
+    origin, direction, _ = rays(scene)
+    near, far = to_box(origin, direction, CORNER, SIDES)
+    return origin, direction, near, np.maximum(far, near)
+
+
+def assert_alike(light: Floats, expected: Floats, error: float, share: float = 0.01) -> None:
+    """In all within a hundredth; each pixel within five standard errors of one whose value is about 1."""
+    assert light.mean() == pytest.approx(expected.mean(), rel=share)
+    assert np.abs(light - expected).max() < 5 * error
+
+
+WHITE = {"background": {"top": [1, 1, 1], "bottom": [1, 1, 1]}}
+BLACK = {"transfer": {"color": [{"at": 0, "color": [0, 0, 0]}]}}
+
+
+def test_what_comes_through(device: Device, folder: Path) -> None:
+    """exp(-sigma L) of a white sky behind a black medium; alpha is the rest."""
+    scene = medium(folder, samples=1024, **BLACK, **WHITE)
+    _, _, near, far = within(scene)
+    expected = np.exp(-SIGMA * (far - near))
+    film = shoot(scene, device)
+    assert expected.min() < 0.2
+    assert_alike(film["R"], expected, 0.5 / 32)
+    np.testing.assert_allclose(film["A"], 1 - film["R"], atol=1e-5)
+
+
+def test_bounds_may_be_loose(device: Device, folder: Path) -> None:
+    """Where the density goes up and down within a brick, its integral decides, by NumPy."""
+    scene = medium(folder, file="waves.nrrd", samples=1024, **BLACK, **WHITE)
+    origin, direction, near, far = within(scene)
+    depth = np.zeros(near.shape)
+    for part in (np.arange(1500) + 0.5) / 1500:
+        places = origin + (near + part * (far - near))[..., None] * direction
+        value = value_at(waves(), (places - CORNER) / VOXEL)
+        depth += -np.log(1 - OPACITY * value) / VOXEL * (far - near) / 1500
+    assert_alike(light_of(scene, device)[..., 0], np.exp(-depth), 0.5 / 32)
+
+
+def phase(cosine: Floats, g: float) -> Floats:
+    """Henyey and Greenstein's."""
+    found: Floats = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
+    return found
+
+
+def from_sun(points: Floats) -> tuple[Floats, Floats]:
+    return np.broadcast_to(-SUN, points.shape), np.full(points.shape[:-1], np.pi * 2.0)
+
+
+LAMP = np.array([2.5, -2.5, 3.0])
+
+
+def from_lamp(points: Floats) -> tuple[Floats, Floats]:
+    offset = LAMP - points
+    square = (offset**2).sum(-1)
+    return offset / np.sqrt(square)[..., None], np.pi * 20 / square
+
+
+def from_ball(points: Floats) -> tuple[Floats, Floats]:
+    toward, irradiance = from_lamp(points)
+    return toward, irradiance * 5 * 0.2**2
+
+
+def from_panel(points: Floats) -> tuple[Floats, Floats]:
+    toward, irradiance = from_lamp(points)
+    facing = toward @ (LAMP / np.linalg.norm(LAMP))
+    return toward, irradiance / np.pi * 0.4 * 0.3 * 5 * facing
+
+
+LIGHTS: dict[str, tuple[dict[str, Any], Callable[[Floats], tuple[Floats, Floats]]]] = {
+    "sun": ({"direction": SUN.tolist(), "intensity": 2}, from_sun),
+    "disc": ({"direction": SUN.tolist(), "intensity": 2, "angular_size": 4}, from_sun),
+    "point": (
+        {"type": "point", "position": LAMP.tolist(), "intensity": 20, "falloff": "inverse_square"},
+        from_lamp,
+    ),
+    "sphere": (
+        {"type": "sphere", "position": LAMP.tolist(), "radius": 0.2, "intensity": 100, "visible": False},
+        from_ball,
+    ),
+    "rectangle": (
+        {
+            "type": "rectangle",
+            "position": LAMP.tolist(),
+            "direction": (-LAMP).tolist(),
+            "width": 0.4,
+            "height": 0.3,
+            "intensity": 100,
+            "visible": False,
+        },
+        from_panel,
+    ),
+}
+
+
+@pytest.mark.parametrize("g", [0.0, 0.6, -0.4])
+@pytest.mark.parametrize("light", LIGHTS)
+def test_light_scattered_once(device: Device, folder: Path, light: str, g: float) -> None:
+    """Of each light: albedo, phase and what comes through to the place and from there, by quadrature along the ray."""
+    keys, lit_from = LIGHTS[light]
+    scene = medium(folder, lights=[keys], anisotropy=g)
+    origin, direction, near, far = within(scene)
+    expected = np.zeros(near.shape)
+    for part in (np.arange(300) + 0.5) / 300:
+        way = part * (far - near)
+        points = origin + (near + way)[..., None] * direction
+        toward, irradiance = lit_from(points)
+        left = np.maximum(to_box(points, toward, CORNER, SIDES)[1], 0)
+        scattered = (
+            phase((toward * direction).sum(-1), g) * irradiance * SIGMA * np.exp(-SIGMA * (way + left))
+        )
+        expected += np.where(far > near, scattered, 0) * (far - near) / 300
+    found = light_of(scene, device)
+    for channel in range(3):
+        assert found[..., channel].mean() == pytest.approx(expected.mean() * COLOR[channel], rel=0.015)
+    error = np.abs(found / COLOR - expected[..., None]).max()
+    assert error < 5 * 2.0 * expected.max() / np.sqrt(256)
+
+
+def wandering(scene: Scene, g: float, orders: int, count: int) -> float:
+    """Mean light of the picture with albedo COLOR[0], lit by the sun: paths of NumPy, scattered up to `orders` times."""
+    random = np.random.default_rng(11)
+    origin, direction, near, far = (
+        np.repeat(each.reshape(-1, *each.shape[2:]), count, 0) for each in within(scene)
+    )
+    total, pixels = 0.0, len(near)
+    alive = far > near
+    place = (origin + near[:, None] * direction)[alive]
+    ahead = direction[alive]
+    weight = np.ones(len(place))
+    for _ in range(orders):
+        room = np.maximum(to_box(place, ahead, CORNER, SIDES)[1], 0)
+        way = random.exponential(1 / SIGMA, len(place))
+        stays = way < room
+        place, ahead, weight = (place + way[:, None] * ahead)[stays], ahead[stays], weight[stays] * COLOR[0]
+        out = np.maximum(to_box(place, np.broadcast_to(-SUN, place.shape), CORNER, SIDES)[1], 0)
+        total += float((weight * phase(ahead @ -SUN, g) * 2 * np.pi * np.exp(-SIGMA * out)).sum())
+        u = random.random(len(place))
+        cosine = 1 - 2 * u if g == 0 else (1 + g * g - ((1 - g * g) / (1 - g + 2 * g * u)) ** 2) / (2 * g)
+        side = np.cross(ahead, np.where(np.abs(ahead[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]]))
+        side /= np.linalg.norm(side, axis=1)[:, None]
+        angle, sine = 2 * np.pi * random.random(len(place)), np.sqrt(np.maximum(1 - cosine**2, 0))
+        across = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * np.cross(ahead, side)
+        ahead = cosine[:, None] * ahead + sine[:, None] * across
+    return total / pixels
+
+
+@pytest.mark.parametrize("g", [0.0, 0.7])
+@pytest.mark.parametrize("bounces", [1, 24])
+def test_light_scattered_often(device: Device, folder: Path, g: float, bounces: int) -> None:
+    """Beside paths of NumPy, with as many orders of scattering."""
+    scene = medium(folder, lights=[LIGHTS["sun"][0]], anisotropy=g, bounces=bounces, samples=512)
+    expected = wandering(scene, g, bounces + 1, 512)
+    assert light_of(scene, device)[..., 0].mean() == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("g", [0.0, 0.8])
+@pytest.mark.parametrize("sky", ["background", "environment"])
+def test_a_white_medium_in_a_white_sky(device: Device, folder: Path, sky: str, g: float) -> None:
+    """What absorbs nothing cannot be seen where light comes from everywhere alike."""
+    around: dict[str, Any] = WHITE
+    if sky == "environment":
+        write_map(folder / "white.exr", 1.0)
+        around = {"environment": {"file": "white.exr"}, "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]}}
+    white = {"transfer": {"color": [{"at": 0, "color": [1, 1, 1]}]}, "anisotropy": g, "bounces": 64}
+    light = light_of(medium(folder, file="ball.nrrd", **white, **around), device)
+    assert light.mean() == pytest.approx(1, abs=0.003)
+    assert np.abs(light[8:16, 8:16].mean() - 1) < 0.01
+
+
+def test_a_medium_that_shines(device: Device, folder: Path) -> None:
+    """j (1 - exp(-sigma L)) / sigma, also where its opacity is 0."""
+    for opacity in (0.0, OPACITY):
+        transfer = {
+            "opacity": [{"at": 1, "opacity": opacity}],
+            "color": [{"at": 0, "color": [0, 0, 0]}],
+            "emission": [{"at": 1, "emission": [0.1, 0.02, 0.3]}],
+        }
+        scene = medium(folder, transfer=transfer, samples=512)
+        _, _, near, far = within(scene)
+        length = (far - near) / VOXEL
+        sigma = -np.log(1 - opacity)
+        way = length if opacity == 0 else -np.expm1(-sigma * length) / sigma
+        light = light_of(scene, device)
+        for channel, each in enumerate((0.1, 0.02, 0.3)):
+            assert light[..., channel].mean() == pytest.approx(each * way.mean(), rel=0.01)
+        np.testing.assert_allclose(light[..., 0], 0.1 * way, atol=0.15)
+
+
+LAMPS = {
+    "lights": [LIGHTS["disc"][0], LIGHTS["sphere"][0], LIGHTS["rectangle"][0]],
+    "environment": {"name": "studio"},
+    "bounces": 4,
+    "samples": 8,
+    "anisotropy": 0.5,
+}
+
+
+def test_every_lane_is_alone(device: Device, folder: Path) -> None:
+    """Packets show what single rays show; rounding may send one path another way."""
+    scene = medium(folder, file="waves.nrrd", **LAMPS)
+    one, many = (light_of(scene, device, lanes=lanes) for lanes in (1, 8))
+    same = np.isclose(one, many, rtol=1e-3, atol=1e-4).all(-1)
+    assert same.mean() > 0.9
+    assert one.mean() == pytest.approx(many.mean(), rel=0.05)
+    assert one.mean() > 0.05
+
+
+def test_double_precision(device: Device, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays of float64 show the same medium."""
+    scene = medium(folder, **{**LAMPS, "samples": 128})
+    single = light_of(scene, device)
+    monkeypatch.setattr(clfractal.renderers.volume, "ray_precision", lambda scene, plan: "float64")
+    double = light_of(medium(folder, **{**LAMPS, "samples": 128}), device)
+    assert double.mean() == pytest.approx(single.mean(), rel=0.02)
+
+
+def test_bounds_hold(device: Device, folder: Path) -> None:
+    """No place of a brick has more extinction than the brick's bound, and some brick's is reached."""
+    scene = medium(folder, file="waves.nrrd")
+    values = np.asarray(waves())
+    grid = grid_from_dense(
+        values, device, corner=tuple(CORNER), spacing=(VOXEL,) * 3, threshold=0.0, normal_radius=1
+    )
+    ranges = brick_ranges(grid)
+    bounds = brick_bounds(scene, grid, ranges)
+    highest = -np.log(1 - OPACITY * ranges[:, 1].astype(float))
+    assert (bounds >= highest * (1 - 1e-6)).all()
+    assert bounds.max() == pytest.approx(highest.max(), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("sections", "message"),
+    [
+        ({"fog": {"density": 0.1}}, "fog: cannot be combined with lighting.mode path in a volume"),
+        ({"cut_planes": [{}]}, "cut_planes: cannot be combined with lighting.mode path in a volume"),
+        ({"transfer": {"opacity": None}}, "lighting.mode: must be direct for a volume's surface, got path"),
+        (
+            {"transfer": {"opacity": None, "emission": [{"at": 0, "emission": [1, 1, 1]}]}},
+            "renderer.transfer.emission: needs opacity, since a surface at a level has no depth that shines",
+        ),
+        ({"anisotropy": 1.0}, "renderer.anisotropy: must be at most 0.95, got 1"),
+        (
+            {"transfer": {"emission": [{"at": 1, "emission": [1, 1, 1]}, {"at": 0, "emission": [1, 1, 1]}]}},
+            "renderer.transfer.emission.1.at: must be at least 1, the value at the stop before, got 0",
+        ),
+        ({"transfer": {"emission": [{"at": 1, "emission": [1, -1, 1]}]}}, "must be at least 0, got -1"),
+    ],
+)
+def test_what_cannot_be_is_told(folder: Path, sections: dict[str, Any], message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        medium(folder, **sections)
+    assert message in str(caught.value)
