@@ -141,7 +141,7 @@ def make_picture(picture: Picture) -> None:
             shown = Image.fromarray(_heat(film["samples"] / np.float32(panel.scene.renderer.samples)))
         elif layer:
             shown = Image.fromarray(encode8(np.stack([film[name] for name in layer], axis=-1)))
-        elif panel.show is not None:
+        elif panel.show == "left" or panel.show == "right":
             colors = np.stack([film[name] for name in "RGB"], axis=-1)
             assert panel.scene.stereo is not None
             shown = Image.fromarray(encode8(filtered(colors, panel.show, panel.scene.stereo.glasses)))

@@ -54,7 +54,9 @@ def light(film: Film) -> Floats:
 @pytest.mark.parametrize("formula", [None, HOLLOW])
 def test_the_layers_of_light_are_the_picture(formula: dict[str, Any] | None, precision: str) -> None:
     """To rounding, in every pixel, where nothing else is in the picture."""
-    more = {} if formula is None else {"formula": formula, "camera": {"position": [2, -3, 1.5], "fov": 40}}
+    more: dict[str, Any] = (
+        {} if formula is None else {"formula": formula, "camera": {"position": [2, -3, 1.5], "fov": 40}}
+    )
     film = rendered(GLOWING, background="transparent", renderer={"precision": precision}, **more)
     whole = layer(film, "")
     assert whole.max() > 0.5
