@@ -4,7 +4,7 @@
 //
 // The integral is estimated without bias whatever the steps are: a part of the way begins where the last one ends, is as long as the
 // distance found in the last one allows, and is asked at one random place of its own (a martingale). So no step shows.
-#define GLOW_BEYOND R(8.0)   // widths around the bounds: farther off is less than 1/2980
+#define GLOW_BEYOND R(32.0)  // widths around the bounds: farther off is less than e^-8, even where the estimate is a quarter
 #define GLOW_PART R(0.5)     // a part, in widths or distances, whichever are longer
 #define GLOW_PARTS 256       // most parts of a way
 

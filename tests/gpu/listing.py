@@ -83,6 +83,7 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "": {},
         "fog": {"fog": {"density": 0.05}},
         "shafts": {"fog": {"density": 0.05, "height": 2, "scattering": {}}},
+        "glow": {"glow": {"by": "trap"}},
     },
     **_OFTEN,
 }
