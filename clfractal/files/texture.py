@@ -1,4 +1,4 @@
-"""Reads pictures that surfaces show: whatever Pillow reads (PNG, JPEG, WebP, TIFF and more), and OpenEXR."""
+"""Reads pictures that surfaces show: PNG, JPEG, WebP, TIFF and BMP by Pillow, and OpenEXR."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ MAX_SIDE = 4096
 BRIGHTEST = 1e6
 
 _MOST_BYTES = 256 << 20
+# Not all that Pillow knows: some it hands to other programs.
+_FORMATS = ("PNG", "JPEG", "WEBP", "TIFF", "BMP")
 
 Floats = npt.NDArray[np.float32]
 
@@ -42,9 +44,9 @@ def _photo(path: Path, data: bytes) -> Floats:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Pillow, on pictures that are too large
-            with Image.open(io.BytesIO(data)) as picture:
+            with Image.open(io.BytesIO(data), formats=_FORMATS) as picture:
                 _check_size(path, *picture.size)
-                if picture.mode.startswith("I;16"):
+                if picture.mode.startswith("I"):  # 16 bits
                     grey = np.asarray(picture, np.float64)[..., None] / 65_535
                     codes = np.broadcast_to(grey, (*grey.shape[:2], 3))
                 else:
