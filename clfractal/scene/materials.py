@@ -57,7 +57,8 @@ class Transmission(Section):
 
     weight: Fraction = Field(0.0, description="part of the body that is glass")
     color: Reflectance = Field(
-        WHITE, description="of light that has gone through `depth` of it; with depth 0 a factor at each boundary"
+        WHITE,
+        description="of light that has gone through `depth` of it; with depth 0 a factor at each boundary",
     )
     depth: Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)] = Field(
         0.0, description="way through the set after which light has that colour, scene units"

@@ -55,7 +55,8 @@ class SurfaceRenderer(Sampled):
         description="find the surface by estimated distances, or by fixed steps and inside tests alone",
     )
     step: Length | None = Field(
-        None, description="step for `search: steps` and of ways through glass, scene units; null: 1/100 of the bounds' radius"
+        None,
+        description="step for `search: steps` and of ways through glass, scene units; null: 1/100 of the bounds' radius",
     )
     points: Points | None = Field(
         None, description="points of a pixel; null: one in its middle, or 3 x 3 where `normal` needs them"

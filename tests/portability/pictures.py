@@ -81,7 +81,18 @@ _MORE = {
 }
 _LENSES = {"still": ", f_number: 0.5"}
 # Each adds something that the others do not have; the rest are more formulas.
-_BRIEF = ("trigonometric", "mandelbox", "still", "paths", "glass", "steps", "cloud", "inside", "coverage", "plane")
+_BRIEF = (
+    "trigonometric",
+    "mandelbox",
+    "still",
+    "paths",
+    "glass",
+    "steps",
+    "cloud",
+    "inside",
+    "coverage",
+    "plane",
+)
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)

@@ -97,7 +97,11 @@ def test_the_same_both_ways() -> None:
     for roughness in (0.3, 0.8):
         one = ask(glass(roughness, ior), turned(above), turned(below), precision="float64").value
         two = ask(
-            glass(roughness, ior), turned(below * flip), turned(above * flip), precision="float64", inside=True
+            glass(roughness, ior),
+            turned(below * flip),
+            turned(above * flip),
+            precision="float64",
+            inside=True,
         ).value
         assert one.max() > 0.1
         assert np.allclose(one / -below[:, 2:] / ior**2, two / above[:, 2:], rtol=1e-3, atol=1e-9)
@@ -107,7 +111,9 @@ def test_the_same_both_ways() -> None:
 def test_samples_follow_their_density(inside: bool) -> None:
     """Counts in cells of the sphere against the density's integral over them (chi-square)."""
     count, across, around = 1 << 16, 12, 12
-    material = glass(0.7, 1.5, base=WHITE, transmission={"weight": 0.7}, coat={"weight": 0.4, "roughness": 0.5})
+    material = glass(
+        0.7, 1.5, base=WHITE, transmission={"weight": 0.7}, coat={"weight": 0.4, "roughness": 0.5}
+    )
     random = np.random.default_rng(11)
     viewers = np.repeat(toward(0.6), count, axis=0)
     places = np.clip(random.random((count, 3)), 1e-6, 1 - 1e-6)
