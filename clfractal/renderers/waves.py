@@ -10,8 +10,8 @@ and each mirror adds what follows `begin_shots` but for the points. With `lighti
 
     scatter_paths  march  gather_paths
 
-ask for light and send the next ray of each path (those within glass are marched by `march_inside` to where they leave the set), and after the last bounce `march  end_paths` finds out which rays
-leave the set. See "A shot" in docs/architecture.md.
+ask for light and send the next ray of each path (`march_inside` takes those within glass to where they leave the set), and
+after the last bounce `march  end_paths` finds out which rays leave the set. See "A shot" in docs/architecture.md.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def test_sets_of_glass_keep_light(formula: dict[str, Any], search: str) -> None:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_media_absorb_along_the_chord(precision: str) -> None:
-    """Glass that bends nothing: each pixel has what Beer and Lambert's law leaves of white on its chord through the ball."""
+    """Glass that bends nothing: pixels have what Beer and Lambert's law leaves of white on a chord of the ball."""
     color, depth = np.array([0.9, 0.5, 0.1]), 0.8
     scene = ball(0, 1.0, transmission={"color": list(color), "depth": depth})
     scene = scene.model_copy(update={"renderer": scene.surface.model_copy(update={"samples": 16})})
@@ -90,7 +90,7 @@ def test_without_a_depth_boundaries_are_tinted() -> None:
 
 
 def test_colours_spread_and_are_white_together() -> None:
-    """Under a grey gradient: without dispersion all is grey; with it red and blue come from elsewhere, but white stays white."""
+    """Under a grey gradient red and blue come from other places only with dispersion; white stays white."""
     grey = {"top": [1, 1, 1], "bottom": [0, 0, 0]}
     plain = seen(ball(0, background=grey), 16)[0]
     assert np.abs(plain[:, 0] - plain[:, 2]).max() < 1e-4

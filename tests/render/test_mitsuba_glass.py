@@ -1,7 +1,7 @@
 """A ball of glass beside Mitsuba 3: clear, rough, and of a medium that absorbs.
 
-The ball fills the picture; it stands under a sky that changes with the height and the colour, so that light which is bent the wrong
-way has the wrong colour. Regions are compared as in `test_mitsuba.py`.
+The ball fills the picture. It stands under a sky whose colour changes with the height, so that light which is bent the
+wrong way has the wrong colour. Regions are compared as in `test_mitsuba.py`.
 """
 
 from __future__ import annotations
