@@ -88,7 +88,9 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.coat_tint = color_pick(inside, color_of(R(1.0), R(1.0), R(1.0)), b.coat_tint);
     b.fuzz = color_pick(inside, color_of(R(0.0), R(0.0), R(0.0)), b.fuzz);
     const color tint = color_pick(less(R(0.0), p->transmission_depth), color_of(R(1.0), R(1.0), R(1.0)), p->transmission_color);
-    b.clear = glass_at(b.dielectric * p->transmission_weight, b.out.z, p->inside, b.ior, b.rough, b.alpha, b.root, tint, tables);
+    const real bent_root = fmin((p->bending_ior - R(1.0)) / (p->bending_ior + R(1.0)) * sqrt(p->specular_weight), R(0.98));
+    const real bending = (R(1.0) + bent_root) / (R(1.0) - bent_root);
+    b.clear = glass_at(b.dielectric * p->transmission_weight, b.out.z, p->inside, b.ior, bending, b.rough, b.alpha, b.root, tint, tables);
     b.dielectric *= R(1.0) - p->transmission_weight;
 #endif
     if (any_of(b.coat)) {
@@ -202,10 +204,10 @@ INLINE real bsdf_density(const bsdf *b, vec toward) {
 #if HAS_GLASS
     const glass *g = &b->clear;
     const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond) * fmax(i.z, R(0.0)) / BSDF_PI;
-    const real facets = b->by_gloss + b->by_glass * fresnel_across(vec_dot(b->out, h), g->across);
+    const real facets = b->by_gloss + b->by_glass * fresnel_across(vec_dot(b->out, h), g->mirrors);
     const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
     const vec bends = bending_facet(b->out, i, g->across);
-    const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->across)) * bending_density(g, b->out, i, bends);
+    const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->mirrors)) * bending_density(g, b->out, i, bends);
     const real beyond = bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI;
     return pick(b->seen, pick(less(R(0.0), i.z), sum, pick(less(i.z, R(0.0)), beyond, R(0.0))), R(0.0));
 #else
@@ -223,7 +225,7 @@ INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density
 #if HAS_GLASS
     const real before = b->by_coat + b->by_gloss, after = before + b->by_glass;
     const mask facet = ~coat & ~gloss & less(choice, after), beyond = ~coat & ~gloss & ~facet & less(choice, after + b->by_beyond);
-    const mask bends = facet & less(fresnel_across(vec_dot(b->out, h), b->clear.across), (choice - before) / b->by_glass);
+    const mask bends = facet & less(fresnel_across(vec_dot(b->out, h), b->clear.mirrors), (choice - before) / b->by_glass);
     vec i = vec_pick(coat | gloss | facet, mirrored, around);
     i = vec_pick(bends, refracted_at(b->out, h, b->clear.across), i);
     i.z = pick(beyond, -i.z, i.z);

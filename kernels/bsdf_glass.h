@@ -9,7 +9,8 @@
 
 typedef struct {
     real weight;             // part of the surface that is glass
-    real across;             // index of the side beyond over the viewer's
+    real across;             // index of the side beyond over the viewer's ...
+    real mirrors;            // ... and as reflectances have it: the mean of all colours, where they part only now
     real alpha, rough, root;
     mask inside;             // whether the viewer is
     color tint;              // of what crosses the boundary
@@ -32,13 +33,14 @@ INLINE albedo glass_albedo(__global const float *tables, real cosine, const glas
 }
 
 // `cosine`: of the viewer's direction with the normal on its side.
-INLINE glass glass_at(real weight, real cosine, real inside, real ior, real rough, real alpha, real root, color tint,
+INLINE glass glass_at(real weight, real cosine, real inside, real ior, real bending, real rough, real alpha, real root, color tint,
                       __global const float *tables) {
     glass g;
-    const real index = fmax(ior, GLASS_LEAST);
+    const real index = fmax(bending, GLASS_LEAST), mean = fmax(ior, GLASS_LEAST);
     g.weight = weight;
     g.inside = less(R(0.5), inside);
     g.across = pick(g.inside, R(1.0) / index, index);
+    g.mirrors = pick(g.inside, R(1.0) / mean, mean);
     g.alpha = alpha;
     g.rough = rough;
     g.root = root;
@@ -87,7 +89,7 @@ INLINE real bending_density(const glass *g, vec o, vec i, vec h) {
 // f * cosine of light from the viewer's side, but for the tint; `single` is GGX's with a reflectance of 1.
 INLINE real glass_reflects(const glass *g, vec o, vec i, vec h, real single, __global const float *tables) {
     const real other = R(1.0) - glass_albedo(tables, i.z, g, 0).of_direction;
-    return single * fresnel_across(vec_dot(o, h), g->across)
+    return single * fresnel_across(vec_dot(o, h), g->mirrors)
            + (R(1.0) - g->crosses) * g->lost * other / (BSDF_PI * g->mean_lost) * i.z;
 }
 
@@ -96,7 +98,7 @@ INLINE color glass_passes(const glass *g, vec o, vec i, __global const float *ta
     const vec h = bending_facet(o, i, g->across);
     const vec up = vec_of(i.x, i.y, fmax(-i.z, R(1e-6)));
     const real other = R(1.0) - glass_albedo(tables, up.z, g, 1).of_direction;
-    const real once = bending_density(g, o, i, h) * (R(1.0) - fresnel_across(vec_dot(o, h), g->across))
+    const real once = bending_density(g, o, i, h) * (R(1.0) - fresnel_across(vec_dot(o, h), g->mirrors))
                       / (R(1.0) + ggx_lambda(up, g->alpha));
     return color_scale(g->tint, once + g->crosses * g->lost * other / (BSDF_PI * g->mean_beyond) * up.z);
 }

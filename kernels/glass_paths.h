@@ -27,7 +27,9 @@ INLINE color glass_met(const carried *with, pbr *p, real *wave, __global const f
     const color weights = spectrum_at(fmax(*wave, R(0.0)), &bend, tables + SPECTRUM);
     const real spread = p->transmission_dispersion_scale / p->transmission_dispersion_abbe_number;
     const real index = p->specular_ior + (p->specular_ior - R(1.0)) * spread * bend;
-    p->specular_ior = pick(spreads, fmax(index, R(1.0)), p->specular_ior);
+    p->bending_ior = pick(spreads, fmax(index, R(1.0)), p->specular_ior);
+    // A path of all colours is reflected like their mean, so that those which are refracted are white together.
+    p->specular_ior = pick(fresh, p->specular_ior, p->bending_ior);
     return color_pick(fresh, weights, white);
 }
 

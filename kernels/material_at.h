@@ -21,6 +21,7 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
         numbers[m->number + 2] = found.b;
     }
 #endif
+    p.bending_ior = p.specular_ior;
     // Of a blend's parts what they reflect and shine is mixed, not the factors of it.
     p.base_color = color_scale(p.base_color, p.base_weight);
     p.emission_color = color_scale(p.emission_color, p.emission_luminance);

@@ -7,7 +7,9 @@ They follow those of `scattering.py` in the buffer, and the kernels `bsdf_glass.
     wavelengths               [WAVELENGTHS + 1][4]
 
 The first two are albedos, without the light that is lost between facets; the root of the reflectance at normal incidence is
-(j / REFLECTANCES)^2, since light from inside changes most near an index of 1. A row of the third is a place in the spectrum, of
+(j / REFLECTANCES)^2, since light from inside changes most near an index of 1.
+
+A row of the third is a place in the spectrum, of
 which all are equally likely: how much more than the index of refraction at 587.6 nm the index is there, in parts of the
 difference between 486.1 nm and 656.3 nm; and the weights of linear Rec. 709, whose mean over all places is 1.
 """
@@ -68,8 +70,10 @@ def glass_albedos() -> Doubles:
 
 
 def fresnel_across(cosine: Doubles, across: float) -> Doubles:
-    """The reflectance of a smooth boundary for unpolarised light, 1 where it reflects all; `across`: the index beyond over the
-    one before."""
+    """The reflectance of a smooth boundary for unpolarised light, 1 where it reflects all.
+
+    `across` is the index of refraction beyond it over the one before it.
+    """
     square = across * across - 1 + cosine * cosine
     g = np.sqrt(np.maximum(square, 0.0))
     a = (g - cosine) / np.maximum(g + cosine, 1e-12)

@@ -90,7 +90,9 @@ def pbr_text() -> str:
         read = f"color_splat(m->{field.name})" if field.count else f"(real)(m->{field.name})"
         own = f"m->base_own ? {read} : tint" if field.name == "base_color" else read
         lines.append(f"    p.{field.name} = {own};")
-    return "\n".join([*lines, "    p.inside = R(0.0);", "    return p;", "}", ""])
+    return "\n".join(
+        [*lines, "    p.inside = R(0.0);", "    p.bending_ior = p.specular_ior;", "    return p;", "}", ""]
+    )
 
 
 def scattering_defines() -> dict[str, object]:

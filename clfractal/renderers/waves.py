@@ -11,8 +11,8 @@ With `lighting.mode: path` in the place of the last two
 
     scatter_paths  march  gather_paths
 
-ask for light and send the next ray of each path (those within glass are marched by `march_inside` to where they leave the set), and after the last bounce `march  end_paths` finds out which rays
-leave the set. See "A shot" in docs/architecture.md.
+ask for light and send the next ray of each path (`march_inside` takes those within glass to where they leave the set), and
+after the last bounce `march  end_paths` finds out which rays leave the set. See "A shot" in docs/architecture.md.
 """
 
 from __future__ import annotations

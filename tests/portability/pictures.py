@@ -74,8 +74,8 @@ _MORE = {
     "materials: {clay: {base: {color: [0.8, 0.5, 0.3], diffuse_roughness: 0.5, metalness: 0.2}, coat: {weight: 0.3},"
     " fuzz: {weight: 0.2}, emission: {luminance: 0.05}}}\nmaterial: {name: clay}\n",
     "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
-    "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2}, transmission: {weight: 0.9, color: [0.6, 0.9, 0.8],"
-    " depth: 1, dispersion_scale: 0.5}}}\nmaterial: {name: glass}\n",
+    "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
+    " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5}}}\nmaterial: {name: glass}\n",
     "quaternion": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]\n",
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
