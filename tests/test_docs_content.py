@@ -133,6 +133,14 @@ PATHS = {
     "A number": "NumberMap",
     "A colour": "ColorMap",
 }
+OBJECTS = {
+    "plane": "PlaneObject",
+    "water": "WaterObject",
+    "waves": "Waves",
+    "sphere": "SphereObject",
+    "box": "BoxObject",
+    "cylinder": "CylinderObject",
+}
 ANIMATION = {
     "animation": "Animation",
     "animation.tracks": "Track",
@@ -217,7 +225,8 @@ def expected_rows(name: str) -> list[list[str]]:
 
 
 def test_every_part_of_a_scene_is_described() -> None:
-    told = {*SECTIONS.values(), *CUT_PLANES.values(), *VOLUMES.values(), *ANIMATION.values(), *PATHS.values()}
+    pages = (SECTIONS, CUT_PLANES, VOLUMES, ANIMATION, PATHS, OBJECTS)
+    told = {name for page in pages for name in page.values()}
     assert told == set(load.schema()["$defs"])
     keys = {code(row[0]) for row in table("scenes.md", "The top level")}
     assert keys == set(load.schema()["properties"])
@@ -247,6 +256,12 @@ def test_keys_defaults_and_ranges_of_volumes(heading: str) -> None:
 def test_keys_defaults_and_ranges_of_paths(heading: str) -> None:
     told = [row[:3] for row in table("paths.md", heading)]
     assert sorted(told) == sorted(expected_rows(PATHS[heading]))
+
+
+@pytest.mark.parametrize("heading", OBJECTS)
+def test_keys_defaults_and_ranges_of_objects(heading: str) -> None:
+    told = [row[:3] for row in table("objects.md", heading)]
+    assert sorted(told) == sorted(expected_rows(OBJECTS[heading]))
 
 
 @pytest.mark.parametrize("heading", ANIMATION)

@@ -317,7 +317,7 @@ def march_record(
         "map_rays": rays.map,
         "ambient_far": distance if not rays.lit else largest,
         "occlusion_distance": distance,
-        "occlusion_share": 1 / rays.cosine if occlusion is not None else 0.0,
+        "occlusion_share": 1 / rays.cosine if occlusion is not None and rays.cosine else 0.0,
         "firefly_limit": largest if limit is None else min(limit, largest),
     }
     return MARCH.value(precision, values)

@@ -274,3 +274,18 @@ def test_both_modes_show_an_object_about_alike(device: Device, name: str, materi
         return
     np.testing.assert_allclose(direct.mean(axis=0), path.mean(axis=0), rtol=0.2)
     assert np.corrcoef(direct[:, 0], path[:, 0])[0, 1] > 0.95
+
+
+def test_ambient_occlusion_is_not_used_along_paths(device: Device) -> None:
+    found = []
+    for occlusion in (None, {"rays": 4}):
+        scene = scene_of(
+            NOWHERE,
+            FROM_ABOVE,
+            (16, 16),
+            objects={"ball": {"type": "sphere", "radius": 0.8}},
+            lighting={"mode": "path", "bounces": 1},
+            renderer={"ambient_occlusion": occlusion},
+        )
+        found.append(colors(shoot(scene, device)))
+    np.testing.assert_array_equal(found[0], found[1])

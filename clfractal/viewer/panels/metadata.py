@@ -214,7 +214,7 @@ def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
     if sections and len(sections) == len(options):
         kind = "section"
     low, high = bounds.get("low"), bounds.get("high")
-    if kind == "vector" and size == 3 and low == 0:
+    if kind == "vector" and size == 3 and low == 0 and "low_open" not in bounds:
         kind = "color"
     usual = _usual(section, name, kind, low, high)
     log = usual is not None and by_magnitude(usual)
