@@ -345,7 +345,7 @@ def brick_bounds(scene: Scene, grid: Grid, ranges: Floats) -> Floats:
     level = np.log2(last - first + 1).astype(int)
     stacked = np.stack(levels)
     bounds = np.maximum(stacked[level, first], stacked[level, last + 1 - 2**level])
-    return (bounds * (1 + 1e-5)).astype(np.float32)
+    return np.asarray(bounds * (1 + 1e-5), np.float32)
 
 
 def full_sample(grid: Grid) -> float:

@@ -60,7 +60,7 @@ def shown(
         folder=folder,
     )
     near, far = to_box(*rays(scene)[:2], CORNER, np.full(3, SIDE))
-    return stacked(shoot(scene, device), "RGB"), np.maximum(far - near, 0) / VOXEL
+    return stacked(shoot(scene, device), "RGB").astype(float), np.maximum(far - near, 0) / VOXEL
 
 
 @pytest.mark.parametrize("opacity", [0.0, 0.02, 0.3, 1.0])

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import clfractal.renderers.volume
@@ -94,14 +95,16 @@ def within(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
     return origin, direction, near, np.maximum(far, near)
 
 
-def assert_alike(light: Floats, expected: Floats, error: float, share: float = 0.01) -> None:
+def assert_alike(
+    light: npt.NDArray[Any], expected: npt.NDArray[Any], error: float, share: float = 0.01
+) -> None:
     """In all within a hundredth; each pixel within five standard errors of one whose value is about 1."""
     assert light.mean() == pytest.approx(expected.mean(), rel=share)
     assert np.abs(light - expected).max() < 5 * error
 
 
-WHITE = {"background": {"top": [1, 1, 1], "bottom": [1, 1, 1]}}
-BLACK = {"transfer": {"color": [{"at": 0, "color": [0, 0, 0]}]}}
+WHITE: dict[str, Any] = {"background": {"top": [1, 1, 1], "bottom": [1, 1, 1]}}
+BLACK: dict[str, Any] = {"transfer": {"color": [{"at": 0, "color": [0, 0, 0]}]}}
 
 
 def test_what_comes_through(device: Device, folder: Path) -> None:
@@ -252,7 +255,11 @@ def test_a_white_medium_in_a_white_sky(device: Device, folder: Path, sky: str, g
     if sky == "environment":
         write_map(folder / "white.exr", 1.0)
         around = {"environment": {"file": "white.exr"}, "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]}}
-    white = {"transfer": {"color": [{"at": 0, "color": [1, 1, 1]}]}, "anisotropy": g, "bounces": 64}
+    white: dict[str, Any] = {
+        "transfer": {"color": [{"at": 0, "color": [1, 1, 1]}]},
+        "anisotropy": g,
+        "bounces": 64,
+    }
     light = light_of(medium(folder, file="ball.nrrd", **white, **around), device)
     assert light.mean() == pytest.approx(1, abs=0.003)
     assert np.abs(light[8:16, 8:16].mean() - 1) < 0.01
@@ -277,7 +284,7 @@ def test_a_medium_that_shines(device: Device, folder: Path) -> None:
         np.testing.assert_allclose(light[..., 0], 0.1 * way, atol=0.15)
 
 
-LAMPS = {
+LAMPS: dict[str, Any] = {
     "lights": [LIGHTS["disc"][0], LIGHTS["sphere"][0], LIGHTS["rectangle"][0]],
     "environment": {"name": "studio"},
     "bounces": 4,
