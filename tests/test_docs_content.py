@@ -94,6 +94,7 @@ SECTIONS = {
     "coloring.trap": "Trap",
     "background": "Gradient",
     "environment": "Environment",
+    "environment.sky": "Sky",
     "fog": "Fog",
     "fog.scattering": "Scattering",
     "glow": "Glow",
@@ -119,6 +120,7 @@ VOLUMES = {
     "renderer.transfer": "Transfer",
     "renderer.transfer.opacity": "OpacityStop",
     "renderer.transfer.color": "ColorStop",
+    "renderer.transfer.emission": "EmissionStop",
 }
 PATHS = {
     "lighting, direct": "DirectLighting",
