@@ -220,7 +220,7 @@ INLINE real bsdf_density(const bsdf *b, vec toward) {
 // A direction chosen by three numbers in (0, 1).
 INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density) {
     const mask coat = less(choice, b->by_coat), gloss = ~coat & less(choice, b->by_coat + b->by_gloss);
-    const vec h = ggx_facet(b->out, pick(coat, b->coat_alpha, b->alpha), u, v), mirrored = mirrored_at(b->out, h);
+    const vec h = ggx_facet(b->out, pick(coat, b->coat_alpha, b->alpha), u, v), mirrored = mirrored_by(b->out, h);
     const vec around = hemisphere_direction(vec_of(R(0.0), R(0.0), R(1.0)), u, v);
 #if HAS_GLASS
     const real before = b->by_coat + b->by_gloss, after = before + b->by_glass;

@@ -38,7 +38,7 @@ INLINE vec ggx_facet(vec o, real alpha, real u, real v) {
 }
 
 // The direction that `o` is mirrored to there; it may be below the surface.
-INLINE vec mirrored_at(vec o, vec h) { return vec_sub(vec_scale(h, R(2.0) * vec_dot(o, h)), o); }
+INLINE vec mirrored_by(vec o, vec h) { return vec_sub(vec_scale(h, R(2.0) * vec_dot(o, h)), o); }
 
 // The reflectance of a dielectric's boundary from outside (exact, unpolarised).
 INLINE real fresnel_dielectric(real cosine, real ior) {

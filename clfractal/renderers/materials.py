@@ -81,7 +81,8 @@ def pbr_text() -> str:
     ]
     lines += [f"    {kinds[field.count]} {field.name};" for field in PARAMETERS]
     lines += [
-        "    real inside;   // whether the viewer is inside glass",
+        "    real inside;        // whether the viewer is inside the glass",
+        "    real bending_ior;   // the index that bends light, of one colour of it",
         "} pbr;",
         "// `tint`: the colouring's colour.",
     ]
