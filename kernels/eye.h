@@ -43,9 +43,12 @@ INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world 
 // Sends a ray for all that it may meet. The march ends at the nearest object, and is left out where that is nearer than `enough`.
 INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask wanted, world w) {
 #if HAS_OBJECTS
-    real number;
+    real number = R(0.0), met = (real)(REAL_LARGEST);
     __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
-    const real met = pick(wanted, objects_met(&r, w.objects, w.settings->object_count, &number), (real)(REAL_LARGEST));
+    if (any_lane(wanted)) {
+        const real nearest = objects_met(&r, w.objects, w.settings->object_count, &number);
+        met = pick(wanted, nearest, met);
+    }
     lanes_store(met, at + RAY_OBJECT * s.q.stride);
     lanes_store(number, at + RAY_OBJECT_NUMBER * s.q.stride);
     r.far = fmin(r.far, met);

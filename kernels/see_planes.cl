@@ -35,7 +35,9 @@ STAGE(find_faces) {
     face.normal = vec_of(R(0.0), R(0.0), R(0.0));
     mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
 #if HAS_OBJECTS
-    bare &= less(face.t, lanes_load(s.q.rays + RAY_OBJECT * s.q.stride + s.slot));
+    const ray whole = eye_ray(&a, view);
+    real number;
+    bare &= less(face.t, objects_met(&whole, w.objects, settings->object_count, &number));
 #endif
     face.bare = number_of(bare);
     STATE_KEEP(s, face, STATE_FACE);

@@ -32,6 +32,9 @@ kernels/eye.h: render/surface_analytic render/lens_and_fog render/surface_rays
 kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
 kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
 kernels/surface*: render/surface_light render/surface_rays render/pixel_points
+kernels/objects.h: render/objects render/objects_light
+kernels/water.h: render/objects
+kernels/look.h: render/objects_light render/surface_light
 kernels/march_steps.h: render/searches
 kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
 kernels/orbit.h: formulas/counts formulas/distance render/points render/surface_analytic

@@ -69,10 +69,15 @@ _RENDERERS = {
 _MORE = {
     "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\n"
     "fog: {density: 0.05, height: 3, scattering: {anisotropy: 0.3}}\n",
-    "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n",
+    "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n"
+    "materials: {steel: {base: {metalness: 1}, specular: {roughness: 0.2}}}\n"
+    "objects: {post: {type: cylinder, position: [0.4, -0.9, 0], rotation: [30, 10, 0], material: steel},"
+    " box: {type: box, position: [-0.8, -0.8, 0.2], size: [0.4, 0.3, 0.5], rotation: [0, 0, 25]}}\n",
     "paths": "lighting: {mode: path, bounces: 3, roulette: 1}\nenvironment: {name: studio}\n"
     "materials: {clay: {base: {color: [0.8, 0.5, 0.3], diffuse_roughness: 0.5, metalness: 0.2}, coat: {weight: 0.3},"
-    " fuzz: {weight: 0.2}, emission: {luminance: 0.05}}}\nmaterial: {name: clay}\n",
+    " fuzz: {weight: 0.2}, emission: {luminance: 0.05}}}\nmaterial: {name: clay}\n"
+    "objects: {sea: {type: water, position: [0, 0, -0.7], material: clay}, floor: {type: plane, position: [0, 0, -1]},"
+    " ball: {position: [0.6, -0.9, 0.2], radius: 0.3, scale: [1, 1, 2], material: clay}}\n",
     "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
     "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
     " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5}}}\nmaterial: {name: glass}\n",

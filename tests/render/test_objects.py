@@ -205,7 +205,8 @@ def test_points_of_a_pixel_find_objects_on_their_own_rays(device: Device) -> Non
     assert (np.abs(film["A"] - expected) > 1e-5).sum() <= 1
 
 
-def test_an_object_hides_the_face_of_a_cut(device: Device) -> None:
+@pytest.mark.parametrize("points", [1, 9])
+def test_an_object_hides_the_face_of_a_cut(device: Device, points: int) -> None:
     plane = {"center": [0, 0, 0], "normal": [0, -1, 0]}
     camera = {"position": [0, -4, 0], "target": [0, 0, 0], "fov": 40}
     ball = {"type": "sphere", "position": [0.3, -1.5, 0.2], "radius": 0.3}
@@ -214,6 +215,7 @@ def test_an_object_hides_the_face_of_a_cut(device: Device) -> None:
         camera,
         (40, 40),
         objects={"ball": ball},
+        renderer={"points": {"pattern": "grid", "count": points}},
         cut_planes=[{"plane": plane, "cut": True, "opacity": 0}],
     )
     film = shoot(scene, device)
@@ -222,8 +224,9 @@ def test_an_object_hides_the_face_of_a_cut(device: Device) -> None:
     view = view_of(scene)
     depth = (points_of(film) - view.origin) @ view.axis
     assert on_ball.sum() > 40
-    assert (depth[on_ball] < 2.6).all()
-    face = (film["A"] == 1) & ~on_ball
+    # With several points a pixel of its rim may show the face.
+    assert (depth[on_ball] < 2.6).sum() >= on_ball.sum() - (0 if points == 1 else 2)
+    face = (film["A"] == 1) & (film["Z"] > 2.6)
     assert face.sum() > 200
     np.testing.assert_allclose(film["Z"][face], 4, atol=0.05)
 
