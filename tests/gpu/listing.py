@@ -50,6 +50,22 @@ _GLASS = {
     "materials": {"glass": {"transmission": {"weight": 1, "dispersion_scale": 1}}},
     "material": {"name": "glass"},
 }
+_MAPS = {
+    "lighting": {"mode": "path"},
+    "materials": {
+        "gold": {
+            "base": {"color": {"by": "trap", "palette": ["#fff", "#840"]}, "metalness": 1},
+            "specular": {"roughness": {"by": "iterations", "curve": [[0, 0.1], [1, 0.6]]}},
+        },
+        "clay": {"base": {"weight": {"by": "curvature"}}},
+        "both": {"blend": ["gold", "clay"], "mask": {"by": "normal"}},
+    },
+    "material": {"name": "both"},
+}
+_OBJECTS = {
+    "sea": {"type": "water", "position": [0, 0, -3], "material": "wood"},
+    "ball": {"type": "sphere", "position": [3, 0, 0], "radius": 1, "material": "wood"},
+}
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
@@ -70,7 +86,8 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
-    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}, "glass": _GLASS},
+    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}, "glass": _GLASS, "maps": _MAPS},
+    "objects": {"": {}, "objects": {"objects": _OBJECTS, "materials": {"wood": {}}}},
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
     "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
@@ -88,6 +105,7 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     **_OFTEN,
 }
 _STOPS = [{"at": 0.05, "opacity": 0}, {"at": 1, "opacity": 0.6}]
+_SHINES = [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [1, 0.5, 0]}]
 _TINTS = [{"at": 0, "color": [1, 0, 0]}, {"at": 1, "color": [0, 0, 1]}]
 _VOLUME: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in ("mandelbulb", "hast")},
@@ -96,8 +114,10 @@ _VOLUME: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "transfer": {
         "level": {},
         "opacity": {"renderer": {"transfer": {"opacity": _STOPS}}},
+        "shining": {"renderer": {"transfer": {"opacity": _STOPS, "emission": _SHINES}}},
         "tinted": {"renderer": {"transfer": {"opacity": _STOPS, "color": _TINTS}}},
     },
+    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}},
     "shadows": {"": {}, "shadows": {"renderer": {"shadows": True}}},
     "places": {"": {}, "nearest": {"renderer": {"interpolation": "nearest"}}},
     "coloring": {"solid": {}, "normal": {"coloring": {"by": "normal"}}},
@@ -114,12 +134,16 @@ _APART = {
     # Each sample of a path finds a spot of its own.
     *(
         frozenset({("lighting", light), ("points", name)})
-        for light in ("path", "glass")
+        for light in ("path", "glass", "maps")
         for name in _SURFACE["points"]
         if name
     ),
-    *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass")),
-    *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass")),
+    *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass", "maps")),
+    *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass", "maps")),
+}
+_OF_MEDIA = {
+    frozenset({("lighting", "path"), ("transfer", "level")}),
+    frozenset({("lighting", "path"), ("planes", "planes")}),
 }
 _FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
 
@@ -136,7 +160,9 @@ class Listed:
 def paired() -> Iterator[Listed]:
     """Programs that have every pair of a renderer's features, number types included, and one of each other kind."""
     for renderer, features in _FEATURES.items():
-        for chosen in covering({**features, "precision": PRECISIONS}, _APART):
+        for chosen in covering(
+            {**features, "precision": PRECISIONS}, _OF_MEDIA if renderer == "volume" else _APART
+        ):
             yield from _of_choice(renderer, chosen)
     for precision in PRECISIONS:
         for name, text in programs.of_others(1, precision):
