@@ -73,6 +73,7 @@ def test_every_field_of_every_section_is_understood() -> None:
         "resolution",
         "size",
         "opacity",
+        "emission",
         "views",
         "area",
         "colors",

@@ -62,7 +62,7 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Material.shininess": (1, 1000),
     **{
         f"{kind}Light.temperature": (1500, 12_000)
-        for kind in ("Directional", "Point", "Spot", "Sphere", "Rectangle")
+        for kind in ("Directional", "Point", "Spot", "Sphere", "Rectangle", "Set")
     },
     **{f"{kind}Light.intensity": (0, 4) for kind in ("Spot", "Sphere", "Rectangle")},
     "DirectionalLight.intensity": (0, 4),

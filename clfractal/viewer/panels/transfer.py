@@ -22,6 +22,7 @@ from clfractal.viewer.panels.ui import Ui
 Stops = list[dict[str, Any]]
 _HEIGHT, _STRIP, _REACH = 120.0, 16.0, 9.0
 _OPACITY, _COLOR = "renderer.transfer.opacity", "renderer.transfer.color"
+_EMISSION = "renderer.transfer.emission"
 _FAR = 60.0
 _SEGMENTS = 64
 
@@ -52,13 +53,35 @@ def draw(ui: Ui) -> None:
     w.problem(ui, _COLOR)
     if color is not None and not w.filtering(ui):
         _strip(ui, color, low, high)
+    if opacity is not None:
+        _light(ui, low, high)
+
+
+def _light(ui: Ui, low: float, high: float) -> None:
+    """Whether values shine by themselves; which of them, and how brightly, is written in the file."""
+    found = plain(w.value(ui, _EMISSION))
+    tip = "high values shine; the stops in the file say how brightly"
+    width = w.row(ui, "Shines", path=_EMISSION, tip=tip, differs=found is not None)
+    if width is not None and w.toggle(_EMISSION, found is not None):
+        kept = ui.memory.setdefault("transfer.kept", {})
+        if found is not None:
+            kept["emission"] = found
+            ui.studio.edit({_EMISSION: None})
+            return
+        first = [
+            {"at": (low + high) / 2, "emission": [0.0, 0.0, 0.0]},
+            {"at": high, "emission": [0.05, 0.015, 0.002]},
+        ]
+        ui.studio.edit({_EMISSION: kept.get("emission") or first})
+    w.problem(ui, _EMISSION)
 
 
 def _switch_opacity(ui: Ui, on: bool, low: float, high: float) -> None:
     kept = ui.memory.setdefault("transfer.kept", {})
     if not on:
         kept["opacity"] = plain(w.value(ui, _OPACITY))
-        ui.studio.edit({_OPACITY: None})
+        kept["emission"] = plain(w.value(ui, _EMISSION)) or kept.get("emission")
+        ui.studio.edit({_OPACITY: None, _EMISSION: None})
         return
     span = high - low
     first = [
