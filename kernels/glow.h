@@ -13,7 +13,7 @@ INLINE real glow_along(ray r, mask active, bits seed, tally *cost, world w, __co
                        __constant const scalar *k) {
     __constant const struct Material *m = w.material;
     const real width = (real)(m->glow_width), widest = (real)(w.settings->bounds_radius);
-    const real least_part = (r.far - r.near) * R(1.0 / 256.0);
+    const real least_part = (r.far - r.near) * R(0.00390625);
     real sum = R(0.0), t = r.near, part = fmax(GLOW_PART * width, least_part);
     for (int i = 0; i < GLOW_PARTS; ++i) {
         active &= less(t, r.far);

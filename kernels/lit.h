@@ -14,7 +14,8 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
 
 #if HAS_SET_LIGHTS
 // The light of one of the rays to balls on the set. (After the lights stands one that is white, for them.)
-INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, tally *cost, world w) {
+INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, look l,
+                          tally *cost, world w) {
     const place_in_pass place = place_of_packet(s.span, s.packet, s.tile);
     const encounter met = queue_met(s.q, turn, s.slot);
     tally_met(cost, met, 0);
@@ -22,7 +23,7 @@ INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, in
     mask shadow;
     const int number = s.sample * w.settings->set_rays + of_set;
     const incidence in = set_incidence(here->point, here->normal, &place.at, number, s.bounce, w, &shines, &shadow);
-    const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, w.material);
+    const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, l);
     return color_scale(color_mul(white, shines), (real)(S(1.0) / (scalar)w.settings->set_rays));
 }
 #endif
@@ -47,7 +48,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
 #if HAS_SET_LIGHTS
         const int of_set = number - w.settings->light_count * w.settings->light_rays;
         if (of_set >= 0) {
-            gathered = color_add(gathered, set_gathered(s, here, to_viewer, turn, of_set, open, cost, w));
+            gathered = color_add(gathered, set_gathered(s, here, to_viewer, turn, of_set, open, l, cost, w));
             continue;
         }
 #endif
