@@ -263,8 +263,8 @@ class Session:
         return _Gathering(wanted, job if scene.animation is None else self._prepared(scene), seconds)
 
     def _prepared(self, scene: Scene) -> Job:
-        # Stills are denoised, not what moves.
-        scene = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
+        if scene.output.denoise:  # stills are, not what moves
+            scene = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
         return prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
 
     def _is_shown(self, wanted: Wanted) -> bool:

@@ -35,11 +35,24 @@ def fill(film: Film) -> np.ndarray:
 
 
 def test_the_table_of_channels() -> None:
-    assert " ".join(ALL) == "R G B A Z N.X N.Y N.Z P.X P.Y P.Z iterations steps samples"
+    assert " ".join(ALL) == (
+        "R G B A Z N.X N.Y N.Z P.X P.Y P.Z iterations steps samples albedo.R albedo.G albedo.B emission.R emission.G"
+        " emission.B direct.R direct.G direct.B indirect.R indirect.G indirect.B normal.X normal.Y normal.Z noisy.R"
+        " noisy.G noisy.B"
+    )
     assert DEFAULT_CHANNELS == ("R", "G", "B", "A", "Z")
     assert [name for name in ALL if CHANNELS[name].fill != 0] == ["Z"]
     assert CHANNELS["Z"].fill == np.inf
-    assert [name for name in ALL if CHANNELS[name].kind == "color"] == ["R", "G", "B", "A"]
+    colors = [name for name in ALL if CHANNELS[name].kind == "color"]
+    assert [name for name in colors if "." not in name] == ["R", "G", "B", "A"]
+    assert {name.split(".")[0] for name in colors[4:]} == {
+        "albedo",
+        "emission",
+        "direct",
+        "indirect",
+        "normal",
+        "noisy",
+    }
 
 
 def test_wrong_channel_names() -> None:

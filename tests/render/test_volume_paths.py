@@ -242,9 +242,9 @@ def wandering(scene: Scene, g: float, orders: int, count: int) -> float:
 @pytest.mark.parametrize("bounces", [1, 24])
 def test_light_scattered_often(device: Device, folder: Path, g: float, bounces: int) -> None:
     """Beside paths of NumPy, with as many orders of scattering."""
-    scene = medium(folder, lights=[LIGHTS["sun"][0]], anisotropy=g, bounces=bounces, samples=512)
-    expected = wandering(scene, g, bounces + 1, 512)
-    assert light_of(scene, device)[..., 0].mean() == pytest.approx(expected, rel=0.02)
+    scene = medium(folder, lights=[LIGHTS["sun"][0]], anisotropy=g, bounces=bounces, samples=2048)
+    expected = wandering(scene, g, bounces + 1, 2048)
+    assert light_of(scene, device)[..., 0].mean() == pytest.approx(expected, rel=0.015)
 
 
 @pytest.mark.parametrize("g", [0.0, 0.8])

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from clfractal.errors import FormulaError, SceneError
-from clfractal.files.channels import CHANNELS
+from clfractal.files.channels import RAY_CHANNELS
 from clfractal.formulas import catalog
 from clfractal.scene import environment
 from clfractal.scene.load import dump_scene, load_scene, schema
@@ -212,8 +212,8 @@ sections = optional(
     background=st.just("transparent") | optional(top=color, bottom=color),
     output=optional(
         exposure=st.floats(-100, 100),
-        channels=st.lists(st.sampled_from(list(CHANNELS)), min_size=1, unique=True),
-        precision=st.dictionaries(st.sampled_from(list(CHANNELS)), st.sampled_from(["half", "float"])),
+        channels=st.lists(st.sampled_from(RAY_CHANNELS), min_size=1, unique=True),
+        precision=st.dictionaries(st.sampled_from(RAY_CHANNELS), st.sampled_from(["half", "float"])),
         png_bits=st.sampled_from([8, 16]),
     ),
 )
