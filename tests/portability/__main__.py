@@ -109,7 +109,7 @@ def _picture_faults(
         for part in range(PARTS[each])[half::2]:
             pictures = _pictures(implementation, each, part)
             pictures.unlink(missing_ok=True)
-            module = ["tests.portability.pictures", str(pictures), each, str(part)]
+            module = ["tests.portability.pictures", str(pictures), each, str(part), *implementation.left_out]
             if not _run(implementation.command(module, environment), environment):
                 found.append(f"the {each} pictures fail")
     return found

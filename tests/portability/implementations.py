@@ -49,6 +49,8 @@ class Implementation:
     root: Callable[[], Path] | None = None
     """Makes the system in a folder that it runs in (`trixie.py`)."""
     variables: tuple[tuple[str, str], ...] = ()
+    left_out: tuple[str, ...] = ()
+    """Pictures whose programs its compiler does not end in any useful time."""
 
     def command(self, module: Sequence[str], environment: Mapping[str, str]) -> list[str]:
         """The command for `python -m MODULE...` on it."""
@@ -144,6 +146,7 @@ IMPLEMENTATIONS = (
         _of_trixie("rusticl.icd"),
         root=_trixie,
         variables=(("RUSTICL_ENABLE", "llvmpipe"), ("RUSTICL_FEATURES", "fp64")),
+        left_out=("paths", "glass"),
     ),
     Implementation("oclgrind", "oclgrind", _oclgrind, simulator=True),
 )
