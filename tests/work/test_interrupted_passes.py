@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,27 @@ def scene_with(kind: str, size: tuple[int, int] = SIZE, **settings: object) -> S
     return scene_of(formula, PERSPECTIVE, size, renderer=renderer, lights=lights)
 
 
+class Impatient(CancelToken):
+    """Ends work when it was asked so many times whether to: within a pass of one launch, too."""
+
+    def __init__(self, questions: int) -> None:
+        super().__init__()
+        self.questions = questions
+
+    def _ask(self) -> None:
+        self.questions -= 1
+        if self.questions < 0:
+            self.cancel()
+
+    def __call__(self) -> bool:
+        self._ask()
+        return super().__call__()
+
+    def check(self) -> None:
+        self._ask()
+        super().check()
+
+
 class Interrupted:
     """Renders a picture in passes, of which each is interrupted a few times."""
 
@@ -57,13 +79,14 @@ class Interrupted:
         for samples in ranges:
             for _ in range(tries):
                 self.try_once(samples)
+            self.attempt(Impatient(int(self.random.integers(0, 3))), samples)
             film = Film(self.plan.channels, self.size, self.plan.region)
             run(self.job, [film], self.executor, samples=samples)
         return film
 
     def try_once(self, samples: tuple[int, int]) -> None:
         """A pass that is told to end after a random number of launches, or at a random time within one."""
-        token, film = CancelToken(), Film(self.plan.channels, self.size, self.plan.region)
+        token = CancelToken()
         launches = int(self.random.integers(0, 12))
         timer = threading.Timer(float(self.random.random() ** 2 * 0.02), token.cancel)
         seen = 0
@@ -77,19 +100,17 @@ class Interrupted:
         by_time = self.random.random() < 0.5
         if by_time:
             timer.start()
+        self.attempt(token, samples, None if by_time else progress)
+        timer.cancel()
+
+    def attempt(
+        self, token: CancelToken, samples: tuple[int, int], progress: Callable[[Progress], None] | None = None
+    ) -> None:
+        film = Film(self.plan.channels, self.size, self.plan.region)
         try:
-            run(
-                self.job,
-                [film],
-                self.executor,
-                token=token,
-                samples=samples,
-                progress=None if by_time else progress,
-            )
+            run(self.job, [film], self.executor, token=token, samples=samples, progress=progress)
         except Stopped:
             self.stops += 1
-        finally:
-            timer.cancel()
 
 
 def same_bits(found: Film, wanted: Film) -> None:
