@@ -4,7 +4,7 @@
     python docs/make_gallery.py mandelbox   one picture, then the page
     python docs/make_gallery.py --page      only the page
 
-Each scene is rendered at its full size, reduced in linear light to WIDTH pixels, and written with the highest quality
+Each scene is rendered at its full size (and denoised, where light bounces), reduced in linear light to WIDTH pixels, and written with the highest quality
 that leaves the file small enough. Pages that show the picture of an earlier format get the new one. The gallery's words
 are the comment at the head of the scene's file, and the formula's own title and reference.
 """
@@ -51,7 +51,8 @@ clfractal render scenes/mandelbulb.yaml -o other_side.png --set 'camera.position
 
 The words are those of the scene files; `python docs/make_gallery.py` makes the pictures and this page anew.
 Times are for that many pixels with the scene's own samples on two processor cores, without the seconds that
-building its program takes when a formula is rendered for the first time.
+building its program takes when a formula is rendered for the first time. Pictures of scenes in which light bounces are
+denoised here (`--denoise`).
 """
 
 
@@ -103,6 +104,8 @@ def page() -> str:
 def make_picture(path: Path) -> None:
     """Renders a scene and writes its reduced picture."""
     scene = load_scene(path)
+    if scene.lighting.mode == "path":
+        scene = load_scene(path, overrides=["output.denoise=true"])
     film = render(beside(scene), channels=["R", "G", "B", "A"])
     linear = shown_light(film)
     coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])

@@ -70,7 +70,10 @@ THESIS_FIGURES = {
 }
 
 # Walls from edge to edge: nothing is seen past them.
-FILLED = ("stereo_hall", "mandelbox_inside", "film_dive")
+FILLED = (
+    *("stereo_hall", "mandelbox_inside", "film_dive", "kleinian_grove", "lantern", "mandelbox_cave"),
+    *("menger_hall", "studio_julia", "wet_street"),
+)
 
 # By module: all tests of one scene come together, and in one process, which renders it once.
 each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem, scope="module")
