@@ -1,5 +1,7 @@
 """Light along paths beside Mitsuba 3, which renders the same ball, pillar and floor in a process of its own.
 
+All three are a set, or the ball alone is one, and the others are objects beside it.
+
 Regions of the pictures are compared: they may differ by the standard errors of both, found from
 several pictures with other seeds, times the factor that Bonferroni's correction asks for, and by 1 % for what a surface's
 footprint is wide.
@@ -32,6 +34,7 @@ SKY = 0.3
 LAMP, POWER = [1.5, -1.5, 2.0], 2.0
 SUN, SUN_POWER = [-1.0, 0.6, -1.2], 0.7
 ALPHA = 0.03
+BULB = [0.75, -0.7, 0.3]
 
 STAGE: dict[str, Any] = {
     "title": "A ball and a pillar on a floor",
@@ -53,6 +56,34 @@ STAGE: dict[str, Any] = {
     "bailout": 100,
     "derivative": "dr",
 }
+BALL = {
+    **STAGE,
+    "title": "A ball",
+    "let": {"ball": STAGE["let"]["ball"]},
+    "shape": "ball",
+    "bounds": {"center": [0, 0, 0], "radius": 0.6},
+}
+KINDS: dict[str, dict[str, Any]] = {
+    "set": {"formula": {"inline": STAGE, "iterations": 1}},
+    "objects": {
+        "formula": {"inline": BALL, "iterations": 1},
+        "objects": {
+            "pillar": {
+                "type": "box",
+                "position": [-0.95, -0.35, 0.05],
+                "size": [0.4, 0.4, 1.1],
+                "material": "m",
+            },
+            "floor": {
+                "type": "cylinder",
+                "position": [0, 0, -0.6],
+                "radius": 4,
+                "height": 0.2,
+                "material": "m",
+            },
+        },
+    },
+}
 _THEIRS = """
 import json, sys
 import mitsuba as mi
@@ -61,6 +92,10 @@ mi.set_variant("scalar_rgb")
 from mitsuba import ScalarTransform4f as T
 told = json.load(sys.stdin)
 body = told["material"]
+for light in told["lights"]:
+    if "to_world" in light:
+        origin, target, up = light["to_world"]["look_at"]
+        light["to_world"] = T().look_at(origin=origin, target=target, up=up) @ T().scale(light["to_world"]["scale"])
 scene = mi.load_dict({
     "type": "scene",
     "integrator": {"type": "path", "max_depth": told["bounces"] + 2, "rr_depth": 1000},
@@ -113,6 +148,37 @@ LIGHTS: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {
             },
         ],
     ),
+    # Lights with a size, which are seen: their intensity is their radiance.
+    "sizes": (
+        {
+            "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]},
+            "lights": [
+                {"type": "sphere", "position": BULB, "radius": 0.15, "intensity": 6},
+                {
+                    "type": "rectangle",
+                    "position": [0, -0.3, 1.6],
+                    "direction": [0, 0, -1],
+                    "up": [0, 1, 0],
+                    "width": 1.2,
+                    "height": 0.6,
+                    "intensity": 3,
+                },
+            ],
+        },
+        [
+            {
+                "type": "sphere",
+                "center": BULB,
+                "radius": 0.15,
+                "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 6}},
+            },
+            {
+                "type": "rectangle",
+                "to_world": {"look_at": [[0, -0.3, 1.6], [0, -0.3, 0], [0, 1, 0]], "scale": [0.6, 0.3, 1]},
+                "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 3}},
+            },
+        ],
+    ),
 }
 
 
@@ -136,13 +202,13 @@ def theirs(material: str, lights: str, folder: Path) -> Floats:
     return np.asarray(np.load(folder / "theirs.npy"), np.float64)
 
 
-def ours(material: str, lights: str) -> Floats:
+def ours(kind: str, material: str, lights: str) -> Floats:
     """The same by paths."""
     pictures = []
     for seed in range(SEEDS):
         scene = clfractal.Scene(
             version=1,
-            formula={"inline": STAGE, "iterations": 1},
+            **KINDS[kind],
             camera={"position": EYE, "target": TARGET, "fov": FOV},
             image={"width": WIDTH, "height": HEIGHT},
             # A tenth of the footprint: at contacts light would be missing.
@@ -172,9 +238,19 @@ def factor() -> float:
 
 
 # (Lamps that metals throw on metals are caustics, which neither finds in so few samples.)
-@pytest.mark.parametrize(("material", "lights"), [("lambert", "sky"), ("lambert", "lamps"), ("metal", "sky")])
-def test_pictures_agree_with_mitsuba(material: str, lights: str, tmp_path: Path) -> None:
-    one, other = regions(ours(material, lights)), regions(theirs(material, lights, tmp_path))
+@pytest.mark.parametrize(
+    ("kind", "material", "lights"),
+    [
+        ("set", "lambert", "sky"),
+        ("set", "lambert", "lamps"),
+        ("set", "metal", "sky"),
+        ("objects", "lambert", "sky"),
+        ("objects", "lambert", "sizes"),
+        ("objects", "metal", "sky"),
+    ],
+)
+def test_pictures_agree_with_mitsuba(kind: str, material: str, lights: str, tmp_path: Path) -> None:
+    one, other = regions(ours(kind, material, lights)), regions(theirs(material, lights, tmp_path))
     error = np.sqrt((one.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)) / SEEDS)
     difference, scale = one.mean(axis=0) - other.mean(axis=0), other.mean(axis=0)
     assert scale.max() > 0.1
