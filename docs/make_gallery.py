@@ -4,9 +4,9 @@
     python docs/make_gallery.py mandelbox   one picture, then the page
     python docs/make_gallery.py --page      only the page
 
-Each scene is rendered at its full size (and denoised, where light bounces), reduced in linear light to WIDTH pixels, and written with the highest quality
-that leaves the file small enough. Pages that show the picture of an earlier format get the new one. The gallery's words
-are the comment at the head of the scene's file, and the formula's own title and reference.
+Each scene is rendered at its full size (and denoised, where light bounces), reduced in linear light to WIDTH pixels, and
+written with the highest quality that leaves the file small enough. Pages that show the picture of an earlier format get the
+new one. The gallery's words are the comment at the head of the scene's file, and the formula's own title and reference.
 """
 
 from __future__ import annotations
