@@ -8,12 +8,19 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from tests.shell import command, environment
+from clfractal.commands.shell import Shell
+from clfractal.commands.unfinished import Unfinished
+from clfractal.device.select import choose
+from clfractal.scene.load import load_scene
+from clfractal.work.prepare import prepare
+from tests.shell import SCENE, command, environment
 
 # One tile of this takes a CPU several seconds: its kernel cannot be stopped, only left.
 ENDLESS = """version: 1
@@ -83,6 +90,7 @@ def test_in_the_middle_of_a_kernel(tmp_path: Path) -> None:
         assert status == 130
         assert re.fullmatch(r"(clfractal|out\.exr(\.partial)?): interrupted.*\n", told), told
         assert not (tmp_path / "out.exr").exists()
+        assert journal.exists() == ("--resume" in told), "without a finished tile nothing stays"
         assert took < LIMIT_SECONDS
         seconds.append(took)
     assert min(seconds) < PROMISE_SECONDS
@@ -128,3 +136,25 @@ def test_while_everything_is_still_loading(tmp_path: Path) -> None:
         assert told.count("\n") == 1
         assert "Traceback" not in told
         assert took < LIMIT_SECONDS
+
+
+@pytest.mark.parametrize("tiles", [0, 1])
+def test_a_main_thread_that_does_not_answer(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], tiles: int
+) -> None:
+    """It is in a driver's call: what another thread does before the process is ended leaves no empty file behind."""
+    (tmp_path / "a.yaml").write_text(SCENE)
+    job = prepare(load_scene(tmp_path / "a.yaml"), choose())
+    (tmp_path / "a.yaml").unlink()
+    shell = Shell(owns_process=False)
+    left = ["a.exr.partial"] * tiles
+    with suppress(KeyboardInterrupt), Unfinished(job, {}, tmp_path / "a.exr", shell, resume=False) as work:
+        shell.state = work.interrupted
+        for tile in range(tiles):
+            work.films[0].put(tile, np.zeros((len(job.channels), 32, 32), np.float32))
+        shell.interrupted()
+        assert [path.name for path in tmp_path.iterdir()] == left
+        assert ("--resume" in capsys.readouterr().err) == bool(tiles)
+        raise KeyboardInterrupt
+    assert [path.name for path in tmp_path.iterdir()] == left
+    assert not shell.leaving

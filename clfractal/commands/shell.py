@@ -64,6 +64,8 @@ class Shell:
         """Whether a command that takes long says what it is doing."""
         self.state: Callable[[], str] = lambda: "clfractal: interrupted"
         """The message for an interrupt."""
+        self.leaving: list[Callable[[], None]] = []
+        """What else an interrupt has to do where the main thread does not get to its own clean-up."""
 
     @property
     def terminal(self) -> bool:
@@ -218,10 +220,14 @@ class Shell:
         return status
 
     def interrupted(self) -> None:
-        """Prints that the program was interrupted, once."""
+        """Does what is left to do, and prints that the program was interrupted, once."""
         if not self._interrupted:
             self._interrupted = True
-            self._write(self.state())
+            told = self.state()
+            for leave in self.leaving:
+                with suppress(OSError):
+                    leave()
+            self._write(told)
 
     def noise(self) -> str:
         """What drivers wrote to standard error since `mute_drivers`."""

@@ -24,7 +24,7 @@ class Unfinished:
         header: the header of its whole picture's files.
         output: the first output, which they stand beside.
         resume: whether to continue earlier ones.
-        shell: prints a message if earlier work is discarded.
+        shell: prints a message if earlier work is discarded; takes the files away at an interrupt, too.
 
     Raises:
         FileError: see `JournalFilm`.
@@ -33,6 +33,7 @@ class Unfinished:
     def __init__(
         self, job: Job, header: Mapping[str, Any], output: Path, shell: Shell, *, resume: bool
     ) -> None:
+        self.shell = shell
         self.paths = partial_paths(job, output)
         self.output = output
         self.first = output.with_name(output.name + PARTIAL)
@@ -61,6 +62,7 @@ class Unfinished:
             self._drop_others(output, shell)
 
     def __enter__(self) -> Self:
+        self.shell.leaving.append(self._leave)
         return self
 
     def __exit__(
@@ -71,6 +73,7 @@ class Unfinished:
                 film.discard()
         else:
             self._leave()
+        self.shell.leaving.remove(self._leave)
 
     def interrupted(self) -> str:
         """What to say of an interrupt."""
