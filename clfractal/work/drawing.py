@@ -108,7 +108,7 @@ class Drawing:
         self._places: dict[int, cl.Event] = {}
         self._sending: list[cl.Event] = []
         self._kept: cl.Buffer | None = None
-        self._kept_count = 0
+        self._kept_count = self._kept_width = 0
 
     def update(self, view: PlannedView, resources: Resources, *, tiles: int) -> None:
         """Takes a view, of which at most `tiles` tiles are rendered at a time.
@@ -146,6 +146,7 @@ class Drawing:
         self.outputs.fit_wave(self.wave.sizes)
         self._upload(arguments)
         self._kept_count = len(kept_numbers(plan, view.scene.renderer))
+        self._kept_width = np.dtype(kernel.precision).itemsize
         if other or self._kernels is None:
             named = list(zip(self._texts, built, strict=True))
             self._kernels = Kernels(self.device, named, number_count(kernel))
@@ -169,9 +170,7 @@ class Drawing:
 
     def kept_bytes(self, tiles: int) -> int:
         """Memory that so many tiles need between passes."""
-        assert self.view is not None
-        width = 8 if self.view.plan.precision == "float64" else 4
-        return tiles * self._kept_count * TILE_PIXELS * width
+        return tiles * self._kept_count * TILE_PIXELS * self._kept_width
 
     @property
     def keeps(self) -> bool:
