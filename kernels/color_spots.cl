@@ -27,7 +27,7 @@ STAGE(color_spots) {
     STAGE_OF(s);
     const world w = WORLD;
     spot here = spot_kept(s.state, bounce, s.stride);
-    const mask found = mask_of(here.found) & equal(OBJECT_OF(here), R(0.0));
+    const mask found = mask_of(here.found) & of_the_set(OBJECT_OF(here), w);
     if (!any_lane(found)) return;
     path so_far;
     const aim a = aim_kept(s.state, s.stride);

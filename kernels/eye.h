@@ -1,6 +1,17 @@
 // Rays from the eye.
 #include "objects.h"
 
+// Whether a surface is one that marches find: of the set or a part of it, and not of an object beside it.
+INLINE mask of_the_set(real object, world w) {
+    mask found = equal(object, R(0.0));
+#if SOLIDS > 1
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        if (w.objects[i].kind == OBJECT_JOINED) found |= equal(object, (real)((scalar)(i + 1)));
+    }
+#endif
+    return found;
+}
+
 // The sums of the packet's pixels before this sample.
 INLINE pixel sums_before(stage s, const place_in_pass *here) {
     if (s.sample == s.span.first) return pixel_before(s.span, here);

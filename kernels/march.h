@@ -32,6 +32,24 @@ INLINE sight march_place(const march *m) {
     return s;
 }
 
+// Part of a distance that is safe to go.
+INLINE real step_scale_of(clearance here, __constant const struct March *settings) {
+#if SOLIDS > 1
+    return here.scale;
+#else
+    return (real)(settings->step_scale);
+#endif
+}
+
+// The scaled distance at which light is computed, in cones.
+INLINE real near_of(clearance here, __constant const struct March *settings) {
+#if SOLIDS > 1
+    return (real)(settings->near) * here.scale / (real)(settings->step_scale);
+#else
+    return (real)(settings->near);
+#endif
+}
+
 // What the distance found at that place means for the march.
 INLINE void march_measure(march *m, sight *s, __constant const struct March *settings) {
     mask free = less_equal((real)(REAL_LARGEST), m->high);
@@ -40,17 +58,18 @@ INLINE void march_measure(march *m, sight *s, __constant const struct March *set
 #endif
     s->cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
     // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing.
-    s->radius = s->here.step * (real)(settings->step_scale);
+    const real scale = step_scale_of(s->here, settings);
+    s->radius = s->here.step * scale;
     // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
     s->radius = pick(less(s->radius, (real)(REAL_LARGEST)), s->radius, (real)(settings->step));
-    s->radius = pick(free, fmin(s->radius, m->radius_before + MOST_GROWTH * (real)(settings->step_scale) * m->step_before), s->radius);
+    s->radius = pick(free, fmin(s->radius, m->radius_before + MOST_GROWTH * scale * m->step_before), s->radius);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));
 }
 
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
 INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __constant const struct March *settings) {
-    const real height = s->cone * (real)(settings->near);
+    const real height = s->cone * near_of(s->here, settings);
     const mask beside = outside & less(s->radius, height);
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
     const mask between = beside & less(height, m->radius_before) & less(m->radius_before, (real)(REAL_LARGEST));

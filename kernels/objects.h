@@ -76,7 +76,7 @@ CALLED real objects_met(const ray *r, __global const struct Object *objects, int
     real nearest = (real)(REAL_LARGEST);
     *number = R(0.0);
     for (int i = 0; i < count; ++i) {
-        if (objects[i].kind == OBJECT_WATER) continue;
+        if (objects[i].kind == OBJECT_WATER || objects[i].kind == OBJECT_JOINED) continue;
         const real t = span_first(object_span(objects + i, r->origin, r->direction));
         const mask here = less(t, nearest) & less(t, r->far);
         nearest = pick(here, t, nearest);

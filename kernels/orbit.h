@@ -7,25 +7,7 @@
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
 
-#include "numbers/quick.h"
-
-// How an orbit ended.
-typedef struct {
-    real count;   // applications until |z| left the radius that counts, or all
-    mask inside;  // it has not
-} orbit_end;
-
-// How an orbit of whole counts ended. Masks are whole numbers: a real could not count beyond 2^24 in float32.
-typedef struct {
-    mask count;   // applications until |z| left the bailout, or all
-    mask inside;  // it has not
-} orbit_counted;
-
-// How far a point is from the solid.
-typedef struct {
-    real step;  // distance that is safe to go, in scene units; 0 inside
-    orbit_end end;
-} clearance;
+#include "orbit_types.h"
 
 // Distance to the solid from the last |z|, its count and the growth of |z| per scene unit, g = |J^T z / |z||, given relative
 // to |z|: `relative` = |z| / g.
@@ -48,13 +30,6 @@ INLINE real distance_from_growth(real square, real relative, real count, __const
 #endif
     // An overflow of the derivative means that the surface is nearer than the number type can resolve.
     return fmax(pick(is_nan(distance), R(0.0), distance), R(0.0));
-}
-
-// Whether the work was cancelled. Long orbits test this now and then, or a launch could take arbitrarily long. The host writes
-// the record while kernels run; they see it if both share their memory. The results of a cancelled launch are discarded.
-#define ORBIT_LOOK 4096
-INLINE int orbit_cancelled(__constant const struct Orbit *orbit) {
-    return *(volatile __constant const int *)&orbit->cancelled;
 }
 
 // Lanes that end the orbit inside at the iteration limit: true for those still within the bailout.
@@ -209,13 +184,6 @@ INLINE void orbit_scalar_distances(const vec *points, const mask *active, cleara
 }
 #endif
 
-// What is known of a point on the surface, from one orbit over dual numbers.
-typedef struct {
-    vec gradient;        // of the distance, not normalised: points away from the solid
-    real square;         // the last |z|^2 ...
-    real square_before;  // ... and the one before it
-} surface_point;
-
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
 INLINE clearance orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
                                      surface_point *surface) {
@@ -270,12 +238,14 @@ INLINE real smooth_count(orbit_end end, surface_point surface, __constant const 
     return pick(end.inside, (real)((scalar)orbit->iterations), smooth);
 }
 
-#if LOGARITHMIC
-// The potential G = log|z_n| / degree^n, which falls towards the solid.
+// The potential G = log|z_n| / degree^n, which falls towards the solid. Linear maps have none: 0, as near as can be.
 INLINE real potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+#if LOGARITHMIC
     return R(0.34657359028) * quick_log2(surface.square) * exp2(-end.count * (real)(orbit->log2_degree));
-}
+#else
+    return R(0.0);
 #endif
+}
 
 // The distance used for marching: the cheapest that the formula offers.
 INLINE clearance orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {

@@ -34,11 +34,8 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
     if (!any_lane(m->proving)) return m->active;
     const real cone = s->cone;
     const vec offset = vec_sub(s->point, s->on_ray);
-    real arrival = PROOF_ARRIVED * cone;
-#if LOGARITHMIC
     const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
-    arrival = pick(close, arrival, PROOF_LANDED * cone);
-#endif
+    const real arrival = pick(close, PROOF_ARRIVED * cone, PROOF_LANDED * cone);
     const real along = vec_dot(offset, m->r.direction);
     const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
     const mask arrived = m->proving & (s->here.end.inside | less(s->radius, arrival)) & ~astray;

@@ -13,6 +13,9 @@ typedef struct {
     vec normal;                    // of a surface: towards the viewer, length 1 ...
     real smooth;                   // ... its escape count ...
     real more_steps, more_count;   // ... and what finding these has cost
+#if SOLIDS > 1
+    real solid;                     // the number of the object that the surface belongs to, or 0
+#endif
 } encounter;
 
 // Places of numbers in these structs; only points of a pixel have something that is known.

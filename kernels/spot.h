@@ -25,7 +25,7 @@ INLINE color spot_color(vec normal, real quantity, real object, world w) {
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask here = equal(object, (real)((scalar)(i + 1)));
-        if (any_lane(here)) found = color_pick(here, color_splat(w.objects[i].color), found);
+        if (w.objects[i].colored && any_lane(here)) found = color_pick(here, color_splat(w.objects[i].color), found);
     }
 #endif
     return found;
@@ -47,6 +47,9 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
         met.more_steps = pick(here, R(0.0), met.more_steps);
         met.more_count = pick(here, R(0.0), met.more_count);
     }
+#if SOLIDS > 1
+    *object = pick(mask_of(met.hit) & ~here, met.solid, *object);
+#endif
 #endif
     return met;
 }
@@ -57,7 +60,7 @@ INLINE real lift_of(const spot *here, world w) {
 #if HAS_OBJECTS
     const real far_out = fmax(fmax(fabs(here->point.x), fabs(here->point.y)), fabs(here->point.z));
     const real over_object = R(0.05) * here->cone + R(64.0) * (real)(REAL_EPSILON) * far_out;
-    return pick(less(R(0.0), here->object), over_object, over_set);
+    return pick(of_the_set(here->object, w), over_set, over_object);
 #else
     return over_set;
 #endif

@@ -64,7 +64,7 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
         met->more_count += pick(active, there->end.count, R(0.0));
         met->more_steps += pick(active, R(1.0), R(0.0));
         if (i == POLISH - 1) break;
-        const real height = there->step * (real)(settings->step_scale) - wanted;
+        const real height = there->step * step_scale_of(*there, settings) - wanted;
         const real slope = (height - height_before) / (t - before);
         const mask usable = less(slope, R(0.0)) & less(R(-1e6), slope);
         const real move = i == 0 ? height : pick(usable, -height / slope, height);
@@ -99,6 +99,9 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     const real away = vec_dot(normal, r.direction);
     met->normal = vec_pick(less(R(0.1), away), vec_along(normal, R(-2.0) * away, r.direction), normal);
     met->smooth = smooth_count(there.end, surface, orbit);
+#if SOLIDS > 1
+    met->solid = surface.solid;
+#endif
 }
 
 // Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and with POLISH where

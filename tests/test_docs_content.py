@@ -142,6 +142,7 @@ OBJECTS = {
     "sphere": "SphereObject",
     "box": "BoxObject",
     "cylinder": "CylinderObject",
+    "formula": "FormulaObject",
 }
 ANIMATION = {
     "animation": "Animation",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,23 @@ ORBIT = Struct(
         Field("log_distance_bailout", "real", 0, "natural logarithm of the distance bailout"),
         Field("log2_degree", "real", 0, "binary logarithm of the degree of one application"),
         Field("solid_radius", "real", 0, "radius in z that holds the last solid, for degree 1"),
+        # Of one of several solids that are joined (`kernels/solids.h`); else 0.
+        Field("kind", "int", 0, "one of SOLID_KINDS"),
+        Field("join", "int", 0, "one of JOINS"),
+        Field("text", "int", 0, "of a formula: the number of its text ..."),
+        Field("first", "int", 0, "... and where its constants begin"),
+        Field("object", "int", 0, "the number of the object, from 1; 0: the scene's own formula"),
+        Field("middle", "real", 3, "its middle, or a point of a plane, scene units"),
+        Field("own_x", "real", 3, "from scene units to its own ones"),
+        Field("own_y", "real", 3, ""),
+        Field("own_z", "real", 3, ""),
+        Field("sides", "real", 3, "of simple solids: half of them, scene units"),
+        Field("scale", "real", 0, "from a distance of the formula's own to what rays may go in the scene"),
+        Field("step_scale", "real", 0, "how much of its own distance that is"),
+        Field("ball", "real", 3, "centre of a ball that holds the formula's set, scene units"),
+        Field("ball_radius", "real", 0, "its radius, scene units"),
+        Field("potential_share", "real", 0, "this radius over that of all that is searched"),
+        Field("smoothness", "real", 0, "width of a smooth union, scene units"),
         Field(CANCELLED, "int", 0, "1: the work was cancelled, and long orbits end at once"),
     ],
 )
@@ -36,8 +54,33 @@ MOST_APPLICATIONS = 2_000_000_000
 EXTRA_APPLICATIONS = 24
 
 
-def orbit_record(chain: Chain, iterations: int, precision: Precision, bailout: float | None = None) -> Record:
-    """The limits of an orbit; `bailout` replaces the formula's own."""
+# A formula by itself: its own space is the scene's.
+_ALONE: dict[str, object] = {
+    **dict.fromkeys(("kind", "join", "text", "first", "object"), 0),
+    **dict.fromkeys(("ball_radius", "potential_share", "smoothness"), 0.0),
+    **dict.fromkeys(("middle", "sides", "ball"), (0.0, 0.0, 0.0)),
+    "own_x": (1.0, 0.0, 0.0),
+    "own_y": (0.0, 1.0, 0.0),
+    "own_z": (0.0, 0.0, 1.0),
+    "scale": 1.0,
+    "step_scale": 1.0,
+}
+
+
+def orbit_record(
+    chain: Chain,
+    iterations: int,
+    precision: Precision,
+    bailout: float | None = None,
+    *,
+    joined: Mapping[str, object] | None = None,
+) -> Record:
+    """The limits of an orbit.
+
+    Args:
+        bailout: in the place of the formula's own.
+        joined: values of the fields that say which of several solids this is; see `clfractal/renderers/solids.py`.
+    """
     inner = bailout if bailout is not None else chain.bailout
     outer = max(inner, chain.distance_bailout)
     # Linear maps measure the solid of exactly `iterations` applications; one more would be a smaller solid.
@@ -52,5 +95,7 @@ def orbit_record(chain: Chain, iterations: int, precision: Precision, bailout: f
         "log2_degree": math.log2(chain.degree) / chain.cycle_length if chain.degree > 1 else 0.0,
         "solid_radius": chain.solid_radius,
         CANCELLED: 0,
+        **_ALONE,
+        **(joined or {}),
     }
     return ORBIT.value(precision, values)

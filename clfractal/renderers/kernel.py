@@ -66,11 +66,14 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class WaveNeeds:
-    """What is kept of each pixel of a launch between its stages: numbers of its state, rays, and numbers of a ray."""
+    """What is kept of each pixel of a launch between its stages: numbers of its state, rays, and numbers of a ray and of
+    what it has met.
+    """
 
     state: int
     turns: int
     ray: int = RAY_NUMBERS
+    met: int = MET_NUMBERS
 
 
 class TileKernel(ABC):

@@ -15,9 +15,9 @@ from clfractal.scene.base import Vector
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import AnyObject, Solid, WaterObject
+from clfractal.scene.objects import AXES, AnyObject, FormulaObject, Solid, WaterObject
 
-OBJECT_KINDS = {"plane": 0, "water": 1, "sphere": 2, "box": 3, "cylinder": 4}
+OBJECT_KINDS = {"plane": 0, "water": 1, "sphere": 2, "box": 3, "cylinder": 4, "joined": 5}
 # Roughness up to which a material mirrors sharply in Phong's light, and from which on it does not.
 MIRRORS, DULL = 0.1, 0.4
 _LARGEST_EXPONENT = 1e5
@@ -31,6 +31,7 @@ OBJECT = Struct(
         Field("own_x", "real", 3, "from scene units to its own ones: of the ball or cube of radius 1,"),
         Field("own_y", "real", 3, "or of a plane, whose own z is its normal"),
         Field("own_z", "real", 3, ""),
+        Field("colored", "int", 0, "0: it has the set's colouring"),
         Field("color", "real", 3, "linear Rec. 709"),
         Field("ambient", "real", 0, "Eq. 5's coefficients"),
         Field("diffuse", "real", 0, ""),
@@ -66,9 +67,12 @@ def object_records(scene: Scene, precision: Precision) -> Record:
     """The objects in their order; one unused record where there are none, since no buffer is empty."""
     numbers = MappedMaterials(scene).blends.roots[1:]
     rows = [
-        {"material": number, **_place(each), **_look(scene, each)}
+        {"material": number, **_place(each), **_look(scene, each), "colored": int(_has_color(scene, each))}
         for number, each in zip(numbers, scene.objects.values(), strict=True)
     ]
+    for row, name in zip(rows, scene.objects, strict=True):
+        if name in scene.joined:  # the march finds it
+            row["kind"] = OBJECT_KINDS["joined"]
     return OBJECT.array(precision, rows) if rows else np.zeros(1, OBJECT.dtype(precision))
 
 
@@ -82,7 +86,7 @@ def _place(each: AnyObject) -> dict[str, object]:
     """Where it is, and its waves."""
     nothing = (0.0,) * WAVES
     row: dict[str, object] = {
-        "kind": OBJECT_KINDS[each.type],
+        "kind": OBJECT_KINDS["joined" if isinstance(each, FormulaObject) else each.type],
         "middle": each.position,
         **dict.fromkeys(("wave_x", "wave_y", "wave_height", "wave_phase"), nothing),
         **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
@@ -90,6 +94,8 @@ def _place(each: AnyObject) -> dict[str, object]:
     if isinstance(each, Solid):
         # The axes stand at right angles: each one's own number is the product with it by its square.
         axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
+    elif isinstance(each, FormulaObject):
+        axes = [np.array(axis) for axis in AXES]
     else:
         axes = [np.array(axis) for axis in frame_of(each.normal)]
     row.update(zip(("own_x", "own_y", "own_z"), axes, strict=True))
@@ -105,6 +111,13 @@ def _place(each: AnyObject) -> dict[str, object]:
             wave_slope=waves.slope,
         )
     return row
+
+
+def _has_color(scene: Scene, each: AnyObject) -> bool:
+    """Whether it has a colour of its own; formulas have the set's colouring where their material has none."""
+    if not isinstance(each, FormulaObject):
+        return True
+    return each.material is not None and scene.materials[each.material].base.color is not None
 
 
 def _look(scene: Scene, each: AnyObject) -> dict[str, Any]:

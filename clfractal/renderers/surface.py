@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
 from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
+    MET_NUMBERS,
     OBJECT_NUMBERS,
     RAY_NUMBERS,
     STATE_PADDING,
@@ -45,6 +45,7 @@ from clfractal.renderers.planes import (
 )
 from clfractal.renderers.scattering import albedo_tables
 from clfractal.renderers.set_lights import set_light_data, set_lights_of, single_lights
+from clfractal.renderers.solids import solid_constants, solid_defines, solid_records, solid_texts
 from clfractal.renderers.waves import (
     air_turns,
     asks_formula,
@@ -97,6 +98,7 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_LENS": 0,
         "HAS_MOTION": 0,
         "HAS_OBJECTS": 0,
+        **solid_defines(scene),
     }
 
 
@@ -154,6 +156,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
         **object_defines(scene),
+        **solid_defines(scene),
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
@@ -217,7 +220,8 @@ class SurfaceKernel(TileKernel):
 
     def wave_needs(self) -> WaveNeeds:
         ray = RAY_NUMBERS + OBJECT_NUMBERS * bool(self.scene.objects)
-        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray)
+        met = MET_NUMBERS + bool(self.scene.joined)
+        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray, met)
 
     @property
     def footprint(self) -> int:
@@ -227,7 +231,6 @@ class SurfaceKernel(TileKernel):
 
     def own_arguments(self) -> list[KernelArgument]:
         scene, precision, kept = self.scene, self.precision, self.resources.kept
-        formula = write_formula(scene.chain)
         surroundings = scene.surroundings
         packed = None
         if surroundings is not None:
@@ -235,13 +238,8 @@ class SurfaceKernel(TileKernel):
         on_set = set_lights_of(scene)
         return [
             records.march_record(scene, precision, self.plan.averaged, packed, on_set),
-            np.stack(
-                [
-                    records.orbit_record(scene.chain, scene.formula.iterations, precision),
-                    *plane_orbits(scene, precision),
-                ]
-            ),
-            np.array(formula.constants, precision),
+            np.stack([*solid_records(scene, precision), *plane_orbits(scene, precision)]),
+            solid_constants(scene, precision),
             records.material_record(scene, precision, packed),
             records.light_records(scene, precision),
             self._palette(),
@@ -296,14 +294,10 @@ def light_kernels(scene: Scene) -> tuple[str, ...]:
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     """The texts of the scene's programs: those that know the formula, and the one that knows the scene's features."""
-    formula = write_formula(scene.chain)
-    generated = {
-        "formula.h": formula.text,
-        "structs.h": records.struct_text() + CUT_PLANE.c_text(),
-        "pbr.h": pbr_text(),
-    }
+    structs = {"structs.h": records.struct_text() + CUT_PLANE.c_text(), "pbr.h": pbr_text()}
 
     def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
+        generated = {**solid_texts(scene, traps="COLORING" in defines), **structs}
         return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
 
     points = ("send_points",) if scene.surface.used_points.count > 1 else ()

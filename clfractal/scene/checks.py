@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from math import dist
+from typing import TYPE_CHECKING
 
 from clfractal.errors import SceneError, Where
 from clfractal.files.channels import LIGHT_LAYERS, NOISY, SURFACE_LAYERS
@@ -11,10 +12,14 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_objects
+from clfractal.scene.objects import FormulaObject
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
+
+if TYPE_CHECKING:
+    from clfractal.formulas.language import Chain
 
 MAX_STEPS_THROUGH = 1_000_000
 MAX_PLANES = 64
@@ -286,12 +291,27 @@ def _check_lights(scene: Scene) -> None:
 
 def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS) -> Sequence[bool]:
     """Which points belong to the solid that is drawn; after `most` applications without escape they count as inside."""
+    found = _inside_formula(scene.chain, min(scene.formula.iterations, most), points)
+    for name, each in scene.joined.items():
+        if isinstance(each, FormulaObject):
+            own = [each.own_place(point) for point in points]
+            more = _inside_formula(scene.joined_chains[name], min(each.formula.iterations, most), own)
+        else:
+            more = [each.holds(point) for point in points]
+        if each.join == "cut":
+            found = [a and not b for a, b in zip(found, more, strict=True)]
+        elif each.join == "intersection":
+            found = [a and b for a, b in zip(found, more, strict=True)]
+        else:
+            found = [a or b for a, b in zip(found, more, strict=True)]
+    return found
+
+
+def _inside_formula(chain: "Chain", iterations: int, points: Sequence[Vector]) -> list[bool]:
     import numpy as np
 
     from clfractal.formulas import reference
 
-    chain = scene.chain
-    iterations = min(scene.formula.iterations, most)
     array = np.array(points, dtype=float)
     inside = reference.escape(chain, array, iterations)[1]
     if chain.shape_index is not None:

@@ -16,7 +16,7 @@ _DEEPEST = 3
 
 
 def inlined(document: Document, folder: Path) -> Document:
-    """The document with `inline` in the place of every `file` of its formula, and of the links of its chain.
+    """The document with `inline` in the place of every `file` of its formulas, and of the links of their chains.
 
     So it is for a `name` of a formula of one's own. A formula that the schema will refuse is left as it is.
 
@@ -24,14 +24,26 @@ def inlined(document: Document, folder: Path) -> Document:
         FileError: a file cannot be read, or lies outside the folder.
         FormulaError: a file is not YAML, or there is no formula of a name.
     """
-    formula = document.root.child("formula")
-    if formula is None:
-        return document
-    try:
-        changed = _without_files(formula, ("formula",), folder, folder)
-    except ClfractalError as error:
-        raise document.locate(error) from error
-    return document if changed is formula else document.replaced(("formula",), changed)
+    for path in _formulas(document):
+        formula: Node | None = document.root
+        for part in path:
+            formula = formula.child(part) if formula is not None else None
+        if formula is None:
+            continue
+        try:
+            changed = _without_files(formula, path, folder, folder)
+        except ClfractalError as error:
+            raise document.locate(error) from error
+        if changed is not formula:
+            document = document.replaced(path, changed)
+    return document
+
+
+def _formulas(document: Document) -> list[tuple[str, ...]]:
+    """Where formulas stand: the scene's own, and those of objects."""
+    objects = document.root.child("objects")
+    names = objects.value if objects is not None and isinstance(objects.value, dict) else {}
+    return [("formula",), *(("objects", name, "formula") for name in names)]
 
 
 def _without_files(node: Node, path: tuple[str, ...], folder: Path, beside: Path) -> Node:
@@ -90,4 +102,5 @@ def _text(found: Path, shown: str, where: Where, path: tuple[str, ...], folder: 
     except FileError as error:
         raise FileError(error.inside(shown), where) from error
     root = read_document(text, shown, error=FormulaError).root
-    return _without_files(root, (*path, "inline"), folder, beside) if len(path) < _DEEPEST else root
+    depth = len(path) - (2 if path[0] == "objects" else 0)
+    return _without_files(root, (*path, "inline"), folder, beside) if depth < _DEEPEST else root

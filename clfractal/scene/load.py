@@ -199,7 +199,7 @@ def _defaults() -> dict[str, Any]:
 
 def check_scene(scene: Scene) -> None:
     """Raises ClfractalError, at a dotted path, for mistakes that the schema cannot find; files are kept with the scene."""
-    _ = scene.chain
+    _ = scene.chain, scene.joined_chains
     check_parts(scene)
     _check_names(scene)
     if scene.layout is not None:

@@ -114,7 +114,10 @@ def _place(root: Root, location: Sequence[str | int]) -> _Place:
     place = _Place([], [root])
     for part in location:
         model = next((m for m in place.models if part in m.model_fields), None)
-        if isinstance(part, int):
+        chosen = [m for m in place.models if _tag(m) == part] if len(place.models) > 1 else []
+        if chosen:  # before a key of the same name
+            place.types = list(chosen)
+        elif isinstance(part, int):
             items = [a for t in place.types if get_origin(t) is tuple for a in get_args(t) if a is not ...]
             place.types = [option for item in items for option in _options(item)]
             place.path.append(part)
@@ -125,8 +128,6 @@ def _place(root: Root, location: Sequence[str | int]) -> _Place:
             values = [get_args(t)[1] for t in place.types if get_origin(t) is dict]
             place.types = [option for value in values for option in _options(value)]
             place.path.append(part)
-        else:
-            place.types = [m for m in place.models if _tag(m) == part] or place.types
     return place
 
 

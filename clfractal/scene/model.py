@@ -23,7 +23,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
-from clfractal.scene.objects import Objects
+from clfractal.scene.objects import FormulaObject, Joined, Objects, Solid, ball_of_both
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stance import Extent
@@ -43,6 +43,7 @@ T = TypeVar("T")
 # Data that a scene has read or resolved, and the section that they depend on.
 _SECTIONS = {
     "chain": "formula",
+    "joined_chains": "objects",
     "surroundings": "environment",
     "given": "renderer",
     "textures": "materials",
@@ -83,7 +84,7 @@ class Scene(Section):
     environment: Environment | None = None
     fog: Fog | None = None
     glow: Glow | None = None
-    objects: Objects = Field({}, description="planes, water, spheres, boxes and cylinders by name")
+    objects: Objects = Field({}, description="planes, water, spheres, boxes, cylinders and formulas by name")
     cut_planes: CutPlanes = Field(
         (), description="planes that are shown in the picture or cut the object open"
     )
@@ -142,7 +143,28 @@ class Scene(Section):
     def bounds(self) -> tuple[Vector, float]:
         """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
         own = self.renderer.bounds if isinstance(self.renderer, SurfaceRenderer) else None
-        return (own.center, own.radius) if own else (self.chain.center, self.chain.radius)
+        if own is not None:
+            return own.center, own.radius
+        found = self.chain.center, self.chain.radius
+        for name, part in self.joined.items():
+            if isinstance(part, FormulaObject) and part.join in ("union", "smooth_union"):
+                found = ball_of_both(
+                    found, part.ball(self.joined_chains[name].center, self.joined_chains[name].radius)
+                )
+            elif isinstance(part, Solid) and part.join == "smooth_union":
+                found = ball_of_both(found, part.ball)
+        return found
+
+    @property
+    def joined(self) -> "Mapping[str, Joined]":
+        """The objects that are parts of the set, in their order: formulas, and what is not only beside it."""
+        if not isinstance(self.renderer, SurfaceRenderer):
+            return {}
+        return {
+            name: each
+            for name, each in self.objects.items()
+            if isinstance(each, Joined) and (isinstance(each, FormulaObject) or each.join != "union")
+        }
 
     @property
     def extent(self) -> Extent:
@@ -182,7 +204,7 @@ class Scene(Section):
         """The same scene, as loaded from another folder."""
         copied = super().model_copy()
         copied._folder = folder
-        copied._read = {name: self._read[name] for name in ("chain",) if name in self._read}
+        copied._read = {name: self._read[name] for name in ("chain", "joined_chains") if name in self._read}
         return copied
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -240,6 +262,25 @@ class Scene(Section):
 
         return self.once(
             "chain", lambda: catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
+        )
+
+    @property
+    def joined_chains(self) -> "Mapping[str, Chain]":
+        """The formulas of objects, by the objects' names.
+
+        Raises:
+            FormulaError: one is wrong; the path says where (a loaded scene's formulas have been checked).
+        """
+        from clfractal.errors import Where
+        from clfractal.formulas import catalog
+
+        return self.once(
+            "joined_chains",
+            lambda: {
+                name: catalog.resolve(each.formula.mapping(), None, Where(path=f"objects.{name}.formula"))
+                for name, each in self.objects.items()
+                if isinstance(each, FormulaObject)
+            },
         )
 
     @property
@@ -324,4 +365,7 @@ class Scene(Section):
         """Plain data (as for YAML or JSON) with every default filled in; it loads back to an equal scene."""
         plain: dict[str, Any] = self.model_dump(mode="json")
         plain["formula"] = self.formula.mapping()
+        for name, each in self.objects.items():
+            if isinstance(each, FormulaObject):
+                plain["objects"][name]["formula"] = each.formula.mapping()
         return plain

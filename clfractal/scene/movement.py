@@ -1,6 +1,6 @@
 """What a scene looks like at each frame of its animation."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -65,7 +65,7 @@ class Movement:
             found = with_values(self._scene, {**self._by_path(frame), **others}, animation=animation)
             if animation is not None:
                 found.take_tables(self._original)
-            _ = found.chain
+            _ = found.chain, found.joined_chains
         except ClfractalError as error:
             raise self._blamed(error, frame) from error
         return found
@@ -82,7 +82,7 @@ class Movement:
         """
         try:
             found = with_values(self._original, self._by_path(frame))
-            _ = found.chain
+            _ = found.chain, found.joined_chains
             return found
         except ClfractalError as error:
             raise self._blamed(error, frame) from error
@@ -195,7 +195,10 @@ def _with_live(scene: Scene, targets: Iterable[Target]) -> Scene:
             if path not in names:
                 at: Any = scene
                 for part in section[1:]:
-                    at = at[int(part)] if isinstance(at, tuple) else getattr(at, part)
+                    if isinstance(at, Mapping):
+                        at = at[part]
+                    else:
+                        at = at[int(part)] if isinstance(at, tuple) else getattr(at, part)
                 names[path] = at.live
             names[path] = tuple(dict.fromkeys((*names[path], name)))
     return with_values(scene, names, animation=None)

@@ -5,7 +5,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.maps import Map, maps_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import Solid
+from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, PlaneObject, Solid
 from clfractal.scene.surface import SurfaceRenderer
 
 
@@ -17,10 +17,46 @@ def check_objects(scene: Scene) -> None:
         raise SceneError(
             f"are shown by renderer surface, not by {scene.renderer.type}; remove them", Where(path="objects")
         )
+    _check_joined(scene)
     for name, each in scene.objects.items():
         _check_material(scene, each.material, Where(path=f"objects.{name}.material"))
-        if isinstance(each, Solid):
+        if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
             _check_lights(scene, name, each)
+
+
+def _check_joined(scene: Scene) -> None:
+    """What cannot be joined to the set, and what the set cannot have then."""
+    if not scene.joined:
+        return
+    names = [name for name, each in scene.joined.items() if isinstance(each, FormulaObject)]
+    if len(names) > MAX_FORMULAS:
+        raise SceneError(
+            f"at most {MAX_FORMULAS} objects can be formulas, and this is one more",
+            Where(path=f"objects.{names[MAX_FORMULAS]}.type"),
+        )
+    first = next(iter(scene.joined))
+    if scene.cut_planes:
+        raise SceneError(
+            f"cannot be combined with the object {first!r}, which is a part of the set; an object"
+            " {type: plane, join: cut} cuts both",
+            Where(path="cut_planes"),
+        )
+    used = scene.material.name
+    if used is not None and isinstance(scene.lighting, PathLighting):
+        weight = scene.materials[used].transmission.weight if used in scene.materials else 0.0
+        if isinstance(weight, Map) or weight > 0:
+            raise SceneError(
+                f"is glass, {used!r}, which cannot be joined with the object {first!r}",
+                Where(path="material.name"),
+            )
+    for name, each in scene.joined.items():
+        where = Where(path=f"objects.{name}.join")
+        if isinstance(each, FormulaObject) and each.join == "cut":
+            raise SceneError(
+                "cannot be cut for a formula: how deep places are in its set is not known", where
+            )
+        if isinstance(each, PlaneObject) and each.join == "smooth_union":
+            raise SceneError("cannot be smooth_union for a plane, which has no end; a flat box can", where)
 
 
 def _check_material(scene: Scene, material: str | None, where: Where) -> None:

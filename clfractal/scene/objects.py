@@ -1,5 +1,6 @@
-"""Objects beside the set: planes, water, spheres, boxes and cylinders, by name."""
+"""Objects beside the set: planes, water, spheres, boxes, cylinders and formulas, by name."""
 
+import math
 from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, Field, Tag, model_validator
@@ -19,10 +20,15 @@ from clfractal.scene.base import (
     problem,
     unit,
 )
+from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.materials import MAX_NAME, MaterialName
 from clfractal.scene.plane import turn
 
 MAX_OBJECTS = 64
+MAX_FORMULAS = 8
+"""Most objects that are formulas: each one's text is a part of the programs."""
+Ball: TypeAlias = tuple[Vector, float]
+"""A centre and a radius, scene units."""
 AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 Angles = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
@@ -38,6 +44,23 @@ class ObjectBase(Section):
     position: Position = Field((0.0, 0.0, 0.0), description="its middle, or a point of a plane; scene units")
 
 
+class Joined(ObjectBase):
+    """An object that may be a part of the set: joined to it, or cut out of it."""
+
+    join: Literal["union", "smooth_union", "cut", "intersection"] = Field(
+        "union",
+        description="with the set and the formulas above it in the file: beside them; flowing together; taken out of"
+        " them; or only what both have in common is left",
+    )
+    smoothness: Length = Field(
+        0.2, description="of a smooth union: how far apart surfaces begin to flow together, scene units"
+    )
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside; of a formula only its chain knows."""
+        raise NotImplementedError
+
+
 class Level(ObjectBase):
     """A surface without an end, seen from both sides."""
 
@@ -50,11 +73,15 @@ class Level(ObjectBase):
         return self
 
 
-class PlaneObject(Level):
-    """A plane without an end."""
+class PlaneObject(Joined, Level):
+    """A plane without an end; as a part of the set, all below it."""
 
     tag = "plane"
     type: Literal["plane"] = "plane"
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is below it."""
+        return sum((p - q) * n for p, q, n in zip(point, self.position, self.normal, strict=True)) < 0
 
 
 class Waves(Section):
@@ -88,7 +115,60 @@ class WaterObject(Level):
         return self
 
 
-class Solid(ObjectBase):
+def ball_of_both(a: Ball, b: Ball) -> Ball:
+    """The smallest ball that holds two others."""
+    apart = math.dist(a[0], b[0])
+    if apart + b[1] <= a[1]:
+        return a
+    if apart + a[1] <= b[1]:
+        return b
+    radius = (a[1] + b[1] + apart) / 2
+    share = (radius - a[1]) / apart
+    x, y, z = (p + share * (q - p) for p, q in zip(a[0], b[0], strict=True))
+    return (x, y, z), radius
+
+
+def turned_axes(rotation: Vector) -> tuple[Vector, Vector, Vector]:
+    """The three axes after turns about those of space, in degrees; each has length 1."""
+    found = []
+    for axis in AXES:
+        for about, degrees in zip(AXES, rotation, strict=True):
+            axis = turn(axis, about, degrees)
+        found.append(axis)
+    return found[0], found[1], found[2]
+
+
+class FormulaObject(Joined):
+    """The set of another formula, or of the same one at another place."""
+
+    tag = "formula"
+    type: Literal["formula"] = "formula"
+    formula: FormulaSpec = Field(description="as the scene's own")
+    rotation: Angles = Field(
+        (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
+    )
+    scale: Length = Field(1.0, description="factor on the formula's own size")
+
+    def own_place(self, point: Vector) -> Vector:
+        """A point in the formula's own space."""
+        offset = [p - q for p, q in zip(point, self.position, strict=True)]
+        x, y, z = (
+            sum(o * a for o, a in zip(offset, axis, strict=True)) / self.scale
+            for axis in turned_axes(self.rotation)
+        )
+        return (x, y, z)
+
+    def ball(self, center: Vector, radius: float) -> Ball:
+        """A ball of the formula's own space, as the object has it in the scene."""
+        axes = turned_axes(self.rotation)
+        x, y, z = (
+            place + self.scale * sum(c * axis[i] for c, axis in zip(center, axes, strict=True))
+            for i, place in enumerate(self.position)
+        )
+        return (x, y, z), self.scale * radius
+
+
+class Solid(Joined):
     """A body with an inside."""
 
     rotation: Angles = Field(
@@ -105,12 +185,15 @@ class Solid(ObjectBase):
     def axes(self) -> tuple[Vector, Vector, Vector]:
         """From its middle to the ends of its own three axes, scene units."""
         found = []
-        for axis, half, factor in zip(AXES, self.half_sides, self.scale, strict=True):
-            for about, degrees in zip(AXES, self.rotation, strict=True):
-                axis = turn(axis, about, degrees)
+        for axis, half, factor in zip(turned_axes(self.rotation), self.half_sides, self.scale, strict=True):
             x, y, z = axis
             found.append((x * half * factor, y * half * factor, z * half * factor))
         return found[0], found[1], found[2]
+
+    @property
+    def ball(self) -> Ball:
+        """Around it."""
+        return self.position, math.hypot(*(length(axis) for axis in self.axes))
 
     def own_place(self, point: Vector) -> Vector:
         """A point in units of `axes` from its middle."""
@@ -120,10 +203,6 @@ class Solid(ObjectBase):
             for axis in self.axes
         )
         return (x, y, z)
-
-    def holds(self, point: Vector) -> bool:
-        """Whether a point is inside."""
-        raise NotImplementedError
 
 
 class SphereObject(Solid):
@@ -180,13 +259,14 @@ class CylinderObject(Solid):
         return x * x + y * y < 1 and abs(z) < 1
 
 
-AnyObject: TypeAlias = PlaneObject | WaterObject | SphereObject | BoxObject | CylinderObject
+AnyObject: TypeAlias = PlaneObject | WaterObject | SphereObject | BoxObject | CylinderObject | FormulaObject
 SceneObject = Annotated[
     Annotated[PlaneObject, Tag("plane")]
     | Annotated[WaterObject, Tag("water")]
     | Annotated[SphereObject, Tag("sphere")]
     | Annotated[BoxObject, Tag("box")]
-    | Annotated[CylinderObject, Tag("cylinder")],
+    | Annotated[CylinderObject, Tag("cylinder")]
+    | Annotated[FormulaObject, Tag("formula")],
     chosen_by("type", "sphere"),
 ]
 

@@ -12,7 +12,15 @@ from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import BoxObject, CylinderObject, Solid, SphereObject, Waves
+from clfractal.scene.objects import (
+    BoxObject,
+    CylinderObject,
+    FormulaObject,
+    Joined,
+    Solid,
+    SphereObject,
+    Waves,
+)
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane, Transform
 from clfractal.scene.stereo import StereoPlane
@@ -37,6 +45,8 @@ _SCALES: tuple[tuple[type[Section], frozenset[str]], ...] = (
     (Transform, frozenset({"scale"})),
     (StereoPlane, frozenset({"width", "height"})),
     (Solid, frozenset({"scale"})),
+    (FormulaObject, frozenset({"scale"})),
+    (Joined, frozenset({"smoothness"})),
     (SphereObject, frozenset({"radius"})),
     (BoxObject, frozenset({"size"})),
     (CylinderObject, frozenset({"radius", "height"})),
@@ -96,9 +106,11 @@ def target_of(scene: Scene, name: str) -> Target:
         raise SceneError("must name a value by its dotted keys, such as camera.position")
     if path[0] in _FIXED and path != ("output", "exposure"):
         raise SceneError(f"cannot move: it {_FIXED[path[0]]}")
-    if path[0] == "formula" and path[1:2] not in ((), ("chain",)) and scene.formula.chain is not None:
-        known = ", ".join(f"formula.chain.{number}" for number in range(len(scene.formula.chain)))
-        raise SceneError(f"cannot move: formula is a chain; name a value of {known}")
+    where, spec = _formula_of(scene, path)
+    if spec is not None and path[len(where) :][:1] not in ((), ("chain",)) and spec.chain is not None:
+        shown = ".".join(where)
+        known = ", ".join(f"{shown}.chain.{number}" for number in range(len(spec.chain)))
+        raise SceneError(f"cannot move: {shown} is a chain; name a value of {known}")
     _check_stands(scene, path)
     owner: Any = None
     value: Any = scene
@@ -106,6 +118,17 @@ def target_of(scene: Scene, name: str) -> Target:
         owner, value = value, _below(value, path, depth)
     kind = _kind(scene, owner, path, value)
     return Target(path, kind, _size(owner, path[-1], kind, value))
+
+
+def _formula_of(scene: Scene, path: tuple[str, ...]) -> tuple[tuple[str, ...], FormulaSpec | None]:
+    """The formula that a value belongs to, and where it stands; None for values of others."""
+    if path[0] == "formula":
+        return path[:1], scene.formula
+    if path[0] == "objects" and path[2:3] == ("formula",):
+        each = scene.objects.get(path[1])
+        if isinstance(each, FormulaObject):
+            return path[:3], each.formula
+    return (), None
 
 
 def _check_stands(scene: Scene, path: Sequence[str]) -> None:
@@ -187,8 +210,11 @@ def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
 
 def _is_whole(scene: Scene, path: tuple[str, ...]) -> bool:
     """Whether a formula's parameter is a whole number."""
-    link = int(path[2]) if path[1] == "chain" else 0
-    known = {each.name: each for each in scene.chain.links[link].bound.formula.parameters}
+    where, _ = _formula_of(scene, path)
+    chain = scene.chain if path[0] == "formula" else scene.joined_chains[path[1]]
+    below = path[len(where) :]
+    link = int(below[1]) if below[0] == "chain" else 0
+    known = {each.name: each for each in chain.links[link].bound.formula.parameters}
     if path[-1] not in known:
         raise SceneError(unknown_name("parameter", path[-1], list(known)))
     return known[path[-1]].type == "int"

@@ -16,7 +16,6 @@ from clfractal.device.select import Device
 from clfractal.pictures.tiles import TILE
 from clfractal.renderers.kernel import (
     BLOCK,
-    MET_NUMBERS,
     STAGE_NUMBERS,
     STATE_PADDING,
     WAVE_NUMBERS,
@@ -77,13 +76,13 @@ def wave_of(kernel: TileKernel, device: Device, capacity: int) -> Wave:
     if not kernel.waves:
         return Wave(capacity * per_tile, 0, [])
     needs, width = kernel.wave_needs(), np.dtype(kernel.precision).itemsize
-    each = width * lanes * (needs.state + (needs.ray + MET_NUMBERS) * needs.turns)
+    each = width * lanes * (needs.state + (needs.ray + needs.met) * needs.turns)
     packets = max(WAVE_BYTES.get(device.info.kind, WAVE_BYTES["cpu"]) // each, 1)
     if packets >= per_tile:
         packets = min(packets // per_tile, capacity) * per_tile
     state = (packets * lanes + STATE_PADDING) * width
     queue = (packets * lanes * needs.turns + STATE_PADDING) * width
-    return Wave(packets, needs.turns, [state * needs.state, queue * needs.ray, queue * MET_NUMBERS])
+    return Wave(packets, needs.turns, [state * needs.state, queue * needs.ray, queue * needs.met])
 
 
 def number_count(kernel: TileKernel) -> int:

@@ -66,6 +66,11 @@ _OBJECTS = {
     "sea": {"type": "water", "position": [0, 0, -3], "material": "wood"},
     "ball": {"type": "sphere", "position": [3, 0, 0], "radius": 1, "material": "wood"},
 }
+_JOINED = {
+    "hole": {"type": "sphere", "join": "cut"},
+    "drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"},
+    "other": {"type": "formula", "formula": {"name": "hast"}, "position": [3, 0, 0]},
+}
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
@@ -87,7 +92,11 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
     "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}, "glass": _GLASS, "maps": _MAPS},
-    "objects": {"": {}, "objects": {"objects": _OBJECTS, "materials": {"wood": {}}}},
+    "objects": {
+        "": {},
+        "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
+        "joined": {"objects": _JOINED},
+    },
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
     "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
@@ -140,6 +149,8 @@ _APART = {
     ),
     *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass", "maps")),
     *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass", "maps")),
+    frozenset({("objects", "joined"), ("planes", "planes")}),
+    frozenset({("objects", "joined"), ("lighting", "glass")}),
 }
 _OF_MEDIA = {
     frozenset({("lighting", "path"), ("transfer", "level")}),

@@ -37,7 +37,9 @@ kernels/water.h: render/objects
 kernels/look.h: render/objects_light render/surface_light
 kernels/march_steps.h: render/searches
 kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
-kernels/orbit.h: formulas/counts formulas/distance render/points render/surface_analytic
+kernels/solids*: render/joined
+kernels/trap*: render/coloring render/joined
+kernels/orbit*: formulas/counts formulas/distance render/points render/surface_analytic
 kernels/p[ar]*: render/surface_samples render/passes device/tune
 kernels/pixel.h: render/surface_samples render/passes render/surface_light
 kernels/points.cl: render/points formulas/counts

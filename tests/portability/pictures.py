@@ -47,6 +47,7 @@ _SCENES: dict[str, str] = {
     "still": "{name: hast, iterations: 8}",
     "paths": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "steps": "{name: mandelbulb, iterations: 5}",
+    "joined": "{name: mandelbulb, iterations: 5}",
     "cloud": "{name: mandelbulb, iterations: 5}",
     "plane": "{name: hast, iterations: 60}",
     "glass": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
@@ -61,6 +62,7 @@ _RENDERERS = {
     "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
     "cloud": "{type: volume, resolution: 12, value: iterations, normals: exact,"
     " transfer: {opacity: [{at: 1, opacity: 0}, {at: 5, opacity: 0.1}]}}",
+    "joined": "{samples: 2}",
     "inside": "{type: volume, resolution: 24, value: inside, normals: least_squares}",
     "coverage": "{type: volume, resolution: 24, value: coverage, shadows: true,"
     " transfer: {opacity: [{at: 0.05, opacity: 0}, {at: 1, opacity: 0.6}]}}",
@@ -81,6 +83,11 @@ _MORE = {
     "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
     "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
     " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5}}}\nmaterial: {name: glass}\n",
+    "joined": "coloring: {by: trap, scale: 1, palette: opal}\n"
+    "objects: {hole: {type: sphere, position: [0.3, -0.8, 0.3], radius: 0.4, join: cut},"
+    " drop: {type: box, join: smooth_union, position: [-0.7, -0.6, 0.6], size: [0.4, 0.3, 0.5]},"
+    " other: {type: formula, position: [0.9, -0.3, -0.4], scale: 0.05, formula: {name: mandelbox, iterations: 8}},"
+    " slab: {type: plane, position: [0, 0, 0.9], join: intersection}}\n",
     "quaternion": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]\n",
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
@@ -93,6 +100,7 @@ _BRIEF = (
     "paths",
     "glass",
     "steps",
+    "joined",
     "cloud",
     "inside",
     "coverage",

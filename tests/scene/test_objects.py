@@ -2,35 +2,49 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from clfractal.errors import ClfractalError
+from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import dump_scene, load_scene
-from clfractal.scene.objects import MAX_OBJECTS, BoxObject, CylinderObject, SphereObject
+from clfractal.scene.movement import movement_of
+from clfractal.scene.objects import (
+    MAX_FORMULAS,
+    MAX_OBJECTS,
+    BoxObject,
+    CylinderObject,
+    FormulaObject,
+    SphereObject,
+)
 from tests.render.objects_oracle import rotation_of
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 STEEL = "materials: {steel: {}, clay: {}}\n"
 MANY = ", ".join(f"b{n}: {{}}" for n in range(MAX_OBJECTS + 1))
 
+OTHER = "type: formula, formula: {name: menger_sponge}"
+FULL = ", ".join(f"f{n}: {{{OTHER}}}" for n in range(MAX_FORMULAS))
+
 # In the texts below the sign § stands where the message must point to.
 CASES = [
     ("objects: {ball: {radius: §0}}", "objects.ball.radius: must be above 0, got 0"),
     (
         "objects: {ball: {type: §bal}}",
-        "objects.ball.type: unknown type 'bal'; known: box, cylinder, plane, sphere, water",
+        "objects.ball.type: unknown type 'bal'; known: box, cylinder, formula, plane, sphere, water",
     ),
     (
         "objects: {ball: {§size: 3}}",
-        "objects.ball: unknown key 'size'; known: material, position, radius, rotation, scale, type",
+        "objects.ball: unknown key 'size'; known: join, material, position, radius, rotation, scale, smoothness, type",
     ),
     ("objects: {b: {type: box, size: §3}}", "objects.b.size: must be a list of 3 numbers, got 3"),
     ("objects: {b: {type: box, size: [1, §0, 1]}}", "objects.b.size.1: must be above 0, got 0"),
     ("objects: {p: {type: plane, normal: §[0, 0, 0]}}", "objects.p.normal: must not be zero"),
     (
         "objects: {p: {type: plane, §radius: 1}}",
-        "objects.p: unknown key 'radius'; known: material, normal, position, type",
+        "objects.p: unknown key 'radius'; known: join, material, normal, position, smoothness, type",
     ),
     (
         "objects: {sea: {type: water, waves: {direction: §[0, 0, 2]}}}",
@@ -69,6 +83,51 @@ CASES = [
     (
         "objects: {ball: {}}\nanimation: {frames: 9, tracks: {objects.bal.radius: §{expression: 1 + t}}}",
         "animation.tracks.objects.bal.radius: unknown object 'bal'; did you mean 'ball'?",
+    ),
+    ("objects: {b: §{type: formula}}", "objects.b.formula: is missing"),
+    (
+        "objects: {b: {type: formula, formula: {name: §mandelbul}}}",
+        "objects.b.formula.name: unknown formula 'mandelbul'; did you mean 'mandelbulb'?",
+    ),
+    (
+        "objects: {b: {type: formula, formula: {name: mandelbulb, parameters: {§powr: 3}}}}",
+        "objects.b.formula.parameters.powr: unknown parameter 'powr'; did you mean 'power'?",
+    ),
+    (
+        "objects: {b: {type: formula, formula: {file: §none.yaml}}}",
+        "objects.b.formula.file: none.yaml cannot be read: No such file or directory",
+    ),
+    (
+        f"objects: {{b: {{{OTHER}, join: §cut}}}}",
+        "objects.b.join: cannot be cut for a formula: how deep places are in its set is not known",
+    ),
+    (
+        "objects: {b: {type: plane, join: §smooth_union}}",
+        "objects.b.join: cannot be smooth_union for a plane, which has no end; a flat box can",
+    ),
+    (
+        "objects: {b: {join: §cutt}}",
+        "objects.b.join: must be union, smooth_union, cut or intersection, got 'cutt'; did you mean 'cut'?",
+    ),
+    ("objects: {b: {join: smooth_union, smoothness: §0}}", "objects.b.smoothness: must be above 0, got 0"),
+    (
+        f"objects: {{{FULL}, last: {{type: §formula, formula: {{name: mandelbulb}}}}}}",
+        f"objects.last.type: at most {MAX_FORMULAS} objects can be formulas, and this is one more",
+    ),
+    (
+        "objects: {b: {join: cut}}\ncut_planes: §[{plane: {normal: [1, 0, 0]}}]",
+        "cut_planes: cannot be combined with the object 'b', which is a part of the set; an object"
+        " {type: plane, join: cut} cuts both",
+    ),
+    (
+        "materials: {ice: {transmission: {weight: 1}}, clay: {}}\nlighting: {mode: path}\n"
+        "material: {name: §ice}\nobjects: {b: {join: cut, material: clay}}",
+        "material.name: is glass, 'ice', which cannot be joined with the object 'b'",
+    ),
+    (
+        f"objects: {{b: {{{OTHER}}}}}\nanimation: {{frames: 9, tracks: {{"
+        "objects.b.formula.parameters.powr: §{expression: 1 + t}}}",
+        "animation.tracks.objects.b.formula.parameters.powr: unknown parameter 'powr'; known: scale",
     ),
 ]
 
@@ -122,3 +181,73 @@ def test_solids_hold_what_is_inside() -> None:
         found = [solid.holds((x, y, z)) for x, y, z in points]
         assert 20 < expected.sum() < 300
         np.testing.assert_array_equal(found, expected)
+
+
+def test_formulas_of_objects_are_written_and_read_again(tmp_path: Path) -> None:
+    """Files that they name are read into the scene; their places and scales make the bounds."""
+    (tmp_path / "own.yaml").write_text(
+        "{variables: [x, y, z], map: [x, y, z], add: none, degree: 1, shape: 'sqrt(x*x + y*y + z*z) - 1',"
+        " bounds: {center: [1, 0, 0], radius: 2}, bailout: 9}"
+    )
+    (tmp_path / "scene.yaml").write_text(
+        HEAD + "objects:\n  own: {type: formula, formula: {file: own.yaml}, position: [10, 0, 0],"
+        " rotation: [0, 0, 90], scale: 3}\n"
+        "  hole: {join: cut, radius: 9}\n"
+    )
+    scene = load_scene(tmp_path / "scene.yaml")
+    again = load_scene(dump_scene(scene))
+    assert again == scene
+    assert list(again.joined) == ["own", "hole"]
+    center, radius = again.bounds
+    # The ball of the object: its centre (1, 0, 0), turned to y, three times as far.
+    assert radius >= 6
+    assert np.linalg.norm(np.array(center) - [10, 3, 0]) <= radius - 6 + 1e-9
+    assert np.linalg.norm(center) <= radius - again.chain.radius + 1e-9
+    assert not again.model_copy(update={"renderer": {"type": "volume"}, "objects": {}}).joined
+
+
+def test_a_parameter_of_an_object_moves() -> None:
+    text = (
+        "objects: {b: {type: formula, formula: {name: mandelbulb, live: [power]}}}\n"
+        "animation: {frames: 9, tracks: {objects.b.formula.parameters.power:"
+        " {keys: [{frame: 0, value: 6}, {frame: 8, value: 8}]},"
+        " objects.b.scale: {keys: [{frame: 0, value: 1}, {frame: 8, value: 4}]}}}"
+    )
+    movement = movement_of(load_scene(HEAD + text))
+    middle = movement.scene(4)
+    assert middle.joined_chains["b"].first.values["power"] == pytest.approx(7)
+    moved = middle.objects["b"]
+    assert isinstance(moved, FormulaObject)
+    assert moved.scale == pytest.approx(2)
+
+
+def test_what_is_inside_of_what_is_joined() -> None:
+    """Lights may stand in a cut, and must not stand in another formula."""
+    ball = (
+        "{variables: [x, y, z], map: [x, y, z], add: none, degree: 1, shape: 'sqrt(x*x + y*y + z*z) - 1',"
+        " bounds: {radius: 2}}"
+    )
+    text = (
+        "objects:\n"
+        f"  twin: {{type: formula, formula: {{inline: {ball}}}, position: [5, 0, 0], rotation: [0, 0, 90], scale: 2}}\n"
+        "  hole: {join: cut, position: [4, 0, 0], radius: 0.5}\n"
+        "  below: {type: plane, join: intersection, position: [0, 0, 1], normal: [0, 0, 2]}\n"
+        "  drop: {join: smooth_union, position: [5, 0, 1.5]}\n"
+    )
+    scene = load_scene(HEAD + text)
+    places = [
+        (5, 1.9, 0),
+        (5, 2.1, 0),
+        (4, 0, 0.4),
+        (4, 0, 0.6),
+        (5, 0.8, 1.2),
+        (5, 0.3, 1.4),
+        (0, 0, 0),
+        (0, 0, -1.3),
+    ]
+    found = inside_solid(scene, places)
+    assert found == [True, False, False, True, False, True, True, False]
+    lamp = "lights: [{type: point, position: [4, 0, 0.4]}]\n"
+    assert load_scene(HEAD + lamp + text).lights
+    with pytest.raises(ClfractalError, match="outside the object"):
+        load_scene(HEAD + lamp.replace("0.4]", "0.6]") + text)

@@ -294,6 +294,34 @@ def test_a_point_is_dragged_over_the_histogram() -> None:
     assert found.opacity == pytest.approx(0.75, abs=0.03)
 
 
+@pytest.mark.parametrize("key", ["color", "emission"])
+def test_colours_and_light_of_values_are_dragged_and_added(key: str) -> None:
+    ui, _ = make_ui("scenes/stereo_volume.yaml")
+    path = f"renderer.transfer.{key}"
+    made = [{"at": at, key: [0.02 * at, 0.01, 0.0]} for at in (0.0, 4.0, 8.0)]
+    assert ui.studio.edit({"renderer.transfer.color": None, "renderer.transfer.emission": None, path: made})
+    before = ui.studio.scene
+    found = plain_stops(ui, key)
+    stage = Stage(ui, lambda ui: transfer._strip(ui, path, plain_stops(ui, key), 0.0, 8.0))
+    assert ui.studio.scene is before
+    left, width, y = 8 + 10 + 11 + 6, 300 - 20 - 11 - 12, 8 + 10 + 16
+    middle = left + width / 2
+    stage.drag((middle, y), (middle + width / 8, y))
+    found = plain_stops(ui, key)
+    assert [stop["at"] for stop in found] == pytest.approx([0, 5, 8], abs=0.3)
+    assert [stop[key] for stop in found] == [stop[key] for stop in made]
+    stage.double_click(left + width / 4, y)
+    found = plain_stops(ui, key)
+    assert [stop["at"] for stop in found] == pytest.approx([0, 2, 5, 8], abs=0.3)
+    assert found[1][key][0] == pytest.approx(0.08 * found[1]["at"] / found[2]["at"], rel=0.05)
+
+
+def plain_stops(ui: Ui, key: str) -> list[dict[str, Any]]:
+    stops = ui.studio.value(f"renderer.transfer.{key}")
+    assert isinstance(stops, list)
+    return stops
+
+
 def test_a_histogram_counts_every_finite_voxel() -> None:
     values = np.array([0.0, 0.1, 0.5, 1.0, 2.0, np.nan, -1.0])
     found = histogram_of(values.reshape(1, 1, 7), 0, 1)
@@ -430,6 +458,24 @@ def test_objects_are_added_given_a_material_and_removed() -> None:
     assert not ui.studio.scene.objects
     assert renderer.switch(ui, "surface")
     assert ui.studio.scene.objects == before.objects
+
+
+def test_a_formula_beside_the_set_is_edited() -> None:
+    ui = opened("scenes/mandelbulb.yaml")
+    ui.size = (1280, 4000)
+    objects._add(ui, "formula", {"type": "formula", "formula": {"name": "mandelbulb", "iterations": 6}})
+    ui.memory["object"] = "formula"
+    before = ui.studio.scene
+    Stage(ui, scene_dock.draw, window=False)
+    assert ui.studio.scene is before
+    path = "objects.formula"
+    assert ui.studio.edit({f"{path}.formula.parameters.power": 5.0, f"{path}.join": "smooth_union"})
+    assert ui.studio.scene.joined_chains["formula"].first.values["power"] == 5
+    Stage(ui, scene_dock.draw, window=False)
+    assert not ui.studio.edit({f"{path}.join": "cut"})
+    assert ui.studio.edit({f"{path}.formula": {"name": "hast", "iterations": 9}})
+    assert renderer.switch(ui, "volume")
+    assert not ui.studio.scene.joined
 
 
 def test_the_cut_alone_and_back() -> None:

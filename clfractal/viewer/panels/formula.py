@@ -88,13 +88,13 @@ def _choice(ui: Ui) -> None:
     w.in_row(4)
     if w.icon_button(theme.LINK, "Make a chain of it: formulas in turn", enabled=chain_path(ui) is None):
         _open_chain(ui)
-    name = _library(ui, "##library", formula.name or "", single=False)
+    name = library(ui, "##library", formula.name or "", single=False)
     if name is not None:
         # Parameters and constants are those of the formula before; how far it is iterated is not.
         ui.studio.edit({"formula": {"name": name, "iterations": formula.iterations}})
 
 
-def _library(ui: Ui, popup: str, current: str, *, single: bool) -> str | None:
+def library(ui: Ui, popup: str, current: str, *, single: bool) -> str | None:
     """The library, to search in and to choose from; the name that was clicked.
 
     Args:
@@ -251,7 +251,7 @@ def _members(ui: Ui, root: str) -> None:
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
     if w.button("Add a formula", icon=theme.PLUS, width=-1, enabled=len(members) < MAX_LINKS):
         imgui.open_popup("##member")
-    name = _library(ui, "##member", "", single=True)
+    name = library(ui, "##member", "", single=True)
     if name is not None:
         ui.studio.edit({root: [*members, {"name": name, "count": 1}]})
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.objects import MAX_OBJECTS, AnyObject
+from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import formula, maps, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
@@ -16,7 +16,16 @@ from clfractal.viewer.panels.ui import Ui
 # No name that a material may have.
 PHONG, NEW = "", " "
 _IN_A_ROW = 3
-_KINDS = {"plane": "Plane", "water": "Water", "sphere": "Sphere", "box": "Box", "cylinder": "Cylinder"}
+_KINDS = {
+    "plane": "Plane",
+    "water": "Water",
+    "sphere": "Sphere",
+    "box": "Box",
+    "cylinder": "Cylinder",
+    "formula": "Formula",
+}
+
+_ABOUT = {"water": "Add water with waves", "formula": "Add the set of another formula"}
 
 
 def summary(ui: Ui) -> str:
@@ -81,13 +90,17 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
         "sphere": {"position": place, "radius": size},
         "box": {"position": place, "size": [2 * size] * 3},
         "cylinder": {"position": place, "radius": size, "height": 4 * size},
+        "formula": {
+            "position": [float(f"{x:.4g}") for x in (center[0] + 2 * radius, *center[1:])],
+            "formula": {"name": "mandelbulb", "iterations": 8},
+        },
     }
     for number, (kind, values) in enumerate(first.items()):
         if number % _IN_A_ROW:
             w.in_row(4)
         else:
             imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
-        about = "Add water with waves" if kind == "water" else f"Add a {kind}"
+        about = _ABOUT.get(kind, f"Add a {kind}")
         if w.button(_KINDS[kind], icon=theme.PLUS, enabled=room, about=about):
             _add(ui, kind, {"type": kind, **values})
     w.in_row(4)
@@ -105,15 +118,38 @@ def _add(ui: Ui, kind: str, values: dict[str, Any]) -> None:
 
 def _object(ui: Ui, name: str) -> None:
     path, each = f"objects.{name}", ui.studio.scene.objects[name]
+    if isinstance(each, FormulaObject):
+        _formula(ui, name, each)
     _material(ui, path, each)
-    keys = [key for key in type(each).model_fields if key not in ("type", "material", "waves")]
+    left = {"type", "material", "waves", "formula"}
+    if not (isinstance(each, Joined) and each.join == "smooth_union"):
+        left.add("smoothness")
+    keys = [key for key in type(each).model_fields if key not in left]
     step = 0.01 * ui.studio.scene.bounds[1]
     w.fields(ui, path, keys, position={"step": step}, rotation={"unit": "°"})
     if each.type == "water":
         w.fields(ui, f"{path}.waves", tuple(type(each.waves).model_fields), spread={"unit": "°"})
     if each.material in ui.studio.scene.materials:
         w.group(ui, f"Material {each.material}")
-        w.section(ui, f"materials.{each.material}")
+        maps.material(ui, each.material)
+
+
+def _formula(ui: Ui, name: str, each: FormulaObject) -> None:
+    """Which formula it is, from the library; its parameters and iterations."""
+    path, chain = f"objects.{name}.formula", ui.studio.scene.joined_chains[name]
+    if not w.filtering(ui):
+        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        text = formula.titles().get(each.formula.name or "", chain.title or "Own formula")
+        if w.button(f"{text}##{path}", width=-1, about="Choose another formula"):
+            imgui.open_popup(f"##library {path}")
+        found = formula.library(ui, f"##library {path}", each.formula.name or "", single=False)
+        if found is not None:
+            ui.studio.edit({path: {"name": found, "iterations": each.formula.iterations}})
+            return
+    w.problem(ui, path)
+    if len(chain.links) == 1:
+        formula.parameters(ui, path, chain.first)
+    w.field(ui, f"{path}.iterations")
 
 
 def _material(ui: Ui, path: str, each: AnyObject) -> None:

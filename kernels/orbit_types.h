@@ -1,0 +1,45 @@
+// What is found out about orbits, whichever formula they are of.
+#include "numbers/quick.h"
+#ifndef SOLIDS
+#define SOLIDS 1  // solids that are joined, see solids.h
+#endif
+
+// How an orbit ended.
+typedef struct {
+    real count;   // applications until |z| left the radius that counts, or all
+    mask inside;  // it has not
+} orbit_end;
+
+// How an orbit of whole counts ended. Masks are whole numbers: a real could not count beyond 2^24 in float32.
+typedef struct {
+    mask count;   // applications until |z| left the bailout, or all
+    mask inside;  // it has not
+} orbit_counted;
+
+// How far a point is from the solid.
+typedef struct {
+    real step;  // distance that is safe to go, in scene units; 0 inside
+    orbit_end end;
+#if SOLIDS > 1
+    real scale; // of several solids: the step scale of the nearest one
+#endif
+} clearance;
+
+// What is known of a point on the surface, from one orbit over dual numbers.
+typedef struct {
+    vec gradient;        // of the distance, not normalised: points away from the solid
+    real square;         // the last |z|^2 ...
+    real square_before;  // ... and the one before it
+#if SOLIDS > 1
+    real count;          // of several solids: the count of the nearest one ...
+    real of;             // ... its number ...
+    real solid;           // ... and that of what the surface belongs to: the same, or what has cut it
+#endif
+} surface_point;
+
+// Whether the work was cancelled. Long orbits test this now and then, or a launch could take arbitrarily long. The host writes
+// the record while kernels run; they see it if both share their memory. The results of a cancelled launch are discarded.
+#define ORBIT_LOOK 4096
+INLINE int orbit_cancelled(__constant const struct Orbit *orbit) {
+    return *(volatile __constant const int *)&orbit->cancelled;
+}

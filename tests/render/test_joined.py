@@ -1,0 +1,359 @@
+"""Formulas and simple solids that are joined to one set, against their distances in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
+from clfractal.renderers.surface import program_texts
+from clfractal.scene.objects import turned_axes
+from tests.render.objects_oracle import NOWHERE
+from tests.render.shots import (
+    BALL,
+    BALL_RADIUS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    QUICK_BALL,
+    SOLIDS,
+    SPHERE_CENTER,
+    SPHERE_RADIUS,
+    normals_of,
+    plan_of,
+    points_of,
+    rays,
+    scene_of,
+    shoot,
+    shoot_whole,
+)
+
+Floats = npt.NDArray[np.float64]
+Distance = Callable[[Floats], Floats]
+
+TURN, MOVED, SCALE = [20, -35, 50], [0.2, 0.1, -0.1], 0.7
+WAYS: dict[str, dict[str, Any]] = {"distance": {}, "steps": {"search": "steps", "step": 0.01}}
+
+
+def ball(points: Floats) -> Floats:
+    found: Floats = np.linalg.norm(points, axis=-1) - BALL_RADIUS
+    return found
+
+
+def solids(points: Floats) -> Floats:
+    """`SOLIDS`, which is 0 inside where it is a formula's."""
+    q = np.abs(points - [0, 0, -0.25]) - [1.2, 1.2, 0.25]
+    box = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
+    found: Floats = np.minimum(np.linalg.norm(points - SPHERE_CENTER, axis=-1) - SPHERE_RADIUS, box)
+    return found
+
+
+def placed(distance: Distance, scale: float = SCALE, place: list[float] | None = None) -> Distance:
+    axes, middle = np.array(turned_axes((20.0, -35.0, 50.0))), np.array(place or MOVED)
+    return lambda points: scale * distance((points - middle) @ axes.T / scale)
+
+
+def a_sphere(center: list[float], radius: float) -> Distance:
+    return lambda points: np.linalg.norm(points - center, axis=-1) - radius
+
+
+def a_box(points: Floats) -> Floats:
+    """Of sides 1.2, 0.5, 0.9 in its own space."""
+    q = np.abs(points) - [0.6, 0.25, 0.45]
+    found: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
+    return found
+
+
+def a_cylinder(points: Floats) -> Floats:
+    """Of radius 0.4 and height 1.3 in its own space."""
+    q = np.stack([np.linalg.norm(points[..., :2], axis=-1) - 0.4, np.abs(points[..., 2]) - 0.65], -1)
+    found: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
+    return found
+
+
+def a_plane(points: Floats) -> Floats:
+    found: Floats = (points - [0, 0, 0.2]) @ (np.array([0.3, -0.2, 2.0]) / np.linalg.norm([0.3, -0.2, 2.0]))
+    return found
+
+
+def smooth(a: Floats, b: Floats, width: float) -> Floats:
+    share = np.maximum(width - np.abs(a - b), 0) / width
+    found: Floats = np.minimum(a, b) - 0.25 * width * share**2
+    return found
+
+
+def marched(distance: Distance, origin: Floats, direction: Floats, far: float = 8.0) -> Floats:
+    """Where rays first meet the solid, by small safe steps; infinite where they do not."""
+    t = np.zeros(direction.shape[:-1])
+    for _ in range(400):
+        t = np.minimum(t + 0.7 * np.maximum(distance(origin + t[..., None] * direction), 0), far)
+    t[distance(origin + t[..., None] * direction) > 1e-7] = np.inf
+    return t
+
+
+def normal_at(distance: Distance, points: Floats) -> Floats:
+    step = 1e-5 * np.eye(3)
+    slope = np.stack([distance(points + e) - distance(points - e) for e in step], -1)
+    found: Floats = slope / np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-30)
+    return found
+
+
+PLACED = {"rotation": TURN, "position": MOVED}
+APART = [0.5, -0.7, 0.3]
+SIMPLE: dict[str, tuple[dict[str, Any], Distance]] = {
+    "sphere": ({"type": "sphere", "position": APART, "radius": 0.5}, a_sphere(APART, 0.5)),
+    "box": (
+        {"type": "box", "size": [1.2, 0.5, 0.9], "rotation": TURN, "position": APART},
+        placed(a_box, 1, APART),
+    ),
+    "cylinder": (
+        {"type": "cylinder", "radius": 0.4, "height": 1.3, "rotation": TURN, "position": APART},
+        placed(a_cylinder, 1, APART),
+    ),
+    "plane": ({"type": "plane", "position": [0, 0, 0.2], "normal": [0.3, -0.2, 2]}, a_plane),
+}
+
+
+def beside_a_rim(met: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Pixels with one of the other kind at most two pixels away."""
+    edged = np.pad(met, 2, mode="edge")
+    rows, columns = met.shape
+    around = [edged[i : i + rows, j : j + columns] for i in range(5) for j in range(5)]
+    found: npt.NDArray[np.bool_] = np.any(around, axis=0) != np.all(around, axis=0)
+    return found
+
+
+def agree(
+    device: Device,
+    scene: Any,
+    distance: Distance,
+    *,
+    precision: Precision = "float32",
+    lanes: int | None = None,
+    degrees: float = 1.0,
+) -> npt.NDArray[np.bool_]:
+    """A picture and the distance have the same places and, at most places, normals that are `degrees` apart at most."""
+    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    origin, direction, footprint = rays(scene)
+    t = marched(distance, origin, direction)
+    met, hit = np.isfinite(t), film["A"] == 1
+    assert ((met == hit) | beside_a_rim(met)).all()
+    assert (met != hit).mean() < 0.04
+    points = origin + np.where(met, t, 0)[..., None] * direction
+    normals = normal_at(distance, points)
+    # At rims a pixel's cone meets what its ray does not.
+    front = met & hit & ((normals * direction).sum(-1) < -0.4)
+    assert front.mean() > 0.1
+    width = footprint * (t if scene.camera.projection == "perspective" else 1)
+    off = (np.linalg.norm(points_of(film) - points, axis=-1) / width)[front]
+    assert np.median(off) < 0.25
+    assert (off > 0.8).mean() < 0.04, np.percentile(off, [50, 80, 90, 95, 99])
+    angle = np.degrees(np.arccos(np.clip((normals_of(film) * normals).sum(-1), -1, 1)))[front]
+    assert np.percentile(angle, 80) < degrees
+    seen: npt.NDArray[np.bool_] = front
+    return seen
+
+
+@pytest.mark.parametrize("join", ["cut", "intersection"])
+@pytest.mark.parametrize("kind", SIMPLE)
+@pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "rule"])
+def test_what_is_cut_out_or_in_common(device: Device, formula: dict[str, Any], kind: str, join: str) -> None:
+    values, other = SIMPLE[kind]
+    scene = scene_of(formula, PERSPECTIVE, (112, 96), objects={"tool": {**values, "join": join}})
+
+    def distance(points: Floats) -> Floats:
+        more = other(points)
+        return np.maximum(ball(points), -more if join == "cut" else more)
+
+    agree(device, scene, distance)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("precision", "lanes"), [("float32", 1), ("float32", 4), ("float64", 4)])
+def test_each_search_and_number_type(device: Device, way: str, precision: Precision, lanes: int) -> None:
+    objects = {
+        "hole": {**SIMPLE["sphere"][0], "join": "cut"},
+        "other": {
+            "type": "formula",
+            "formula": {"inline": SOLIDS, "iterations": 3},
+            "scale": SCALE,
+            **PLACED,
+        },
+    }
+    scene = scene_of(BALL, PERSPECTIVE, (96, 80), objects=objects, renderer={"type": "surface", **WAYS[way]})
+    other = placed(solids)
+
+    def distance(points: Floats) -> Floats:
+        return np.minimum(np.maximum(ball(points), -SIMPLE["sphere"][1](points)), other(points))
+
+    agree(device, scene, distance, precision=precision, lanes=lanes, degrees=4.0)
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+@pytest.mark.parametrize("points", [1, 9])
+def test_a_formula_at_another_place(device: Device, camera: dict[str, Any], points: int) -> None:
+    other = {"type": "formula", "formula": {"inline": SOLIDS, "iterations": 3}, "scale": SCALE, **PLACED}
+    renderer = {"type": "surface", "points": {"count": points, "pattern": "grid"}}
+    scene = scene_of(NOWHERE, camera, (112, 96), objects={"other": other}, renderer=renderer)
+    agree(device, scene, placed(solids), degrees=6.0 if points > 1 else 1.0)
+
+
+def test_a_smooth_union_is_where_its_smooth_minimum_is_0(device: Device) -> None:
+    formula = {"inline": SOLIDS, "iterations": 3}
+    drop = {"type": "sphere", "position": [0.9, -0.7, 0.4], "radius": 0.35, "join": "smooth_union"}
+    camera = {**PERSPECTIVE, "target": [0.9, -0.7, 0.3], "fov": 24}
+    scene = scene_of(formula, camera, (112, 96), objects={"drop": {**drop, "smoothness": 0.4}})
+    exact = a_sphere([0.9, -0.7, 0.4], 0.35)
+
+    def flowing(points: Floats) -> Floats:
+        return smooth(np.maximum(solids(points), 0), exact(points), 0.4)
+
+    front = agree(device, scene, flowing, degrees=6)
+    origin, direction, _ = rays(scene)
+    plain = marched(lambda points: np.minimum(solids(points), exact(points)), origin, direction)
+    sooner = plain - np.where(front, marched(flowing, origin, direction), 0)
+    assert (sooner[front] > 0.02).sum() > 100, "something flows between both"
+
+
+def test_the_formula_at_home_looks_as_ever(device: Device) -> None:
+    """A scene whose second formula is far away has the same picture."""
+    formula = {"name": "mandelbulb", "iterations": 8}
+    camera = {"position": [0.5, -2.6, 0.6], "fov": 35}
+    far = {"type": "formula", "formula": {"name": "mandelbulb", "iterations": 8}, "position": [0, 60, 0]}
+    alone = shoot(scene_of(formula, camera, (64, 64)), device)
+    joined = shoot(scene_of(formula, camera, (64, 64), objects={"far": far}), device)
+    assert (alone["A"] != joined["A"]).mean() < 0.02
+    both = (alone["A"] == 1) & (joined["A"] == 1)
+    apart = np.abs(alone["Z"][both] - joined["Z"][both])
+    assert np.median(apart) < 2e-3
+    assert np.percentile(apart, 80) < 1e-2
+    assert np.median(np.linalg.norm(normals_of(alone) - normals_of(joined), axis=-1)[both]) < 0.05
+
+
+@pytest.mark.parametrize("by", ["iterations", "trap", "thickness"])
+def test_each_formula_has_its_own_colouring(device: Device, by: str) -> None:
+    """The same set as an object, smaller and elsewhere, has the colours that it has by itself."""
+    formula = {"name": "mandelbulb", "iterations": 7}
+    scale, place = 0.5, np.array([1.5, 0.2, -0.4])
+    coloring: dict[str, Any] = {"by": by, "scale": 1.0 if by == "trap" else 0.3, "repeat": False}
+    if by == "trap":
+        coloring["trap"] = {"shape": "point", "center": [0.4, 0.1, 0.2]}
+    home, there = dict(coloring), dict(coloring)
+    if by == "thickness":
+        home |= {"step": 0.01, "scale": 2.0}
+        there |= {"step": 0.01 * scale, "scale": 2.0 / scale}
+    camera = {"position": [0.3, -2.5, 0.5], "fov": 35}
+    lit = {"material": {"ambient": 1, "diffuse": 0.2, "specular": 0}}
+    alone = shoot(scene_of(formula, camera, (160, 160), **lit, coloring=home), device)
+    moved = {
+        "position": (place + scale * np.array(camera["position"])).tolist(),
+        "target": place.tolist(),
+        "fov": 35,
+    }
+    twin = {"type": "formula", "formula": formula, "position": place.tolist(), "scale": scale}
+    scene = scene_of(NOWHERE, moved, (160, 160), objects={"twin": twin}, **lit, coloring=there)
+    joined = shoot(scene, device)
+    both = (alone["A"] == 1) & (joined["A"] == 1)
+    assert both.mean() > 0.8
+    for channel in "RGB":
+        assert np.median(np.abs(alone[channel] - joined[channel])[both]) < 0.06
+    assert np.std(joined["R"][both]) > 0.04
+
+
+def test_walls_have_their_own_colour_and_light_along_paths(device: Device) -> None:
+    tool = {"type": "plane", "position": [0, 0, 0], "normal": [0, 0, -1], "join": "cut", "material": "red"}
+    scene = scene_of(
+        BALL,
+        {"position": [0, 0, 4], "target": [0, 0, 0], "up": [0, 1, 0], "fov": 30},
+        (32, 32),
+        objects={"tool": tool},
+        materials={"red": {"base": {"color": [0.8, 0.1, 0.05]}, "specular": {"weight": 0}}},
+        lights=[],
+        background=[1, 1, 1],
+        lighting={"mode": "path", "bounces": 2},
+        renderer={"type": "surface", "samples": 16},
+    )
+    film = shoot(scene, device, samples=16)
+    middle = (slice(13, 19), slice(13, 19))
+    assert (film["A"][middle] == 1).all()
+    np.testing.assert_allclose(points_of(film)[middle][..., 2], 0, atol=2e-3)
+    np.testing.assert_allclose(normals_of(film)[middle], np.broadcast_to([0, 0, 1], (6, 6, 3)), atol=1e-2)
+
+
+def twin_of(formula: dict[str, Any], camera: dict[str, Any], **sections: Any) -> tuple[Any, Any]:
+    """A scene, and the same one with its set as an object of half the size elsewhere."""
+    scale, place = 0.5, np.array([1.5, 0.2, -0.4])
+    moved = {
+        "position": (place + scale * np.array(camera["position"])).tolist(),
+        "target": place.tolist(),
+        "fov": camera["fov"],
+    }
+    twin = {"type": "formula", "formula": formula, "position": place.tolist(), "scale": scale}
+    alone = scene_of(formula, camera, (64, 64), **sections)
+    return alone, scene_of(NOWHERE, moved, (64, 64), objects={"twin": twin}, **sections)
+
+
+@pytest.mark.parametrize("by", ["closeness", "trap"])
+def test_a_formula_beside_the_set_glows(device: Device, by: str) -> None:
+    formula, camera = {"name": "mandelbulb", "iterations": 6}, {"position": [0.3, -3, 0.5], "fov": 45}
+    glow = {"by": by, "width": 0.1, "reach": 0.5}
+    alone, joined = twin_of(formula, camera, background=[0, 0, 0], lights=[])
+    alone = alone.model_copy(update={"glow": {**glow, "color": [1, 1, 1]}})
+    # Widths are of the scene: half of them around a set of half the size.
+    joined = joined.model_copy(update={"glow": {**glow, "width": 0.05, "color": [1, 1, 1]}})
+    first, second = (shoot(scene, device, samples=16)["G"] for scene in (alone, joined))
+    assert first.mean() > 0.02
+    assert second.mean() == pytest.approx(first.mean(), rel=0.08)
+
+
+def test_along_paths_it_has_the_same_light(device: Device) -> None:
+    formula, camera = {"name": "mandelbulb", "iterations": 5}, {"position": [0.3, -3, 0.5], "fov": 40}
+    alone, joined = twin_of(
+        formula,
+        camera,
+        lighting={"mode": "path", "bounces": 3},
+        environment={"name": "dusk"},
+        lights=[{"direction": [1, 1, -1]}],
+        materials={"clay": {"base": {"color": [0.7, 0.5, 0.3]}}},
+        material={"name": "clay"},
+    )
+    first, second = (shoot(scene, device, samples=64) for scene in (alone, joined))
+    for channel in "RGB":
+        assert second[channel].mean() == pytest.approx(first[channel].mean(), rel=0.03)
+
+
+def test_both_eyes_and_all_views_of_it(device: Device) -> None:
+    views = [{"camera": PERSPECTIVE}, {"renderer": {"type": "cut_plane"}}]
+    scene = scene_of(
+        BALL,
+        {"position": [0, -4, 0.5], "fov": 40},
+        (96, 48),
+        objects={"hole": {**SIMPLE["sphere"][0], "join": "cut"}},
+        layout={"columns": 2, "views": views},
+    )
+    film = shoot_whole(scene, device)
+    whole = shoot_whole(scene_of(BALL, PERSPECTIVE, (48, 48), objects={}), device)
+    left = film["Z"][:, :48]
+    seen = np.isfinite(left) & np.isfinite(whole["Z"])
+    assert (left[seen] - whole["Z"][seen] > 0.2).sum() > 20, "the hole is seen"
+    assert (film["A"][:, 50:] == 1).all()
+
+
+def test_a_moving_formula_compiles_once(device: Device) -> None:
+    formula = {"name": "mandelbulb", "iterations": 5, "live": ["power"]}
+
+    def texts(power: float, scale: float) -> list[str]:
+        twin = {"type": "formula", "formula": {**formula, "parameters": {"power": power}}, "scale": scale}
+        scene = scene_of(BALL, PERSPECTIVE, objects={"twin": {**twin, "position": [1, scale, 0]}})
+        return [text.flat.text for text in program_texts(scene, plan_of(scene, device))]
+
+    assert texts(4.0, 0.5) == texts(7.5, 0.8)
+    one = {"type": "formula", "formula": formula}
+    both = scene_of(formula, PERSPECTIVE, objects={"a": one, "b": {**one, "position": [3, 0, 0]}})
+    march = program_texts(both, plan_of(both, device))[0].flat.text
+    assert "orbit_solid_0" in march
+    assert "orbit_solid_1" not in march, "equal texts are one"
