@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, Stopped
+from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError, Stopped
 from clfractal.pictures.tiles import Region
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Borrowing
@@ -19,6 +19,7 @@ from clfractal.viewer.background import Task
 from clfractal.viewer.fitting import Fits
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.viewer.pacing import Pacing, Schedule
+from clfractal.viewer.resting import clean
 from clfractal.work.canvas import CHANNELS, Canvas, CanvasKernels, CanvasStore
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
@@ -320,7 +321,19 @@ class Session:
             if work.ranges and self._tasks:
                 raise Stopped
         self._executor.forget()
+        if work.cleans:
+            self._clean(work, work.canvas, token)
         work.finished = True
+
+    def _clean(self, work: _Gathering, canvas: Canvas, token: CancelToken) -> None:
+        """Takes the noise out of the whole picture, as its scene wants; one that cannot be stays as it is."""
+        problem = None
+        try:
+            clean(work.job.scene, canvas, self._aside, token, self._tell)
+        except FileError as error:
+            problem = error
+        self._publish(work.wanted, work.job, work.job, canvas, 1, work.samples, True, work.seconds, 0.0)
+        self.problem = problem
 
     def _pass(self, work: _Gathering, canvas: Canvas, token: CancelToken) -> None:
         """The next pass; one that was interrupted is done anew: pixels that have its samples already get no more."""
@@ -337,8 +350,8 @@ class Session:
         if samples[1] == 1:
             pixels = sum(view.plan.region.pixels for view in part.views)
             self.pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
-        last = not work.ranges
-        if last or samples[0] == 0 or work.schedule.due(time.perf_counter()):
+        if not work.ranges or samples[0] == 0 or work.schedule.due(time.perf_counter()):
+            last = not work.ranges and not work.cleans
             self._publish(wanted, work.job, work.job, canvas, 1, work.samples, last, work.seconds, seconds)
 
     def _grown(self, work: _Gathering, canvas: Canvas, seconds: float) -> None:
@@ -459,6 +472,7 @@ class _Gathering:
         self.samples = 0
         self.prepared = False
         self.finished = False
+        self.cleans = wanted.scene.output.denoise and wanted.region is None  # of its noise, at the end
 
     def begin(self, *, in_passes: bool) -> None:
         """All samples are still to be made, in passes or at once."""

@@ -161,6 +161,16 @@ class Canvas:
         planes = {name: np.ascontiguousarray(colors[..., index]) for index, name in enumerate("RGBA")}
         return {**planes, "Z": depths}
 
+    def write_colors(self, queue: cl.CommandQueue, number: int, colors: Floats) -> None:
+        """Replaces a view's R, G, B, of shape (rows, columns, 3) of its region; coverage stays."""
+        part = self.parts[number]
+        shape = (part.region.height, part.region.width)
+        whole = np.empty((*shape, 4), np.float32)
+        with self.device.failures("changing a picture"):
+            cl.enqueue_copy(queue, whole, self.colors, src_offset=16 * part.offset)
+            whole[..., :3] = colors
+            cl.enqueue_copy(queue, self.colors, whole, dst_offset=16 * part.offset)
+
     def start_reading_depths(self, queue: cl.CommandQueue) -> tuple[list[Floats], cl.Event]:
         """Depths of all views, arrays of shape (rows, columns), which are there when the event is complete."""
         depths = np.empty(self.pixels, np.float32)

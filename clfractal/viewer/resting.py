@@ -1,0 +1,75 @@
+"""The window's picture without its noise: when all its samples are made, and the scene's output wants that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from clfractal.device.cancel import CancelToken
+from clfractal.files.channels import ALBEDO, NORMAL
+from clfractal.pictures.denoise import check_installed, denoised
+from clfractal.pictures.film import Film
+from clfractal.pictures.tiled import Floats
+from clfractal.scene.model import Scene
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.work.canvas import Canvas
+from clfractal.work.films import JobFilms
+from clfractal.work.local import LocalExecutor
+from clfractal.work.prepare import prepare
+from clfractal.work.run import run
+
+GUIDE_SAMPLES = 4
+"""Samples of what surfaces reflect and of their normals, which the filter is told; it knows that they are noisy, too."""
+
+
+def clean(
+    scene: Scene, canvas: Canvas, executor: LocalExecutor, token: CancelToken, tell: Callable[[str], None]
+) -> None:
+    """Replaces the colours on a canvas that holds the finished picture of a scene.
+
+    Args:
+        executor: of the canvas's device; it renders what the filter is told beside the colours.
+
+    Raises:
+        FileError: Open Image Denoise is not installed, or failed.
+        Stopped: the token was set; the canvas is as it was.
+        DeviceError: the device failed.
+    """
+    check_installed()
+    tell("taking out the noise")
+    guides = _guides(scene, canvas, executor, token, tell)
+    cleaned: list[Floats] = []
+    for number, guide in enumerate(guides):
+        planes = canvas.read(executor.device.queue, number)
+        colors = np.stack([planes[name] for name in "RGB"], axis=-1)
+        aids = [] if guide is None else [_stacked(guide, names) for names in (ALBEDO, NORMAL)]
+        cleaned.append(denoised(colors, *aids))
+        token.check()
+    for number, colors in enumerate(cleaned):
+        canvas.write_colors(executor.device.queue, number, colors)
+
+
+def _guides(
+    scene: Scene, canvas: Canvas, executor: LocalExecutor, token: CancelToken, tell: Callable[[str], None]
+) -> list[Film | None]:
+    """What each part of the canvas shows of surfaces; None where only colours are known."""
+    plain = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
+    shown = [view.renderer for view, _ in scene.views] if scene.layout is not None else [scene.renderer]
+    if not all(isinstance(renderer, SurfaceRenderer) for renderer in shown):
+        return [None] * len(canvas.parts)
+    job = prepare(
+        plain,
+        executor.device,
+        channels=("R", "G", "B", *ALBEDO, *NORMAL),  # a pair is put together of colours
+        samples=min(GUIDE_SAMPLES, scene.renderer.samples),
+        on_start=tell,
+    )
+    films = JobFilms(job)
+    run(job, films.films, executor, token=token)
+    token.check()
+    return [*films.films]
+
+
+def _stacked(film: Film, names: tuple[str, ...]) -> Floats:
+    return np.stack([film[name] for name in names], axis=-1)
