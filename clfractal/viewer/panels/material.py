@@ -7,6 +7,7 @@ from typing import Any
 from clfractal.scene.environment import names
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import Environment
+from clfractal.viewer.panels import maps
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas
 from clfractal.viewer.panels.ui import Ui
@@ -20,7 +21,7 @@ def draw(ui: Ui) -> None:
     _lighting(ui)
     name = ui.studio.scene.material.name
     if name is not None and ui.studio.scene.lighting.mode == "path":
-        w.section(ui, f"materials.{name}")
+        maps.material(ui, name)
         return
     if ui.studio.scene.coloring.by == "solid":
         w.field(ui, "material.color")

@@ -117,8 +117,18 @@ def fields(ui: Ui, prefix: str, names: Sequence[str], **options: Mapping[str, An
         field(ui, f"{prefix}.{name}", **options.get(name, {}))
 
 
-def section(ui: Ui, path: str, *, skip: Sequence[str] = (), depth: int = 0) -> None:
-    """Every field of a section that widgets are known for, in the schema's order, sections within it as groups."""
+def section(
+    ui: Ui,
+    path: str,
+    *,
+    skip: Sequence[str] = (),
+    depth: int = 0,
+    of_map: Callable[[Ui, str, Map], None] | None = None,
+) -> None:
+    """Every field of a section that widgets are known for, in the schema's order, sections within it as groups.
+
+    `of_map` draws what is left of a value that differs from place to place, below its fields.
+    """
     found = find(ui.studio.scene, path)
     if found is None or not hasattr(type(found.value), "model_fields"):
         return
@@ -130,11 +140,13 @@ def section(ui: Ui, path: str, *, skip: Sequence[str] = (), depth: int = 0) -> N
         if meta is not None and meta.kind == "section" and inner is not None and depth < 3:
             if inner.value is not None:
                 group(ui, label_of(name))
-                section(ui, f"{path}.{name}", depth=depth + 1)
+                section(ui, f"{path}.{name}", depth=depth + 1, of_map=of_map)
         else:
             field(ui, f"{path}.{name}")
             if inner is not None and isinstance(inner.value, Map):
                 fields(ui, f"{path}.{name}", inner.value.used_keys)
+                if of_map is not None:
+                    of_map(ui, f"{path}.{name}", inner.value)
 
 
 def field(

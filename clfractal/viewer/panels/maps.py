@@ -1,0 +1,89 @@
+"""What differs from place to place in a material: the palette or the curve of each of its maps."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from imgui_bundle import imgui
+
+from clfractal.scene.maps import ColorMap, Map, NumberMap
+from clfractal.viewer.panels import palette_editor, theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.ui import Ui
+
+_MOST_POINTS = 256
+_HEIGHT = 54.0
+
+
+def material(ui: Ui, name: str) -> None:
+    """Every field of a material, and what its maps consist of."""
+    w.section(ui, f"materials.{name}", of_map=draw)
+
+
+def draw(ui: Ui, path: str, found: Map) -> None:
+    """The palette, or the curve, of the map at a path; and its trap."""
+    if found.by == "trap":
+        own = {"point": ("center",), "sphere": ("center", "radius")}
+        w.fields(ui, f"{path}.trap", ("shape", *own.get(found.trap.shape, ("center", "direction"))))
+    if isinstance(found, ColorMap) and found.texture is None:
+        palette_editor.draw(ui, f"{path}.palette")
+    elif isinstance(found, NumberMap):
+        _curve(ui, f"{path}.curve", found.curve)
+
+
+def _curve(ui: Ui, path: str, points: tuple[tuple[float, float], ...]) -> None:
+    """The curve as it is, and its points: where each is in the range, and the value there."""
+    if not w.filtering(ui):
+        _draw_curve(points)
+    for index, (at, value) in enumerate(points):
+        # A point stays between its neighbours.
+        low = points[index - 1][0] if index else 0.0
+        high = points[index + 1][0] if index + 1 < len(points) else 1.0
+        about = "place in the range, 0 to 1"
+        w.number(
+            ui,
+            f"{path}.{index}.0",
+            f"Point {index + 1}",
+            at,
+            w.Scale(low, high, (0, 1)),
+            default=None,
+            tip=about,
+        )
+        w.number(ui, f"{path}.{index}.1", "Value", value, w.Scale(), default=None, tip="the value there")
+    w.problem(ui, path)
+    if w.filtering(ui):
+        return
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    plain = [list(point) for point in points]
+    if w.icon_button(theme.PLUS, "Add a point", name=f"{path}.more", enabled=len(points) < _MOST_POINTS):
+        ui.studio.edit({path: with_point(plain)})
+    w.in_row(4)
+    if w.icon_button(theme.TRASH, "Remove the last point", name=f"{path}.less", enabled=len(points) > 2):
+        ui.studio.edit({path: plain[:-1]})
+
+
+def with_point(points: list[list[float]]) -> list[list[float]]:
+    """The points with one more, on the curve in the middle of its widest gap."""
+    index = max(range(1, len(points)), key=lambda i: points[i][0] - points[i - 1][0])
+    middle = [round((a + b) / 2, 6) for a, b in zip(points[index - 1], points[index], strict=True)]
+    return [*points[:index], middle, *points[index:]]
+
+
+def _draw_curve(points: tuple[tuple[float, float], ...]) -> None:
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    imgui.dummy(imgui.ImVec2(width, _HEIGHT))
+    draw = imgui.get_window_draw_list()
+    far = imgui.ImVec2(corner.x + width, corner.y + _HEIGHT)
+    draw.add_rect_filled(corner, far, theme.packed(theme.FRAME), 4.0)
+    low, high = min(value for _, value in points), max(value for _, value in points)
+    whole = [(0.0, points[0][1]), *points, (1.0, points[-1][1])]
+    places = [
+        imgui.ImVec2(
+            corner.x + 4 + (width - 8) * at,
+            corner.y + _HEIGHT - 5 - (_HEIGHT - 10) * ((value - low) / (high - low) if high > low else 0.5),
+        )
+        for at, value in whole
+    ]
+    for before, after in pairwise(places):
+        draw.add_line(before, after, theme.packed(theme.ACCENT), 1.5)
