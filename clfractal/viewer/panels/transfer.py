@@ -52,15 +52,15 @@ def draw(ui: Ui) -> None:
         return
     w.problem(ui, _COLOR)
     if color is not None and not w.filtering(ui):
-        _strip(ui, color, low, high)
+        _strip(ui, _COLOR, color, low, high)
     if opacity is not None:
         _light(ui, low, high)
 
 
 def _light(ui: Ui, low: float, high: float) -> None:
-    """Whether values shine by themselves; which of them, and how brightly, is written in the file."""
+    """Whether values shine by themselves, which of them, and how brightly."""
     found = plain(w.value(ui, _EMISSION))
-    tip = "high values shine; the stops in the file say how brightly"
+    tip = "light of their own, by value"
     width = w.row(ui, "Shines", path=_EMISSION, tip=tip, differs=found is not None)
     if width is not None and w.toggle(_EMISSION, found is not None):
         kept = ui.memory.setdefault("transfer.kept", {})
@@ -73,7 +73,10 @@ def _light(ui: Ui, low: float, high: float) -> None:
             {"at": high, "emission": [0.05, 0.015, 0.002]},
         ]
         ui.studio.edit({_EMISSION: kept.get("emission") or first})
+        return
     w.problem(ui, _EMISSION)
+    if found is not None and not w.filtering(ui):
+        _strip(ui, _EMISSION, found, low, high)
 
 
 def _switch_opacity(ui: Ui, on: bool, low: float, high: float) -> None:
@@ -268,14 +271,15 @@ def histogram(ui: Ui) -> Histogram | None:
 # Colours
 
 
-def _strip(ui: Ui, stops: Stops, low: float, high: float) -> None:
-    """The colours of values, and their stops."""
+def _strip(ui: Ui, path: str, stops: Stops, low: float, high: float) -> None:
+    """The colours of values, or the light that they send out, and their stops."""
+    key = path.rpartition(".")[2]
     low, high = _range(stops, low, high)
-    state = ui.memory.setdefault("transfer.strip", {"chosen": 0, "held": False})
+    state = ui.memory.setdefault(f"transfer.strip.{key}", {"chosen": 0, "held": False})
     state["chosen"] = min(state["chosen"], len(stops) - 1)
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
     corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
-    imgui.invisible_button("##colors", imgui.ImVec2(wide, _STRIP + 14))
+    imgui.invisible_button(f"##{key}", imgui.ImVec2(wide, _STRIP + 14))
     area = _Area(corner.x + 6, corner.y, wide - 12, _STRIP, low, high)
     mouse = imgui.get_mouse_pos()
     if imgui.is_item_activated():
@@ -284,23 +288,26 @@ def _strip(ui: Ui, stops: Stops, low: float, high: float) -> None:
             state.update(chosen=near, held=True)
         elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
             at = area.value(mouse.x)
-            stops, state["chosen"] = inserted(stops, at, color=_color_at(stops, at))
-            ui.studio.edit({_COLOR: stops})
+            stops, state["chosen"] = inserted(stops, at, **{key: _color_at(stops, at, key)})
+            ui.studio.edit({path: stops})
     if imgui.is_item_active() and state["held"] and imgui.is_mouse_dragging(0, 2.0):
         stops = placed(stops, state["chosen"], area.value(mouse.x))
-        ui.studio.edit({_COLOR: stops}, gesture=_COLOR)
+        ui.studio.edit({path: stops}, gesture=path)
     if imgui.is_item_deactivated() and state["held"]:
         state["held"] = False
         ui.studio.end_gesture()
-    _draw_strip(area, stops, state["chosen"])
-    w.field(ui, f"{_COLOR}.{state['chosen']}.color")
-    _place_row(ui, stops, state, area, _COLOR)
+    _draw_strip(area, stops, state["chosen"], key)
+    w.field(ui, f"{path}.{state['chosen']}.{key}")
+    _place_row(ui, stops, state, area, path)
 
 
-def _draw_strip(area: _Area, stops: Stops, chosen: int) -> None:
+def _draw_strip(area: _Area, stops: Stops, chosen: int, key: str) -> None:
+    """Light is shown by its parts of the brightest: its amount says what a voxel's side adds."""
     draw = imgui.get_window_draw_list()
     values = np.linspace(area.low, area.high, _SEGMENTS + 1)
-    colors = np.array([_color_at(stops, float(each)) for each in values])
+    colors = np.array([_color_at(stops, float(each), key) for each in values])
+    if key == "emission":
+        colors = colors / max(colors.max(), 1e-12)
     codes = [theme.packed((*map(float, row), 1.0)) for row in encode(np.clip(colors, 0, 1))]
     for number in range(_SEGMENTS):
         left = area.x + area.width * number / _SEGMENTS
@@ -315,7 +322,7 @@ def _draw_strip(area: _Area, stops: Stops, chosen: int) -> None:
         )
     for number, stop in enumerate(stops):
         x = area.place(stop["at"], 0).x
-        own, _ = shown(stop["color"])
+        own, _ = shown(stop[key])
         edge = theme.packed(theme.ACCENT if number == chosen else theme.TEXT)
         low, high = imgui.ImVec2(x - 5, area.y + _STRIP + 1), imgui.ImVec2(x + 5, area.y + _STRIP + 11)
         draw.add_rect_filled(low, high, theme.packed((*own, 1.0)), 2.0)
@@ -344,9 +351,9 @@ def _range(stops: Stops, low: float, high: float) -> tuple[float, float]:
     return (low, high) if high > low else (low - 0.5, high + 0.5)
 
 
-def _color_at(stops: Stops, value: float) -> list[float]:
+def _color_at(stops: Stops, value: float, key: str = "color") -> list[float]:
     at = [stop["at"] for stop in stops]
-    return [float(f"{np.interp(value, at, [s['color'][axis] for s in stops]):.4g}") for axis in range(3)]
+    return [float(f"{np.interp(value, at, [s[key][axis] for s in stops]):.4g}") for axis in range(3)]
 
 
 def _without(stops: Stops, index: int) -> Stops:
