@@ -69,9 +69,9 @@ def _check_places(scene: Scene) -> None:
                 Where(path=f"lights.{number}.type"),
             )
         # Here, because NumPy takes long to import.
-        from clfractal.scene.places import places_of
+        from clfractal.scene.places import check_places
 
-        places_of(scene, number)
+        check_places(scene, number)
 
 
 def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:

@@ -44,43 +44,72 @@ class Places:
     trap: Floats
 
 
+Pool = tuple[Floats, Floats, Floats]
+
+
 def places_of(scene: Scene, number: int) -> Places:
     """The places of a scene's light, which is a SetLight; found once, and the same on every machine.
 
     Raises:
         SceneError: no place is near enough to the trap; at the light's threshold.
     """
+    check_places(scene, number)
     light = scene.lights[number]
     assert isinstance(light, SetLight)
-    found = found_places(
+    return _spread_places(light.spacing or 0.0, *_searched(scene, light))
+
+
+def check_places(scene: Scene, number: int) -> None:
+    """As `places_of`, without choosing among the places that are near enough, which takes the longest.
+
+    Raises:
+        SceneError: no place is near enough to the trap; at the light's threshold.
+    """
+    light = scene.lights[number]
+    assert isinstance(light, SetLight)
+    found = near_trap(*_searched(scene, light))
+    if isinstance(found, str):
+        raise SceneError(found, Where(path=f"lights.{number}.threshold"))
+
+
+Searched = tuple[str, int, tuple[tuple[float, float, float], float], str, float, int, str, int]
+
+
+def _searched(scene: Scene, light: SetLight) -> Searched:
+    """What the places near a trap follow from, as values that can be keys."""
+    return (
         json.dumps(scene.formula.mapping(), sort_keys=True),
         scene.formula.iterations,
         scene.bounds,
         light.trap.model_dump_json(),
         light.threshold,
         light.count,
-        light.spacing,
         light.within.model_dump_json() if light.within is not None else "",
         light.seed,
     )
-    if not isinstance(found, Places):
-        raise SceneError(found, Where(path=f"lights.{number}.threshold"))
-    return found
 
 
 @lru_cache(maxsize=16)
-def found_places(
+def _spread_places(spacing: float, *searched: *Searched) -> Places:
+    found, count = near_trap(*searched), searched[5]
+    assert not isinstance(found, str)
+    surface, normal, near = found
+    spread = spread_out(surface, count, spacing)
+    return Places(surface[spread], normal[spread], near[spread])
+
+
+@lru_cache(maxsize=16)
+def near_trap(
     formula: str,
     iterations: int,
     bounds: tuple[tuple[float, float, float], float],
     trap_text: str,
     threshold: float,
     count: int,
-    spacing: float | None,
     within: str,
     seed: int,
-) -> Places | str:
-    """As `places_of`, of values that follow from nothing else; or what is wrong."""
+) -> Pool | str:
+    """Places near the trap, several for each of `count` if they are found: surface, normal, trap; or what is wrong."""
     chain = catalog.resolve(json.loads(formula), None, Where(path="formula"))
     trap = Trap.model_validate_json(trap_text)
     iterations = min(iterations, _MOST_APPLICATIONS)
@@ -89,7 +118,7 @@ def found_places(
         ball = json.loads(within)
         center, radius = tuple(ball["center"]), ball["radius"]
     random = np.random.default_rng(seed)
-    pool: list[tuple[Floats, Floats, Floats]] = []
+    pool: list[Pool] = []
     nearest, enough, reached = np.inf, 0, False
     for _ in range(_MOST_BATCHES):
         start = _in_ball(random, _BATCH, center, radius)
@@ -109,8 +138,7 @@ def found_places(
     if enough == 0:
         return f"no place of the set is that near to the trap: the nearest is {nearest:.3g} away, got {threshold:g}"
     surface, normal, near = (np.concatenate(parts) for parts in zip(*pool, strict=True))
-    spread = spread_out(surface, count, spacing or 0.0)
-    return Places(surface[spread], normal[spread], near[spread])
+    return surface, normal, near
 
 
 def descended(chain: Chain, points: Floats, iterations: int, tolerance: float) -> tuple[Floats, Floats]:
@@ -173,10 +201,17 @@ def distance_from_trap(trap: Trap, points: Floats) -> Floats:
 def spread_out(points: Floats, count: int, spacing: float) -> NDArray[np.int64]:
     """Numbers of at most `count` points: each is the farthest from all before (Gonzalez 1985), over `spacing` away."""
     chosen = [0]
+    axes = [np.ascontiguousarray(axis) for axis in points.T]
     away = np.full(len(points), np.inf)
+    # Written to in each step: whole arrays of it would take most of the time.
+    square, part = np.empty(len(points)), np.empty(len(points))
     while len(chosen) < min(count, len(points)):
-        offset = points - points[chosen[-1]]
-        np.minimum(away, np.einsum("ij,ij->i", offset, offset), out=away)
+        square[:] = 0
+        for axis in axes:
+            np.subtract(axis, axis[chosen[-1]], out=part)
+            np.multiply(part, part, out=part)
+            np.add(square, part, out=square)
+        np.minimum(away, square, out=away)
         farthest = int(away.argmax())
         if away[farthest] <= spacing**2:
             break

@@ -83,7 +83,8 @@ def test_places_lie_on_the_set_near_the_trap(
     assert (near < threshold).all()
     np.testing.assert_array_equal(near, found.trap)
     # The same again, and other places by another seed.
-    places.found_places.cache_clear()
+    places.near_trap.cache_clear()
+    places._spread_places.cache_clear()
     np.testing.assert_array_equal(made(1)[1].surface, found.surface)
     assert not np.array_equal(made(2)[1].surface, found.surface)
 
