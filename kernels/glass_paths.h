@@ -1,4 +1,5 @@
-// Paths through glass: what they carry while they are inside the set, and how they get there.
+// Paths through glass: what they carry while they are inside, and how they get there.
+#include "media.h"
 
 // A place in the spectrum: the index of refraction there (`bend`, see `clfractal/renderers/glass.py`), and what it weighs.
 INLINE color spectrum_at(real place, real *bend, __global const float *table) {
@@ -15,56 +16,76 @@ INLINE color spectrum_at(real place, real *bend, __global const float *table) {
 }
 
 // The material as a path meets it, from inside or not: for glass that spreads colours, at the path's wavelength, or at one that it
-// takes if it is refracted now, `wave` in (0, 1), which then is the path's; the result is what it weighs then. The index by Cauchy's equation n = a + b / wavelength^2.
-INLINE color glass_met(const carried *with, pbr *p, real *wave, __global const float *tables) {
-    p->inside = with->inside;
+// takes if it is refracted now, `wave` in (0, 1), which then is the path's; the result is what it weighs then. The index by Cauchy's
+// equation n = a + b / wavelength^2, and over that of the glass around.
+INLINE color glass_met(const carried *with, border edge, pbr *p, real *wave, world w) {
     const color white = color_of(R(1.0), R(1.0), R(1.0));
-    const mask spreads = less(R(0.0), p->transmission_weight * p->transmission_dispersion_scale);
+    p->inside = number_of(edge.leaving);
+    const mask spreads = less(R(0.0), p->transmission_weight * p->transmission_dispersion_scale) & ~edge.hidden;
     const mask fresh = spreads & less(with->wave, R(0.0));
     *wave = pick(fresh, *wave, with->wave);
-    if (!any_lane(spreads)) return white;
-    real bend;
-    const color weights = spectrum_at(fmax(*wave, R(0.0)), &bend, tables + SPECTRUM);
-    const real spread = p->transmission_dispersion_scale / p->transmission_dispersion_abbe_number;
-    const real index = p->specular_ior + (p->specular_ior - R(1.0)) * spread * bend;
-    p->bending_ior = pick(spreads, fmax(index, R(1.0)), p->specular_ior);
-    // A path of all colours is reflected like their mean, so that those which are refracted are white together.
-    p->specular_ior = pick(fresh, p->specular_ior, p->bending_ior);
-    return color_pick(fresh, weights, white);
+    color weights = white;
+    if (any_lane(spreads)) {
+        real bend;
+        weights = color_pick(fresh, spectrum_at(fmax(*wave, R(0.0)), &bend, w.albedos + SPECTRUM), white);
+        const real spread = p->transmission_dispersion_scale / p->transmission_dispersion_abbe_number;
+        const real index = p->specular_ior + (p->specular_ior - R(1.0)) * spread * bend;
+        p->bending_ior = pick(spreads, fmax(index, R(1.0)), p->specular_ior);
+        // A path of all colours is reflected like their mean, so that those which are refracted are white together.
+        p->specular_ior = pick(fresh, p->specular_ior, p->bending_ior);
+    }
+    if (any_lane(less(R(0.0), edge.around))) {
+        // Where the glass around is the denser one, the boundary is that of it, seen from its inside.
+        const real share = R(1.0) / medium_of(edge.around, w).index, bends = p->bending_ior * share, mirrors = p->specular_ior * share;
+        const mask thinner = less(bends, R(1.0));
+        p->bending_ior = pick(thinner, R(1.0) / bends, bends);
+        p->specular_ior = fmax(pick(thinner, R(1.0) / mirrors, mirrors), R(1.0));
+        const mask glassy = thinner & less(R(0.0), p->transmission_weight);
+        p->inside = pick(glassy, R(1.0) - p->inside, p->inside);
+    }
+    return weights;
 }
 
-// Whether a direction leads from a spot into the open.
-INLINE mask leads_out(vec toward, vec normal, real inside) {
-    const mask over = less(R(0.0), vec_dot(toward, normal)), within = mask_of(inside);
-    return (over & ~within) | (~over & within);
+// Whether a direction leads from a spot to the outer side of its body.
+INLINE mask leads_out(vec toward, vec normal, mask leaving) {
+    const mask over = less(R(0.0), vec_dot(toward, normal));
+    return (over & ~leaving) | (~over & leaving);
 }
 
-// What the medium takes away for each unit of the way, in natural logarithms.
-INLINE color absorption_of(const pbr *p) {
-    const real each = R(-1.0) / fmax(p->transmission_depth, R(1e-6));
-    const mask deep = less(R(0.0), p->transmission_depth);
-#define ABSORBED(c) pick(deep, each * log(fmax(p->transmission_color.c, R(1e-6))), R(0.0))
-    return color_of(ABSORBED(r), ABSORBED(g), ABSORBED(b));
-#undef ABSORBED
+// What a medium leaves of light on a way through it.
+INLINE color absorbed(color light, color absorption, real way) {
+    return color_of(light.r * exp(-way * absorption.r), light.g * exp(-way * absorption.g), light.b * exp(-way * absorption.b));
 }
 
-// Lets the medium absorb light on a way through it.
+// Lets the medium absorb light on a path's way through it.
 INLINE void path_absorbs(path *so_far, const carried *with, real way, world w) {
-    const real far = pick(mask_of(with->inside), fmin(way, R(2.0) * (real)(w.settings->bounds_radius)), R(0.0));
-    so_far->through.r *= exp(-far * with->absorption.r);
-    so_far->through.g *= exp(-far * with->absorption.g);
-    so_far->through.b *= exp(-far * with->absorption.b);
+    // The set ends where its bounds do, though its exit may not be found.
+    const real most = R(2.0) * (real)(w.settings->bounds_radius);
+    const real far = pick(equal(with->medium, set_body(w)), fmin(way, most), way);
+    so_far->through = color_pick(less(R(0.0), with->medium), absorbed(so_far->through, with->absorption, far), so_far->through);
 }
 
-// After a direction was chosen: whether the path goes on inside, and what it carries there.
-INLINE void path_crosses(path *so_far, carried *with, const spot *here, const pbr *p, color weights, real wave) {
-    const mask over = less(R(0.0), vec_dot(so_far->direction, here->normal)), within = mask_of(with->inside);
-    const mask stays_out = leads_out(so_far->direction, here->normal, with->inside);
+// Brings a path over the boundary if its direction leads there.
+INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, color weights, real wave, world w) {
+    const mask over = less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;
+    const mask stays_out = leads_out(so_far->direction, here->normal, edge.leaving);
     so_far->through = color_pick(over, so_far->through, color_mul(so_far->through, weights));
     with->wave = pick(over, with->wave, wave);
-    with->absorption = color_pick(within, with->absorption, absorption_of(p));
-    so_far->origin = vec_pick(stays_out, so_far->origin, here->seen);
-    // Nobody asks for light that reaches a spot through the set.
-    with->density = pick(stays_out, with->density, R(-1.0));
-    with->inside = number_of(~stays_out);
+    vec origin = here->seen;
+#if HAS_OBJECTS
+    const mask of_set = of_the_set(here->object, w);
+    const real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
+    origin = vec_pick(of_set, origin, vec_along(here->point, lift, here->normal));
+    so_far->origin = vec_pick(stays_out & of_set, so_far->origin, origin);
+#else
+    so_far->origin = vec_pick(stays_out, so_far->origin, origin);
+#endif
+    // Nobody asks for light that reaches a spot through its own body.
+    with->density = pick(stays_out & ~edge.hidden, with->density, R(-1.0));
+    media_leave(with, edge.body, crosses & edge.leaving);
+    media_enter(with, edge.body, crosses & ~edge.leaving);
+    if (!any_lane(crosses)) return;
+    const mask enters = crosses & ~edge.leaving & equal(with->medium, edge.body);
+    const color own = absorption_of(p->transmission_color, p->transmission_depth);
+    with->absorption = color_pick(crosses, color_pick(enters, own, medium_of(with->medium, w).absorption), with->absorption);
 }

@@ -118,6 +118,23 @@ INLINE vec object_normal(__global const struct Object *o, vec point) {
     return vec_normalize(vec_add(vec_add(x, y), vec_scale(vec_splat(o->own_z), n.z)));
 }
 
+#if HAS_GLASS
+// Whether a place is inside an object, or below a plane.
+INLINE mask object_holds(__global const struct Object *o, vec point) {
+    const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
+    const mask low = less(fabs(own.z), R(1.0));
+    const real across = own.x * own.x + own.y * own.y;
+    if (o->kind == OBJECT_SPHERE) return less(across + own.z * own.z, R(1.0));
+    if (o->kind == OBJECT_BOX) return low & less(fabs(own.x), R(1.0)) & less(fabs(own.y), R(1.0));
+    if (o->kind == OBJECT_CYLINDER) return low & less(across, R(1.0));
+#if HAS_WATER
+    real unused;
+    if (o->kind == OBJECT_WATER) return less(own.z, water_height(o, own.x, own.y, own, &unused));
+#endif
+    return less(own.z, R(0.0));
+}
+#endif
+
 // The normals of the objects at places of theirs, towards the viewer.
 CALLED vec objects_normal(const vec *point, const vec *direction, real number, __global const struct Object *objects, int count) {
     vec normal = vec_scale(*direction, R(-1.0));

@@ -7,7 +7,8 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
 }
 
 // One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
-INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, const bsdf *b, real total, world w, color *brings) {
+// `behind`: in glass, whether the spot is seen from inside its body.
+INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, const bsdf *b, real total, mask behind, world w, color *brings) {
     real u, v, choice, unused;
     path_square(s, at, PURPOSE_ASK, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICE, w, &choice, &unused);
@@ -21,8 +22,8 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.albedos), chosen.light), weight);
     mask dark = ~less(R(0.0), brightest(*brings));
 #if HAS_GLASS
-    // The set hides what is behind its surface.
-    dark |= ~leads_out(chosen.toward, b->normal, number_of(b->clear.inside));
+    // A body hides what is behind its surface.
+    dark |= ~leads_out(chosen.toward, b->normal, behind);
 #endif
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
@@ -70,9 +71,7 @@ STAGE(scatter_paths) {
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
     carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
 #if HAS_GLASS
-    with.inside = R(0.0);
-    with.wave = R(-1.0);
-    with.absorption = with.awaited;
+    if (bounce == 0) media_begin(&with, arrived.origin, w);
 #endif
     mask on_path = mask_of(so_far.on_path);
     real far = pick(mask_of(found.found), vec_dot(vec_sub(found.seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
@@ -81,12 +80,14 @@ STAGE(scatter_paths) {
     const mask lands = on_path & mask_of(found.found) & ~before.met;
     if (bounce > 0) {
         STATE_RECALL(s, with, STATE_CARRIED);
+    }
 #if HAS_GLASS
-        path_absorbs(&so_far, &with, far, w);
+    path_absorbs(&so_far, &with, far, w);
 #endif
+    if (bounce > 0) {
         path_ends(&so_far, &with, &before, on_path & ~lands, a.y, w);
     } else {
-        so_far.seen = color_pick(before.met, before.shows, so_far.seen);
+        so_far.seen = color_pick(before.met, color_mul(before.shows, so_far.through), so_far.seen);
         spot_of_light(s, &found, arrived.origin, arrived.direction, far, before.met);
     }
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
@@ -101,29 +102,45 @@ STAGE(scatter_paths) {
 #endif
         pbr p = pbr_at(s, &found, w);
         vec outward = found.normal;
+        mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
         real wave, unused;
         path_square(s, &here.at, PURPOSE_WAVE, w, &wave, &unused);
-        const color weights = glass_met(&with, &p, &wave, w.albedos);
-        outward = vec_pick(mask_of(with.inside), vec_scale(outward, R(-1.0)), outward);
+        const border edge = border_at(&with, &found, w);
+        const color weights = glass_met(&with, edge, &p, &wave, w);
+        behind = edge.leaving;
+        shows &= ~edge.hidden;
+        outward = vec_pick(behind, vec_scale(outward, R(-1.0)), outward);
 #endif
-        so_far.seen = color_pick(lands, color_add(so_far.seen, color_mul(color_scale(p.emission_color, p.emission_luminance), so_far.through)), so_far.seen);
+        so_far.seen = color_pick(shows, color_add(so_far.seen, color_mul(color_scale(p.emission_color, p.emission_luminance), so_far.through)), so_far.seen);
 #if HAS_PARTS
         reflects = pbr_albedo(&p, w.albedos);
 #endif
         const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
         with.total = weight_of_all(so_far.origin, w);
-        const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, w, &with.awaited);
+        const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, behind, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
         if (bounce > 0) with.awaited = limited(with.awaited, w.settings);
         asks.origin = so_far.origin;
         asks.direction = light.toward;
-        asks.far = light.distance;
+        asks.far = pick(shows, light.distance, R(-1.0));
         asks.footprint = found.cone * (real)(w.settings->shadow_detail);
+#if HAS_GLASS
+        // On the outer side, where light is asked for, there may be glass too.
+        const mask through_glass = less(R(0.0), pick(behind, edge.around, with.medium));
+        if (any_lane(through_glass)) {
+            const color around = color_pick(behind, medium_of(edge.around, w).absorption, with.absorption);
+            with.awaited = color_pick(through_glass, absorbed(with.awaited, around, light.distance), with.awaited);
+        }
+        const path before_it = so_far;
+#endif
         path_goes_on(s, &here.at, &so_far, &with, &b, w);
 #if HAS_GLASS
-        path_crosses(&so_far, &with, &found, &p, weights, wave);
+        so_far.direction = vec_pick(edge.hidden, arrived.direction, so_far.direction);
+        so_far.through = color_pick(edge.hidden, before_it.through, so_far.through);
+        so_far.on_path = pick(edge.hidden, before_it.on_path, so_far.on_path);
+        path_crosses(&so_far, &with, &found, edge, &p, weights, wave, w);
 #endif
         spot seen_first = found;
         if (bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
@@ -164,10 +181,9 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
-#if HAS_GLASS
-    // Within the set there are no objects.
-    const mask within = mask_of(with.inside);
-    send_to_set(s, 1, r, R(0.0), mask_of(so_far.on_path) & within, w);
+#if HAS_GLASS_SET
+    const mask within = equal(with.medium, set_body(w));
+    send_clipped(s, 1, r, R(0.0), WHICH, mask_of(so_far.on_path) & within, w);
     so_far.on_path = pick(within, R(0.0), so_far.on_path);
 #endif
     send_clipped(s, 0, r, R(0.0), WHICH, mask_of(so_far.on_path), w);
@@ -189,12 +205,15 @@ STAGE(end_paths) {
     const encounter last = queue_met(s.q, 0, s.slot);
     tally_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
-#if HAS_GLASS
-    on_path &= ~mask_of(with.inside);
+#if HAS_GLASS_SET
+    on_path &= ~equal(with.medium, set_body(w));
 #endif
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
+#if HAS_GLASS
+    path_absorbs(&so_far, &with, far, w);
+#endif
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
 #if HAS_PARTS
     if (bounce == 1) glance_once(s, so_far.seen);

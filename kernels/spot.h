@@ -84,14 +84,15 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
     return here;
 }
 
-#if HAS_GLASS
+#if HAS_GLASS_SET
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.
-INLINE encounter met_within(queue q, int slot, encounter met, real *object) {
-    const ray second = queue_ray(q, 1, slot);
+INLINE encounter met_within(stage s, ray r, encounter met, real *object, world w) {
+    const ray second = queue_ray(s.q, 1, s.slot);
     const mask within = less(second.near, second.far);
-    const encounter other = queue_met(q, 1, slot);
+    real other_object;
+    const encounter other = surface_met(s, 1, r, &other_object, w);
     for (int i = 0; i < NUMBERS_OF(encounter); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
-    *object = pick(within, R(0.0), *object);
+    *object = pick(within, other_object, *object);
     return met;
 }
 #endif

@@ -67,7 +67,8 @@ typedef struct {
     real density;    // per steradian, of its direction; below 0 where lights were not asked for at all
     real total;      // what all lights weighed at the spot
 #if HAS_GLASS
-    real inside;        // whether the path is inside the set
+    real medium;        // the glass that the path is in, by the number of its body, see media.h; 0: the open
+    real under;         // the glass that this one stands in likewise
     real wave;          // its place in the spectrum; below 0 while it has all colours
     color absorption;   // of the medium, per unit of the way
 #endif

@@ -138,8 +138,8 @@ STAGE(find_spots) {
     {
         real object;
         encounter met = surface_met(s, 0, r, &object, w);
-#if HAS_GLASS
-        if (bounce > 0) met = met_within(s.q, s.slot, met, &object);
+#if HAS_GLASS_SET
+        if (bounce > 0) met = met_within(s, r, met, &object, w);
 #endif
         tally_met(&cost, met, 1);
         at_first.coverage = met.hit;

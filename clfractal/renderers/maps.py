@@ -13,7 +13,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
 from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
 from clfractal.scene.base import unit
-from clfractal.scene.blends import Blends, blends_of
+from clfractal.scene.blends import Blends, blends_of, is_glass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.model import Scene
@@ -167,11 +167,20 @@ def mapped_materials(scene: Scene) -> MappedMaterials | None:
 
 
 def has_glass(scene: Scene) -> bool:
+    """Whether paths go through anything."""
+    return any(glass_bodies(scene))
+
+
+def has_glass_set(scene: Scene) -> bool:
     """Whether paths go through the set."""
+    return bool(glass_bodies(scene)[0])
+
+
+def glass_bodies(scene: Scene) -> list[bool]:
+    """Whether paths go through the set, then through each object."""
     if not isinstance(scene.lighting, PathLighting):
-        return False
-    weights = [material.transmission.weight for material in MappedMaterials(scene).blends.materials]
-    return any(isinstance(weight, Map) or weight > 0 for weight in weights)
+        return [False] * (1 + len(scene.objects))
+    return [is_glass(material, scene.materials) for material in used_materials(scene)]
 
 
 def map_defines(scene: Scene) -> dict[str, object]:

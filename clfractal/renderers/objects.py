@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.renderers.maps import MappedMaterials
+from clfractal.renderers.maps import MappedMaterials, glass_bodies
 from clfractal.renderers.water import WAVES, frame_of, wave_set
 from clfractal.scene.base import Vector
 from clfractal.scene.maps import Map
@@ -27,6 +27,7 @@ OBJECT = Struct(
     [
         Field("kind", "int", 0, "one of OBJECT_KINDS"),
         Field("material", "int", 0, "the number of its material along paths"),
+        Field("glass", "int", 0, "1: light goes through it along paths"),
         Field("middle", "real", 3, "of a solid; a point of a plane, scene units"),
         Field("own_x", "real", 3, "from scene units to its own ones: of the ball or cube of radius 1,"),
         Field("own_y", "real", 3, "or of a plane, whose own z is its normal"),
@@ -66,9 +67,16 @@ def object_defines(scene: Scene) -> dict[str, object]:
 def object_records(scene: Scene, precision: Precision) -> Record:
     """The objects in their order; one unused record where there are none, since no buffer is empty."""
     numbers = MappedMaterials(scene).blends.roots[1:]
+    glass = glass_bodies(scene)[1:]
     rows = [
-        {"material": number, **_place(each), **_look(scene, each), "colored": int(_has_color(scene, each))}
-        for number, each in zip(numbers, scene.objects.values(), strict=True)
+        {
+            "material": number,
+            "glass": int(through),
+            **_place(each),
+            **_look(scene, each),
+            "colored": int(_has_color(scene, each)),
+        }
+        for number, through, each in zip(numbers, glass, scene.objects.values(), strict=True)
     ]
     for row, name in zip(rows, scene.objects, strict=True):
         if name in scene.joined:  # the march finds it

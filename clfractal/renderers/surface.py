@@ -28,6 +28,7 @@ from clfractal.renderers.maps import (
     MappedMaterials,
     asked_maps,
     has_glass,
+    has_glass_set,
     map_defines,
     mapped_materials,
 )
@@ -161,6 +162,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
         "HAS_GLASS": int(has_glass(scene)),
+        "HAS_GLASS_SET": int(has_glass_set(scene)),
         "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
         "HAS_GLOW": int(scene.glow is not None),
     }
@@ -314,7 +316,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             *light_kernels(scene),
         ),
     ]
-    if has_glass(scene):
+    if has_glass_set(scene):
         within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
         texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
     if asks_formula(scene):

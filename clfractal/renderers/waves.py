@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.renderers.kernel import Stage
-from clfractal.renderers.maps import asked_maps, has_glass
+from clfractal.renderers.maps import asked_maps, has_glass_set
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.renderers.set_lights import single_lights
@@ -81,8 +81,8 @@ def air_turns(scene: Scene) -> int:
 def most_turns(scene: Scene) -> int:
     """The most rays that a pixel sends for one purpose."""
     after = max(light_turns(scene), 1) + air_turns(scene)
-    # A path that is within glass has a ray of another kind.
-    return max(scene.surface.used_points.count, after, 1 + int(has_glass(scene)))
+    # A path that is within a set of glass has a ray of another kind.
+    return max(scene.surface.used_points.count, after, 1 + int(has_glass_set(scene)))
 
 
 def march_kernels(plan: Plan) -> tuple[str, ...]:
@@ -126,7 +126,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield from _marched(marching, turns, GOAL_POINT if steps else GOAL_SURFACE)
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
-            if bounce > 0 and has_glass(scene):
+            if bounce > 0 and has_glass_set(scene):
                 yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE)
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
         if asks_formula(scene):

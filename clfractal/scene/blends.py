@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.scene.maps import Map
 from clfractal.scene.materials import PbrMaterial
 
 
@@ -46,6 +47,14 @@ def blends_of(roots: Sequence[PbrMaterial], named: Mapping[str, PbrMaterial]) ->
         for m in order
     )
     return Blends(tuple(order), parts, tuple(numbers[id(root)] for root in roots))
+
+
+def is_glass(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
+    """Whether light may go through a material, or through a part of what it is blended of; references have been checked."""
+    if material.blend is not None:
+        return any(is_glass(named[name], named) for name in material.blend)
+    weight = material.transmission.weight
+    return isinstance(weight, Map) or weight > 0
 
 
 def check_blends(named: Mapping[str, PbrMaterial]) -> None:

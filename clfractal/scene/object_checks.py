@@ -1,9 +1,10 @@
 """Checks of a scene's objects: their materials, lights in them, and what cannot show them."""
 
 from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.scene.blends import is_glass
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import PlacedLight
-from clfractal.scene.maps import Map, maps_of
+from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
+from clfractal.scene.maps import maps_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, PlaneObject, Solid
 from clfractal.scene.surface import SurfaceRenderer
@@ -19,7 +20,7 @@ def check_objects(scene: Scene) -> None:
         )
     _check_joined(scene)
     for name, each in scene.objects.items():
-        _check_material(scene, each.material, Where(path=f"objects.{name}.material"))
+        _check_material(scene, name, each.material)
         if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
             _check_lights(scene, name, each)
 
@@ -42,13 +43,11 @@ def _check_joined(scene: Scene) -> None:
             Where(path="cut_planes"),
         )
     used = scene.material.name
-    if used is not None and isinstance(scene.lighting, PathLighting):
-        weight = scene.materials[used].transmission.weight if used in scene.materials else 0.0
-        if isinstance(weight, Map) or weight > 0:
-            raise SceneError(
-                f"is glass, {used!r}, which cannot be joined with the object {first!r}",
-                Where(path="material.name"),
-            )
+    if used in scene.materials and _lets_through(scene, used):
+        raise SceneError(
+            f"is glass, {used!r}, which cannot be joined with the object {first!r}",
+            Where(path="material.name"),
+        )
     for name, each in scene.joined.items():
         where = Where(path=f"objects.{name}.join")
         if isinstance(each, FormulaObject) and each.join == "cut":
@@ -59,26 +58,35 @@ def _check_joined(scene: Scene) -> None:
             raise SceneError("cannot be smooth_union for a plane, which has no end; a flat box can", where)
 
 
-def _check_material(scene: Scene, material: str | None, where: Where) -> None:
+def _lets_through(scene: Scene, material: str | None) -> bool:
+    """Whether a material is glass along paths."""
+    if material is None or not isinstance(scene.lighting, PathLighting):
+        return False
+    return is_glass(scene.materials[material], scene.materials)
+
+
+def _check_material(scene: Scene, name: str, material: str | None) -> None:
+    where = Where(path=f"objects.{name}.material")
     if material is None or material in scene.materials:
-        _check_kind(scene, material, where)
+        _check_kind(scene, name, material, where)
         return
     if not scene.materials:
         raise SceneError(f"names {material!r}, but the scene has no materials", where)
     raise SceneError(unknown_name("material", material, tuple(scene.materials)), where)
 
 
-def _check_kind(scene: Scene, name: str | None, where: Where) -> None:
-    """Glass is for the set, and what differs from place to place is for paths."""
-    path = isinstance(scene.lighting, PathLighting)
-    used = name if name is not None else scene.material.name
+def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
+    """What is joined is no glass, and what differs from place to place is for paths."""
+    used = material if material is not None else scene.material.name
     if used is None:
         return
-    material = scene.materials[used]
-    weight = material.transmission.weight
-    if path and (isinstance(weight, Map) or weight > 0):
-        raise SceneError(f"{used!r} has transmission, which objects cannot have", where)
-    if not path and name is not None and (material.blend is not None or any(maps_of(material))):
+    if name in scene.joined and _lets_through(scene, used):
+        raise SceneError(
+            f"{used!r} is glass, which formulas beside the set and what is joined cannot be", where
+        )
+    if isinstance(scene.lighting, PathLighting) or material is None:
+        return
+    if scene.materials[used].blend is not None or any(maps_of(scene.materials[used])):
         raise SceneError(f"{used!r} differs from place to place, which needs lighting.mode: path", where)
 
 
@@ -86,7 +94,10 @@ def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
     """A light in a solid reaches nothing, but where the eye is in it too: then it is a room."""
     if solid.holds(scene.camera.position):
         return
+    glass = _lets_through(scene, solid.material or scene.material.name)
     for index, light in enumerate(scene.lights):
+        if glass and isinstance(light, (SphereLight, RectangleLight)):
+            continue  # paths find it, since it has a size
         if isinstance(light, PlacedLight) and solid.holds(light.position):
             shown = ", ".join(f"{x:g}" for x in light.position)
             raise SceneError(

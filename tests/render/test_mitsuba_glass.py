@@ -1,4 +1,4 @@
-"""A ball of glass beside Mitsuba 3: clear, rough, and of a medium that absorbs.
+"""A ball of glass beside Mitsuba 3: clear, rough, of a medium that absorbs; and with another ball in it.
 
 The ball fills the picture. It stands under a sky whose colour changes with the height, so that light which is bent the
 wrong way has the wrong colour. Regions are compared as in `test_mitsuba.py`.
@@ -37,12 +37,18 @@ told = json.load(sys.stdin)
 height = np.cos(np.pi * (np.arange(256) + 0.5) / 256)[:, None, None]
 top, bottom = np.array(told["top"]), np.array(told["bottom"])
 sky = np.broadcast_to(top + (bottom - top) * (0.5 - 0.5 * height), (256, 512, 3)).astype(np.float32).copy()
+
+def medium(absorbs):
+    sigma = {"type": "rgb", "value": [part / 4 for part in absorbs]}
+    return {"type": "homogeneous", "albedo": 0.0, "scale": 4.0, "sigma_t": sigma}
 ball = {"type": "sphere", "radius": 1.0, "bsdf": told["material"]}
+bodies = {"ball": ball}
 if told["absorbs"]:
-    ball["interior"] = {
-        "type": "homogeneous", "albedo": 0.0, "scale": 4.0,
-        "sigma_t": {"type": "rgb", "value": [part / 4 for part in told["absorbs"]]},
-    }
+    ball["interior"] = medium(told["absorbs"])
+if told["around"]:
+    outer = {"type": "sphere", "radius": 2.0, "bsdf": told["around"], "interior": medium(told["around_absorbs"])}
+    bodies["outer"] = outer
+    ball["exterior"] = medium(told["around_absorbs"])
 scene = mi.load_dict({
     "type": "scene",
     "integrator": {"type": "volpath", "max_depth": told["bounces"] + 2, "rr_depth": 1000},
@@ -52,7 +58,7 @@ scene = mi.load_dict({
         "film": {"type": "hdrfilm", "width": told["size"], "height": told["size"], "rfilter": {"type": "box"}},
         "sampler": {"type": "independent", "sample_count": told["samples"]},
     },
-    "ball": ball,
+    **bodies,
     "sky": {"type": "envmap", "bitmap": mi.Bitmap(sky), "to_world": T().rotate([1, 0, 0], 90)},
 })
 np.save(told["to"], np.stack([np.array(mi.render(scene, seed=1 + seed))[..., :3] for seed in range(told["seeds"])]))
@@ -77,7 +83,28 @@ BALLS: dict[str, tuple[dict[str, Any], dict[str, Any], list[float]]] = {
         {"type": "dielectric", "int_ior": INDEX, "ext_ior": 1.0},
         [-math.log(part) / DEPTH for part in COLOR],
     ),
+    "drop": (
+        {"specular": {"roughness": 0, "ior": 1.2}, "transmission": {"weight": 1}},
+        {"type": "dielectric", "int_ior": 1.2, "ext_ior": INDEX},
+        [],
+    ),
+    "core": (
+        {"base": {"color": [0.7, 0.8, 0.9]}, "specular": {"weight": 0}},
+        {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.7, 0.8, 0.9]}},
+        [],
+    ),
 }
+# What stands around some of them: an object, and the same for Mitsuba.
+_AMBER = [-math.log(part) / DEPTH for part in COLOR]
+AROUND: dict[str, tuple[dict[str, Any], dict[str, Any], list[float]]] = {
+    "drop": (BALLS["amber"][0], BALLS["clear"][1], _AMBER),
+    "core": (BALLS["amber"][0], BALLS["clear"][1], _AMBER),
+}
+
+
+def fov_of(ball: str) -> float:
+    """That the bodies fill the picture."""
+    return 35.0 if ball in AROUND else FOV
 
 
 def theirs(ball: str, folder: Path) -> Floats:
@@ -85,10 +112,12 @@ def theirs(ball: str, folder: Path) -> Floats:
     told = {
         "material": BALLS[ball][1],
         "absorbs": BALLS[ball][2],
+        "around": AROUND[ball][1] if ball in AROUND else None,
+        "around_absorbs": AROUND[ball][2] if ball in AROUND else None,
         "top": TOP,
         "bottom": BOTTOM,
         "bounces": BOUNCES,
-        "fov": FOV,
+        "fov": fov_of(ball),
         "eye": EYE,
         "size": SIZE,
         "samples": SAMPLES,
@@ -104,17 +133,21 @@ def theirs(ball: str, folder: Path) -> Floats:
 def ours(ball: str) -> Floats:
     """The same by paths."""
     pictures = []
+    around = AROUND[ball][0] if ball in AROUND else {}
     for seed in range(SEEDS):
         scene = clfractal.Scene(
             version=1,
             formula={"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]},
-            camera={"position": EYE, "target": [0, 0, 0], "fov": FOV},
+            camera={"position": EYE, "target": [0, 0, 0], "fov": fov_of(ball)},
             image={"width": SIZE, "height": SIZE},
-            renderer={"samples": SAMPLES, "detail": 0.1, "seed": seed},
+            renderer={"samples": SAMPLES, "detail": 0.02, "seed": seed},
             lighting={"mode": "path", "bounces": BOUNCES, "roulette": BOUNCES},
             background={"top": TOP, "bottom": BOTTOM},
             lights=[],
-            materials={"m": BALLS[ball][0]},
+            materials={"m": BALLS[ball][0], "around": around},
+            objects={"outer": {"type": "sphere", "radius": 2.0, "material": "around"}}
+            if ball in AROUND
+            else {},
             material={"name": "m"},
         )
         film = clfractal.render(scene)

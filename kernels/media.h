@@ -1,0 +1,101 @@
+// The glass around a path. A body of glass is an object, with its number from 1, or the set, with the number after them all. Where several
+// stand in each other the one with the highest number displaces the others (as nested dielectrics by priority: Schmidt and Budge 2002):
+// boundaries of those are not seen there. A path knows two at a place.
+
+INLINE real set_body(world w) { return (real)((scalar)(w.settings->object_count + 1)); }
+
+// What a material's own numbers say of a medium: its index, and what it takes away for each unit of the way, in natural logarithms.
+typedef struct {
+    real index;
+    color absorption;
+} medium;
+
+INLINE color absorption_of(color left, real depth) {
+    const real each = R(-1.0) / fmax(depth, R(1e-6));
+    const mask deep = less(R(0.0), depth);
+#define ABSORBED(c) pick(deep, each * log(fmax(left.c, R(1e-6))), R(0.0))
+    return color_of(ABSORBED(r), ABSORBED(g), ABSORBED(b));
+#undef ABSORBED
+}
+
+INLINE void medium_of_material(int number, mask here, medium *found, world w) {
+    if (!any_lane(here)) return;
+    __constant const struct Pbr *material = w.materials + number;
+    // A blend is a medium like its first part.
+    while (material->blend[0] >= 0) material = w.materials + material->blend[0];
+    found->index = pick(here, (real)(material->specular_ior), found->index);
+    const color taken = absorption_of(color_splat(material->transmission_color), (real)(material->transmission_depth));
+    found->absorption = color_pick(here, taken, found->absorption);
+}
+
+// The medium of a body, or the open.
+CALLED medium medium_of(real body, world w) {
+    medium found = {R(1.0), color_of(R(0.0), R(0.0), R(0.0))};
+    if (!any_lane(less(R(0.0), body))) return found;
+#if HAS_OBJECTS
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        medium_of_material(w.objects[i].material, equal(body, (real)((scalar)(i + 1))), &found, w);
+    }
+#endif
+#if HAS_GLASS_SET
+    medium_of_material(SET_MATERIAL, equal(body, set_body(w)), &found, w);
+#endif
+    return found;
+}
+
+// Goes into a body, or leaves it.
+INLINE void media_enter(carried *with, real body, mask here) {
+    here &= ~equal(body, with->medium) & ~equal(body, with->under);
+    const mask over = less(with->medium, body);
+    with->under = pick(here, pick(over, with->medium, fmax(with->under, body)), with->under);
+    with->medium = pick(here & over, body, with->medium);
+}
+
+INLINE void media_leave(carried *with, real body, mask here) {
+    const mask first = here & equal(body, with->medium), second = here & equal(body, with->under);
+    with->medium = pick(first, with->under, with->medium);
+    with->under = pick(first | second, R(0.0), with->under);
+}
+
+// The open around the eye, or the glass that it is in.
+INLINE void media_begin(carried *with, vec eye, world w) {
+    with->medium = with->under = R(0.0);
+    with->wave = R(-1.0);
+#if HAS_OBJECTS
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        if (w.objects[i].glass) media_enter(with, (real)((scalar)(i + 1)), object_holds(w.objects + i, eye));
+    }
+#endif
+    with->absorption = medium_of(with->medium, w).absorption;
+}
+
+// A boundary at which a path arrives.
+typedef struct {
+    real body;
+    mask leaving;    // whether the path comes from inside the body
+    mask hidden;     // whether the body is displaced here: the path goes straight on
+    real around;     // the glass that the body stands in, or 0
+} border;
+
+INLINE border border_at(const carried *with, const spot *here, world w) {
+    border found;
+    mask glass = less(R(0.0), R(1.0)) & (HAS_GLASS_SET ? ~0 : 0);
+    found.body = set_body(w);
+    found.leaving = equal(with->medium, found.body) | equal(with->under, found.body);
+#if HAS_OBJECTS
+    const mask beside = less(R(0.0), here->object);
+    found.body = pick(beside, here->object, found.body);
+    glass &= ~beside;
+    found.leaving &= ~beside;
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask this_one = beside & equal(here->object, (real)((scalar)(i + 1)));
+        if (!w.objects[i].glass || !any_lane(this_one)) continue;
+        glass |= this_one;
+        // The spot's normal is towards the viewer.
+        found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen), here->normal), R(0.0));
+    }
+#endif
+    found.around = pick(equal(with->medium, found.body), with->under, with->medium);
+    found.hidden = glass & less(found.body, found.around);
+    return found;
+}

@@ -1,0 +1,223 @@
+"""Objects of glass along paths: they keep light, absorb it, stand in each other, and hold what is not glass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import yaml
+
+import clfractal
+from clfractal.errors import SceneError
+from clfractal.renderers.plan import make_plan
+from clfractal.renderers.surface import program_texts
+from clfractal.scene.model import Scene
+from tests.render.test_paths import BALL, GREY, path, scene_of
+
+Floats = npt.NDArray[np.float64]
+
+BODIES: dict[str, dict[str, Any]] = {
+    "sphere": {"type": "sphere", "radius": 1},
+    "box": {"type": "box", "size": [1.6, 1.2, 1], "rotation": [20, 10, 30]},
+    "cylinder": {"type": "cylinder", "radius": 0.8, "height": 1.2, "rotation": [30, 0, 0]},
+}
+# The scene's set, where it is not looked at.
+FAR_OFF = {"position": [0, 40, 0], "target": [0, 44, 0], "fov": 30}
+
+
+def glass(roughness: float = 0, ior: float = 1.5, **transmission: Any) -> dict[str, Any]:
+    return {"specular": {"roughness": roughness, "ior": ior}, "transmission": {"weight": 1, **transmission}}
+
+
+def scene(objects: dict[str, Any], materials: dict[str, Any], **sections: Any) -> Scene:
+    """Objects about (0, 44, 0), far from the set."""
+    moved = {
+        name: {**each, "position": np.add(each.get("position", [0, 0, 0]), [0, 44, 0]).tolist()}
+        for name, each in objects.items()
+    }
+    bounces = sections.pop("bounces", 48)
+    return scene_of(
+        objects=moved,
+        materials=materials,
+        lighting=path(bounces),
+        image={"width": 32, "height": 32},
+        **{"background": GREY, "camera": FAR_OFF, **sections},
+    )
+
+
+def colors_of(found: Scene, samples: int, **options: Any) -> Floats:
+    """The picture's colours, shape (height, width, 3)."""
+    found = found.model_copy(update={"renderer": found.surface.model_copy(update={"samples": samples})})
+    film = clfractal.render(found, **options)
+    return np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64)
+
+
+@pytest.mark.parametrize("roughness", [0, 0.5])
+@pytest.mark.parametrize("body", BODIES)
+def test_glass_before_white_is_not_seen(body: str, roughness: float) -> None:
+    colors = colors_of(
+        scene({"body": {**BODIES[body], "material": "glass"}}, {"glass": glass(roughness)}), 32
+    )
+    assert abs(colors.mean() - 1) < 0.005
+
+
+def test_glass_in_glass_before_white_is_not_seen() -> None:
+    """Whichever is the denser, and whether it is an object or the set; and where three stand in each other."""
+    materials = {"box": glass(0.2, 1.3), "ball": glass(0, 1.6), "set": glass(0.1, 1.2)}
+    eye = {"position": [1, -5, 1.5], "fov": 32}
+    objects = {
+        "box": {"type": "box", "size": [3, 3, 3], "position": [0, -44, 0], "material": "box"},
+        "ball": {
+            "type": "sphere",
+            "radius": 0.9,
+            "position": [0.9, -44.6, 0],
+            "material": "ball",
+        },
+    }
+    found = scene(objects, materials, camera=eye, material={"name": "set"}, bounces=64)
+    assert abs(colors_of(found, 32).mean() - 1) < 0.01
+
+
+def test_a_white_ground_under_water_before_white_is_not_seen() -> None:
+    """From above the waves and from below."""
+    objects = {
+        "ground": {"type": "plane", "position": [0, 0, -1.5], "material": "white"},
+        "lake": {"type": "water", "waves": {"height": 0.1, "length": 1.5}, "material": "lake"},
+    }
+    materials = {"white": {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}, "lake": glass(0, 1.33)}
+    for height in (2, -0.8):
+        camera = {"position": [0, 40, height], "target": [0, 44, -1], "fov": 30}
+        colors = colors_of(scene(objects, materials, camera=camera, bounces=64), 64)
+        assert abs(colors.mean() - 1) < 0.01
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_media_absorb_along_the_way(precision: str) -> None:
+    """Glass that bends nothing: a slab leaves what Beer and Lambert's law says, also with the eye in it."""
+    color, depth = np.array([0.9, 0.5, 0.1]), 0.8
+    materials = {"glass": glass(0, 1.0, color=list(color), depth=depth)}
+    slab = {"type": "box", "size": [9, 1.2, 9], "material": "glass"}
+    colors = colors_of(scene({"slab": slab}, materials), 16, precision=precision)
+    assert np.abs(colors[16, 16] - color ** (1.2 / depth)).max() < 0.003
+    around = {"type": "box", "size": [9, 9, 9], "position": [0, -4, 0], "material": "glass"}
+    colors = colors_of(scene({"around": around}, materials), 16, precision=precision)
+    assert np.abs(colors[16, 16] - color ** (4.5 / depth)).max() < 0.003
+
+
+def test_a_lamp_in_a_medium_is_dimmed_on_both_of_its_ways() -> None:
+    """A ground of Lambert's law under a lamp in a medium that bends nothing, seen from inside it and from outside."""
+    color, depth = np.array([0.9, 0.6, 0.3]), 2.0
+    materials = {
+        "glass": glass(0, 1.0, color=list(color), depth=depth),
+        "white": {"base": {"color": [0.8, 0.8, 0.8]}, "specular": {"weight": 0}},
+    }
+    ground = {"type": "plane", "position": [0, 1, 0], "normal": [0, -1, 0], "material": "white"}
+    lamp = {"type": "sphere", "position": [0, 44, 0.7], "radius": 0.05, "intensity": 1}
+    dark = {"top": [0, 0, 0], "bottom": [0, 0, 0]}
+    clear = colors_of(scene({"ground": ground}, materials, lights=[lamp], background=dark, bounces=0), 64)
+    around = {"type": "box", "size": [9, 9, 9], "position": [0, -3.4, 0], "material": "glass"}
+    both = {"ground": ground, "around": around}
+    found = colors_of(scene(both, materials, lights=[lamp], background=dark, bounces=0), 64)
+    place = (12, 16)
+    # From the lamp to the middle of the ground and to the eye; what lies between in this pixel.
+    up = (16 - place[0] - 0.5) / 16 * np.tan(np.radians(15)) * 5
+    eye, spot = np.array([0, 40, 0]), np.array([0, 45, up])
+    way = np.linalg.norm(spot - eye) + np.linalg.norm(spot - np.array([0, 44, 0.7]))
+    expected = clear[place] * color ** (way / depth)
+    assert clear[place].min() > 0.001
+    np.testing.assert_allclose(found[place], expected, rtol=0.03)
+
+
+def test_what_stands_later_in_the_file_displaces_what_it_overlaps() -> None:
+    """Two slabs of one glass that overlap look as one does, and water in a slab that stands later is not seen.
+
+    (Equal glasses have a boundary of index 1.005 between them.)
+    """
+    materials = {"glass": glass(0, 1.5, color=[0.9, 0.5, 0.2], depth=1), "water": glass(0, 1.2)}
+    turn = {"rotation": [0, 0, 20], "material": "glass"}
+    one = {"slab": {"type": "box", "size": [3, 1.2, 3], **turn}}
+    across = 0.2 * np.array([-np.sin(np.radians(20)), np.cos(np.radians(20)), 0])
+    two = {
+        "front": {"type": "box", "size": [3, 0.8, 3], "position": (-across).tolist(), **turn},
+        "back": {"type": "box", "size": [3, 0.8, 3], "position": across.tolist(), **turn},
+    }
+    behind = {
+        "post": {"type": "cylinder", "radius": 0.3, "height": 9, "position": [0, 2, 0], "material": "post"}
+    }
+    materials["post"] = {"base": {"color": [0.2, 0.3, 0.9]}, "emission": {"luminance": 0.5}}
+
+    def blocks(objects: dict[str, Any]) -> Floats:
+        inner = colors_of(scene({**objects, **behind}, materials), 256)[6:-6, 6:-6]
+        return np.asarray(inner.reshape(4, 5, 4, 5, 3).mean(axis=(1, 3)))
+
+    alone = blocks(one)
+    assert np.std(alone) > 0.05
+    assert np.abs(blocks(two) - alone).max() < 0.02
+    hidden = {"water": {"type": "box", "size": [1, 0.5, 1], "rotation": [0, 0, 20], "material": "water"}}
+    assert np.abs(blocks({**hidden, **one}) - alone).max() < 0.012
+    assert np.abs(blocks({**one, **hidden}) - alone).max() > 0.03
+
+
+def test_objects_within_a_set_of_glass_are_seen() -> None:
+    """A ball that shines, in one of clear glass."""
+    materials = {
+        "glass": glass(0, 1.0),
+        "lamp": {"base": {"weight": 0}, "specular": {"weight": 0}, "emission": {"luminance": 3}},
+    }
+    objects = {"lamp": {"type": "sphere", "radius": 0.4, "position": [0, -44, 0], "material": "lamp"}}
+    colors = colors_of(
+        scene(objects, materials, camera={"position": [0, -4, 0], "fov": 40}, material={"name": "glass"}), 16
+    )
+    assert abs(colors[16, 16].mean() - 3) < 0.01
+    assert abs(colors[16, 26].mean() - 1) < 0.02
+
+
+def test_sets_that_are_no_glass_have_no_march_within() -> None:
+    """Rays within objects of glass are ordinary rays."""
+    found = scene({"ball": {"type": "sphere", "material": "glass"}}, {"glass": glass()})
+    plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
+    assert [text.name for text in program_texts(found, plan)] == ["rays", "surface"]
+
+
+@pytest.mark.parametrize(
+    ("objects", "message"),
+    [
+        (
+            {"bulb": {"type": "formula", "formula": BALL, "material": "glass"}},
+            "objects.bulb.material: 'glass' is glass, which formulas beside the set and what is joined cannot be",
+        ),
+        (
+            {"ball": {"type": "sphere", "join": "cut", "material": "glass"}},
+            "objects.ball.material: 'glass' is glass, which formulas beside the set and what is joined cannot be",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told(objects: dict[str, Any], message: str) -> None:
+    values = {
+        "version": 1,
+        "formula": BALL,
+        "camera": {},
+        "lighting": {"mode": "path"},
+        "materials": {"glass": glass()},
+        "objects": objects,
+    }
+    with pytest.raises(SceneError) as caught:
+        clfractal.load_scene(yaml.safe_dump(values))
+    assert message in str(caught.value)
+
+
+def test_only_lamps_with_a_size_may_stand_in_glass() -> None:
+    values = {
+        "version": 1,
+        "formula": BALL,
+        "camera": {},
+        "lighting": {"mode": "path"},
+        "materials": {"glass": glass()},
+        "objects": {"ball": {"type": "sphere", "position": [4, 0, 0], "material": "glass"}},
+    }
+    lamp = {"position": [4, 0, 0.2]}
+    clfractal.load_scene(yaml.safe_dump({**values, "lights": [{"type": "sphere", "radius": 0.1, **lamp}]}))
+    with pytest.raises(SceneError, match=r"lights.0.position: must be outside the object 'ball'"):
+        clfractal.load_scene(yaml.safe_dump({**values, "lights": [{"type": "point", **lamp}]}))
