@@ -79,6 +79,9 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->point = vec_pick(met, vec_along(origin, far, direction), found->point);
     found->seen = vec_pick(met, found->point, found->seen);
     found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
+#if HAS_MATTES
+    found->object = pick(met, R(-1.0), found->object);
+#endif
     spot_keep(found, s.state, 0, s.stride);
 }
 
@@ -184,6 +187,13 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     result.normal = vec_pick(bare, face.normal, result.normal);
     result.smooth = pick(bare, face.count, result.smooth);
 #endif
+#if HAS_MATTES
+    result.thing = pick(result.hit, found.object + R(1.0), R(0.0));
+    result.covers = result.coverage;
+#if PLANES > 0
+    result.thing = pick(bare, R(1.0), result.thing);
+#endif
+#endif
     result.depth = depth_of(result.point, a.time, w.view);
     color background = sky(from_eye.direction, a.y, 0, w);
 #if HAS_FOG
@@ -263,12 +273,36 @@ INLINE void end_parts(stage s, const place_in_pass *here, parts more, mask wante
 }
 #endif
 
+#if HAS_MATTES
+// Likewise which things they show; `sums` are those before.
+INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, shot found, mask wanted, real offset) {
+    mattes sum = {{0}};
+    if (s.sample > s.span.first) {
+        STATE_RECALL(s, sum, STATE_MATTES);
+    } else if (s.span.first > 0) {
+        kept_mattes(here->kept, s.span.slots + CHANNEL_COUNT, 0, &sum);
+    }
+    mattes_add(&sum, found.thing, found.covers, wanted, wanted & less(offset, sums->nearest));
+    if (s.sample + 1 < s.span.end) {
+        STATE_KEEP(s, sum, STATE_MATTES);
+        return;
+    }
+    const pass span = s.span;
+    const real shots = sums->shots + number_of(wanted);
+    mattes_write(span.film + here->tile * span.channel_count * TILE_PIXELS, span.slots, here->at.place, &sum, shots);
+    if (span.mode & PASS_KEEP) kept_mattes(here->kept, span.slots + CHANNEL_COUNT, 1, &sum);
+}
+#endif
+
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.
 INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
     const place_in_pass at = place_of_packet(s.span, s.packet, s.tile);
     const mask wanted = mask_of(a.wanted);
     const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);
     pixel p = sums_before(s, &at);
+#if HAS_MATTES
+    end_mattes(s, &at, &p, found, wanted, a.offset);
+#endif
     sample_add(&p, found, wanted, a.offset);
 #if HAS_PARTS
     end_parts(s, &at, found.of_light, wanted, p.shots);

@@ -48,6 +48,14 @@ INLINE void kept_parts(__global scalar *kept, __global const int *slots, int wri
 }
 #endif
 
+#if HAS_MATTES
+// And these; see `KEPT`.
+INLINE void kept_mattes(__global scalar *kept, __global const int *slots, int write, mattes *sum) {
+#define KEPT_MATTE(i) kept_number(kept, slots, KEPT_MATTE_0 + i, write, (real *)sum + i);
+    FOR_NUMBERS(NUMBERS_OF(mattes), KEPT_MATTE)
+}
+#endif
+
 // A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
 typedef struct {
     int tile, packet;

@@ -10,6 +10,15 @@ typedef struct {
 } parts;
 #endif
 
+#if HAS_MATTES
+// Which things a pixel shows: of each rank a number from 1, or 0 where there is none, and the sum of what it covers; and the
+// number nearest to the pixel's middle. Things that come when all ranks are taken are not noted.
+typedef struct {
+    real pairs[2 * MATTE_RANKS];
+    real nearest;
+} mattes;
+#endif
+
 // The results of one sample.
 typedef struct {
     color radiance;       // over the background; premultiplied where that is transparent
@@ -20,6 +29,9 @@ typedef struct {
     real smooth, steps;   // escape count; evaluations
 #if HAS_PARTS
     parts of_light;
+#endif
+#if HAS_MATTES
+    real thing, covers;   // the number of what is seen, from 1, and what it covers
 #endif
 } shot;
 
@@ -110,5 +122,32 @@ INLINE void parts_write(__global float *film, __global const int *slots, const i
     const real share = R(1.0) / fmax(shots, R(1.0));
 #define WRITE_PART(i) write_channel(film, slots[RAY_CHANNELS + i], place, ((const real *)sum)[i] * share);
     FOR_NUMBERS(NUMBERS_OF(parts), WRITE_PART)
+}
+#endif
+
+#if HAS_MATTES
+// `nearest`: whether this shot is the nearest to the pixel's middle so far.
+INLINE void mattes_add(mattes *sum, real thing, real covers, mask active, mask nearest) {
+    sum->nearest = pick(nearest, thing, sum->nearest);
+    mask waits = active & less(R(0.0), thing) & less(R(0.0), covers);
+    for (int rank = 0; rank < MATTE_RANKS; ++rank) {
+        real *pair = sum->pairs + 2 * rank;
+        const mask fits = waits & (equal(pair[0], thing) | equal(pair[0], R(0.0)));
+        pair[0] = pick(fits, thing, pair[0]);
+        pair[1] += pick(fits, covers, R(0.0));
+        waits &= ~fits;
+    }
+}
+
+// Writes them; `clfractal/renderers/mattes.py` makes of them what the channels of objects and of materials tell.
+INLINE void mattes_write(__global float *film, __global const int *slots, const int *place, const mattes *sum, real shots) {
+    const real share = R(1.0) / fmax(shots, R(1.0));
+    write_channel(film, slots[CHANNEL_OBJECT], place, sum->nearest);
+    write_channel(film, slots[CHANNEL_MATERIAL], place, sum->nearest);
+    for (int i = 0; i < 2 * MATTE_RANKS; ++i) {
+        const real value = sum->pairs[i] * (i & 1 ? share : R(1.0));
+        write_channel(film, slots[CHANNEL_CRYPTOOBJECT00R + i], place, value);
+        write_channel(film, slots[CHANNEL_CRYPTOMATERIAL00R + i], place, value);
+    }
 }
 #endif

@@ -145,6 +145,8 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     here.smooth = p->smooth;
 #if HAS_OBJECTS
     here.object = p->object;
+#elif HAS_MATTES
+    here.object = R(0.0);
 #endif
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);

@@ -78,7 +78,7 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
     here.residual = R(0.0);
     here.quantity = R(0.0);
     here.tint = spot_color(met.normal, met.smooth, object, w);
-#if HAS_OBJECTS
+#if HAS_OBJECTS || HAS_MATTES
     here.object = object;
 #endif
     return here;

@@ -33,14 +33,14 @@ typedef struct {
     real cone;               // the pixel's footprint there
     real smooth;             // escape count
     color tint;
-#if HAS_OBJECTS
-    real object;             // the number of the object, from 1; 0: the set
+#if HAS_OBJECTS || HAS_MATTES
+    real object;             // the number of the object, from 1; 0: the set; -1: a light, where it is seen first
 #endif
     real quantity;           // what chooses the colour, where that is not known at once
     real residual;           // distance of the pixel's points from their plane, in footprints
 } spot;
 
-#if HAS_OBJECTS
+#if HAS_OBJECTS || HAS_MATTES
 #define OBJECT_OF(here) ((here).object)
 #else
 #define OBJECT_OF(here) R(0.0)
@@ -110,9 +110,14 @@ typedef struct {
 #define STATE_PARTS (STATE_GLOW + (HAS_GLOW ? NUMBERS_OF(color) : 0))
 #if HAS_PARTS
 #define STATE_GLANCE (STATE_PARTS + NUMBERS_OF(parts))
-#define STATE_SUMS (STATE_GLANCE + NUMBERS_OF(glance))
+#define STATE_MATTES (STATE_GLANCE + NUMBERS_OF(glance))
 #else
-#define STATE_SUMS STATE_PARTS
+#define STATE_MATTES STATE_PARTS
+#endif
+#if HAS_MATTES
+#define STATE_SUMS (STATE_MATTES + NUMBERS_OF(mattes))
+#else
+#define STATE_SUMS STATE_MATTES
 #endif
 // Of the first spot, and of the one after the last bounce.
 #define STATE_SPOT(bounce) (STATE_SUMS + NUMBERS_OF(pixel) + ((bounce) > 0 ? NUMBERS_OF(spot) : 0))

@@ -36,6 +36,25 @@ def _layer(name: str, parts: str, description: str) -> tuple[Channel, ...]:
     )
 
 
+MATTE_RANKS = 6
+"""Objects, and materials, whose coverage is known in each pixel."""
+
+
+def _matte(name: str, kind: str) -> tuple[Channel, ...]:
+    """The channels of a Cryptomatte layer: two ranks each in `CryptoObject00`, `CryptoObject01` and so on."""
+    parts = (
+        (2 * pair + rank, f"{name}{pair:02d}.{'RGBA'[2 * rank + part]}", part)
+        for pair in range(MATTE_RANKS // 2)
+        for rank in range(2)
+        for part in range(2)
+    )
+    words = ("identifier", "coverage")
+    return tuple(
+        Channel(each, "data", "float", 0.0, f"{words[part]} of the {kind} of rank {rank}, Cryptomatte")
+        for rank, each, part in parts
+    )
+
+
 _TABLE = (
     Channel("R", "color", "half", 0.0, "red, linear Rec. 709"),
     Channel("G", "color", "half", 0.0, "green, linear Rec. 709"),
@@ -56,6 +75,22 @@ _TABLE = (
     *_layer("direct", "RGB", "light that was reflected once before it came to the eye"),
     *_layer("indirect", "RGB", "light that was reflected more than once"),
     *_layer("normal", "XYZ", "mean of the surface normals of all samples, times coverage"),
+    Channel(
+        "object",
+        "data",
+        "float",
+        0.0,
+        "number of the object: 1 the set, then the objects in their order; 0: nothing",
+    ),
+    Channel(
+        "material",
+        "data",
+        "float",
+        0.0,
+        "number of the material: of `materials` in their order, from 1; after them `material`",
+    ),
+    *_matte("CryptoObject", "object"),
+    *_matte("CryptoMaterial", "material"),
     *_layer("noisy", "RGB", "the picture before it was denoised"),
 )
 
@@ -74,30 +109,46 @@ LIGHT_LAYERS: tuple[str, ...] = (*layer("emission"), *layer("direct"), *layer("i
 """Parts of the picture by how often light was reflected; only paths know them."""
 SURFACE_LAYERS: tuple[str, ...] = (*ALBEDO, *LIGHT_LAYERS, *NORMAL)
 """Channels that only surfaces have, in the order of `parts` in `kernels/pixel.h`."""
+NUMBERED: tuple[str, ...] = ("object", "material")
+OBJECT_MATTES: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoObject"))
+MATERIAL_MATTES: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoMaterial"))
+MATTES: tuple[str, ...] = (*NUMBERED, *OBJECT_MATTES, *MATERIAL_MATTES)
+"""Channels that tell which things a pixel shows; only surfaces have them."""
 NOISY: tuple[str, ...] = layer("noisy")
 """The picture before it was denoised: made when all else is finished, never rendered."""
 RAY_CHANNELS: tuple[str, ...] = tuple(
-    name for name in CHANNELS if name not in SURFACE_LAYERS and name not in NOISY
+    name for name in CHANNELS if name not in {*SURFACE_LAYERS, *MATTES, *NOISY}
 )
 """The channels that every renderer makes."""
+
+LAYERS: dict[str, tuple[str, ...]] = {
+    **{
+        name: layer(name)
+        for name in ("N", "P", "albedo", "emission", "direct", "indirect", "normal", "noisy")
+    },
+    "CryptoObject": OBJECT_MATTES,
+    "CryptoMaterial": MATERIAL_MATTES,
+}
+"""Names that stand for several channels wherever a picture's channels are named."""
 
 DEFAULT_CHANNELS: tuple[str, ...] = ("R", "G", "B", "A", "Z")
 """The channels of a picture unless the scene's `output.channels` names others."""
 
 
 def check_channels(names: Iterable[str], where: Where | None = None) -> tuple[str, ...]:
-    """The names as a tuple, in the given order.
+    """The names as a tuple, in the given order; layers (`LAYERS`) are replaced by their channels.
 
     Raises:
         SceneError: no name, an unknown one (with the nearest known), or one given twice.
     """
     chosen: list[str] = []
     for name in names:
-        if name not in CHANNELS:
-            raise SceneError(unknown_name("channel", str(name), CHANNELS), where)
-        if name in chosen:
-            raise SceneError(f"channel {name!r} is given twice", where)
-        chosen.append(name)
+        if name not in CHANNELS and name not in LAYERS:
+            raise SceneError(unknown_name("channel", str(name), (*CHANNELS, *LAYERS)), where)
+        for each in LAYERS.get(name, (name,)):
+            if each in chosen:
+                raise SceneError(f"channel {each!r} is given twice", where)
+            chosen.append(each)
     if not chosen:
         raise SceneError("a picture needs at least one channel", where)
     return tuple(chosen)

@@ -24,6 +24,7 @@ from clfractal.scene.stereo import APART, Stereo
 
 # Names of the header's keys in a file: OpenEXR's own names are kept, the others begin with the program's name.
 _MATRICES = ("worldToCamera", "worldToNDC")
+_OF_MATTES = "cryptomatte/"
 _FILE_KEYS = {"scene": "clfractal"} | {name: name for name in (*_MATRICES, "view", "multiView")}
 # In a file with both eyes' pictures each has its own of these, with its view before the name.
 _OF_VIEWS = (*_MATRICES, "devices", "tileDevices")
@@ -222,6 +223,8 @@ def _file_key(key: str) -> str:
     view, dot, name = key.rpartition(".")
     if dot:
         return f"{view}.{_file_key(name)}"
+    if key.startswith(_OF_MATTES):
+        return key  # as its specification says
     return _FILE_KEYS.get(key) or f"clfractal{key[:1].upper()}{key[1:]}"
 
 
@@ -241,5 +244,5 @@ def _texts(header: Mapping[str, Any]) -> dict[str, str]:
     return {"Software": _software(header)} | {
         _file_key(key): str(value)
         for key, value in header.items()
-        if isinstance(value, str | bool | int | float | np.number)
+        if isinstance(value, str | bool | int | float | np.number) and not key.startswith(_OF_MATTES)
     }

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.device.watched import CANCELLED
-from clfractal.files.channels import CHANNELS, RAY_CHANNELS, SURFACE_LAYERS
+from clfractal.files.channels import CHANNELS, MATTE_RANKS, MATTES, NUMBERED, RAY_CHANNELS, SURFACE_LAYERS
 from clfractal.pictures.tiles import TILE
 from clfractal.renderers.plan import Plan
 from clfractal.scene.sampled import Sampled
@@ -39,8 +39,8 @@ STATISTICS = ("rays", "hits", "steps", "iterations", "bad_distances", "waits")
 PASS_KEEP = 1  # what pixels have so far is kept for a later pass
 PASS_ADD = 2  # statistics are added to those of the launch before
 
-# Numbers of a pixel that are kept between passes, in the order of `pixel` and `parts` in `kernels/pixel.h`, and the
-# channels that need them; with none they are always kept.
+# Numbers of a pixel that are kept between passes, in the order of `pixel`, `parts` and `mattes` in `kernels/pixel.h`,
+# and the channels that need them; with none they are always kept.
 _DATA = ("Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 _OF_NOISE = ("brightness", "brightness_square", "coverage_square")
 _KEPT: dict[str, tuple[str, ...]] = {
@@ -50,13 +50,15 @@ _KEPT: dict[str, tuple[str, ...]] = {
     "coverage": ("A",),
     "shots": (),
     **dict.fromkeys(_OF_NOISE, ()),
-    "nearest": _DATA,
+    "nearest": (*_DATA, *NUMBERED),
     "depth": ("Z",),
     **{f"normal_{axis.lower()}": (f"N.{axis}",) for axis in "XYZ"},
     **{f"point_{axis.lower()}": (f"P.{axis}",) for axis in "XYZ"},
     "smooth": ("iterations",),
     "steps": ("steps",),
     **{f"layer_{name.replace('.', '_').lower()}": (name,) for name in SURFACE_LAYERS},
+    **{f"matte_{number}": MATTES for number in range(2 * MATTE_RANKS)},
+    "matte_nearest": NUMBERED,
 }
 
 
@@ -71,6 +73,8 @@ def pass_defines(plan: Plan) -> dict[str, object]:
         "CHANNEL_COUNT": len(CHANNELS),
         "RAY_CHANNELS": len(RAY_CHANNELS),
         "HAS_PARTS": int(has_parts(plan)),
+        "HAS_MATTES": int(has_mattes(plan)),
+        "MATTE_RANKS": MATTE_RANKS,
         **_numbered("KEPT", _KEPT),
         **_numbered("STATISTIC", STATISTICS),
         "STATISTICS": len(STATISTICS),
@@ -82,6 +86,11 @@ def pass_defines(plan: Plan) -> dict[str, object]:
 def has_parts(plan: Plan) -> bool:
     """Whether the picture has any of the layers that only surfaces have."""
     return not set(SURFACE_LAYERS).isdisjoint(plan.channels)
+
+
+def has_mattes(plan: Plan) -> bool:
+    """Whether the picture tells which things pixels show."""
+    return not set(MATTES).isdisjoint(plan.channels)
 
 
 def sampling_record(sampled: Sampled, samples: int, precision: Precision, *, transparent: bool) -> Record:

@@ -34,7 +34,7 @@ from clfractal.renderers.maps import (
 )
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.objects import object_defines, object_records
-from clfractal.renderers.passes import has_parts, pass_defines
+from clfractal.renderers.passes import has_mattes, has_parts, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
@@ -80,6 +80,8 @@ SEARCH_INSIDE = 2
 STATE_NUMBERS = 120
 # More of them where the picture has layers: sums, and what one shot knows of them.
 _PARTS_NUMBERS = 15 + 9
+# Of mattes likewise; and each spot's object.
+_MATTE_NUMBERS = 13
 
 Floats = npt.NDArray[np.float32]
 
@@ -191,6 +193,7 @@ def normal_count(scene: Scene) -> int:
 def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
     more = len(asked_maps(scene)) + 2 * bool(scene.objects) + (_PARTS_NUMBERS if has_parts(plan) else 0)
+    more += (_MATTE_NUMBERS + 2) * has_mattes(plan)
     return STATE_NUMBERS + 4 * normal_count(scene) + more
 
 

@@ -5,7 +5,14 @@ from math import dist
 from typing import TYPE_CHECKING
 
 from clfractal.errors import SceneError, Where
-from clfractal.files.channels import LIGHT_LAYERS, NOISY, SURFACE_LAYERS
+from clfractal.files.channels import (
+    LIGHT_LAYERS,
+    MATERIAL_MATTES,
+    MATTES,
+    NOISY,
+    OBJECT_MATTES,
+    SURFACE_LAYERS,
+)
 from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
@@ -82,13 +89,18 @@ def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:
             raise SceneError(f"{name} is what was denoised; it needs output.denoise: true", Where(path=where))
         if name in NOISY and not {"R", "G", "B"} <= set(names):
             raise SceneError(f"{name} is what was denoised; it needs the channels R, G, B", Where(path=where))
-        if name in SURFACE_LAYERS and not surface:
+        if name in {*SURFACE_LAYERS, *MATTES} and not surface:
             raise SceneError(
                 f"{name} is known of surfaces only, not with renderer.type {scene.renderer.type}",
                 Where(path=where),
             )
         if name in LIGHT_LAYERS and not isinstance(scene.lighting, PathLighting):
             raise SceneError(f"{name} needs lighting: {{mode: path}}", Where(path=where))
+    for layer, parts in (("CryptoObject", OBJECT_MATTES), ("CryptoMaterial", MATERIAL_MATTES)):
+        if 0 < len(set(parts) & set(names)) < len(parts):
+            raise SceneError(
+                f"{layer} is one thing: name {layer}, which brings all of its channels", Where(path=where)
+            )
 
 
 def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:

@@ -7,10 +7,10 @@ kind, write its class and add it to the union.
 from math import radians, tan
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Tag, model_validator
 
 from clfractal.errors import unknown_name
-from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
+from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, LAYERS, MATTES
 from clfractal.files.curves import Tone
 from clfractal.scene.base import (
     Amount,
@@ -156,6 +156,19 @@ def _known_channel(name: str) -> str:
     return name
 
 
+def _without_layers(names: Any) -> Any:
+    """Channels in the place of the layers that they are parts of."""
+    if not isinstance(names, (list, tuple)) or not any(str(name) in LAYERS for name in names):
+        return names
+    chosen: list[Any] = []
+    for index, name in enumerate(names):
+        for each in LAYERS.get(str(name), (name,)):
+            if each in chosen:
+                raise problem(f"channel {each!r} is given twice", str(index))
+            chosen.append(each)
+    return chosen
+
+
 ChannelName = Annotated[
     str,
     Field(strict=True, max_length=100, json_schema_extra={"enum": list(CHANNELS)}),
@@ -170,6 +183,10 @@ Exposure = Annotated[
 ]
 
 
+def _with_layers(schema: dict[str, Any]) -> None:
+    schema["items"] = {**schema["items"], "enum": [*CHANNELS, *LAYERS]}
+
+
 class Output(Section):
     """What the picture files contain."""
 
@@ -180,9 +197,11 @@ class Output(Section):
     tone: Tone = Field(
         "linear", description="the curve from light to what a screen shows: linear, reinhard or agx"
     )
-    channels: Annotated[tuple[ChannelName, ...], Field(strict=False, min_length=1, max_length=64)] = Field(
-        DEFAULT_CHANNELS, description="names of the channels of an EXR"
-    )
+    channels: Annotated[
+        tuple[ChannelName, ...],
+        Field(strict=False, min_length=1, max_length=64, json_schema_extra=_with_layers),
+        BeforeValidator(_without_layers),
+    ] = Field(DEFAULT_CHANNELS, description="names of the channels of an EXR, or of layers of them")
     precision: dict[ChannelName, Literal["half", "float"]] = Field(
         default_factory=dict,
         description="half or float for those channels of an EXR that are not stored as by default",
@@ -204,6 +223,9 @@ class Output(Section):
         for index, channel in enumerate(self.channels):
             if channel in self.channels[:index]:
                 raise problem(f"channel {channel!r} is given twice", f"channels.{index}")
+        for name, stored in self.precision.items():
+            if name in MATTES and stored == "half":
+                raise problem("must be float: numbers of things are exact", f"precision.{name}")
         return self
 
     @property

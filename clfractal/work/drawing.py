@@ -19,6 +19,7 @@ from clfractal.device.select import Device, is_simulator
 from clfractal.device.watched import Watched, is_watched
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel
+from clfractal.renderers.mattes import told
 from clfractal.renderers.passes import STATISTICS, kept_numbers
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Resources
@@ -219,7 +220,8 @@ class Drawing:
         with self.device.failures("reading the film"):
             cl.enqueue_copy(self.device.transfers, found, self.outputs.sets[span.slot].results)
         statistics = found[: 4 * counts].view(np.uint32).reshape(-1, len(STATISTICS))
-        return found[head:].view(np.float32).reshape(shape), statistics.sum(axis=0, dtype=np.uint64)
+        film = told(found[head:].view(np.float32).reshape(shape), self.view.plan.channels, self.view.scene)
+        return film, statistics.sum(axis=0, dtype=np.uint64)
 
     def _built(self, kernel: TileKernel, sizes: list[int], resources: Resources) -> list[program.Program]:
         """The kernel's programs: those before, if their texts are the same."""

@@ -24,6 +24,7 @@ from clfractal.pictures.paste import Pasted
 from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiled import Picture
 from clfractal.pictures.tiles import Region, TileGrid
+from clfractal.renderers.mattes import attributes
 from clfractal.renderers.plan import PlannedView
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
@@ -197,6 +198,7 @@ class Job:
             "tone": scene.output.tone,
             "transparent": scene.background == "transparent",
             **({"denoised": NAME} if self.denoises else {}),
+            **attributes(scene, self.channels),
             "worldToCamera": camera.world_to_camera(),
             "worldToNDC": camera.world_to_ndc(),
         }
