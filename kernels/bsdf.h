@@ -39,6 +39,10 @@ typedef struct {
     real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
     real dielectric;          // part of the surface that has a body
     mask seen;                // whether the viewer is over the surface
+#if HAS_BUMP
+    vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each; see bsdf_bumped.h
+    real level;               // cosine between the normals
+#endif
 #if HAS_GLASS
     glass clear;
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
