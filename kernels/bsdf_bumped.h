@@ -1,9 +1,10 @@
 // How a material scatters light whose normal is not the surface's own: as by that normal, but light that would go below the surface, or
 // that of its inner side above it, is mirrored by the surface (an ideal mirror, so nothing is lost). Towards the horizon, where the normal
-// leans to, light fades as by Chiang, Li and Burley 2019 ("Taming the shadow terminator"), and what is taken there goes to the other side:
-// it is mirrored by a wall across the way in which the normal leans, as the specular tangent facet of Schuessler and others 2017
-// ("Microfacet-based normal mapping for robust Monte Carlo path tracing") does. All these are mirror images of directions, so what a
-// material reflects in all is what it reflects without them, and values and densities change alike.
+// leans to, diffuse light fades as by Chiang, Li and Burley 2019 ("Taming the shadow terminator"), and what is taken there goes to the other
+// side: it is mirrored by a wall across the way in which the normal leans, as the specular tangent facet of Schuessler and others 2017
+// ("Microfacet-based normal mapping for robust Monte Carlo path tracing") does. Highlights do not fade, or they would come back as sparks;
+// wide ones fade by their alpha. All these are mirror images of directions, so what a material reflects in all is what it reflects without
+// them, and values and densities change alike.
 #if HAS_BUMP
 
 // The material of a relief, `b`, on the surface with that normal.
@@ -20,7 +21,7 @@ INLINE void bsdf_lean(bsdf *b, vec surface) {
 
 INLINE vec mirrored_across(vec a, vec normal) { return vec_along(a, R(-2.0) * vec_dot(a, normal), normal); }
 
-// The part of light that keeps its direction, one above the surface.
+// The part of diffuse light that keeps its direction, one above the surface.
 INLINE real horizon_share(const bsdf *b, vec toward) {
     const real over = vec_dot(toward, b->surface), facing = vec_dot(toward, b->normal) * b->level;
     const mask near = less(over, facing) & less(R(0.0), over);
@@ -28,7 +29,7 @@ INLINE real horizon_share(const bsdf *b, vec toward) {
     return share * (R(1.0) + share * (R(1.0) - share));
 }
 
-// Whether a direction is as much over the surface as one by the leaning normal is.
+// Whether a direction is on the same side of the surface as it is by the leaning normal.
 INLINE mask same_side(real a, real b) { return less(R(0.0), a * b); }
 
 // f * cosine, and the probability per steradian of `scatter_sample`.
@@ -38,17 +39,18 @@ CALLED void scatter_value(const bsdf *b, const vec *direction, __global const fl
     const mask above = less(R(0.0), over), across = above & less(vec_dot(toward, b->leans), R(0.0));
     const vec leaning = vec_pick(across, mirrored_across(toward, b->leans), toward);
     const real stays = pick(above, horizon_share(b, leaning), R(1.0)), comes = pick(across, R(1.0) - stays, stays);
-    *value = color_of(R(0.0), R(0.0), R(0.0));
-    *density = R(0.0);
+    const real none = R(0.0);
+    *value = color_of(none, none, none);
+    *density = none;
     // What leaves in a direction came in it, or from its image below the surface; or was mirrored by the wall.
     for (int i = 0; i < TURNS(3); ++i) {
         const vec from = i == 0 ? toward : i == 1 ? mirrored_across(leaning, b->surface) : leaning;
-        real share = i == 0 ? pick(across, R(1.0), stays) : i == 1 ? comes : pick(across, comes, R(0.0));
-        share = pick(same_side(vec_dot(from, b->normal), over), share, R(0.0));
-        const mask counts = less(R(0.0), share);
+        const real broad = i == 0 ? pick(across, R(1.0), stays) : i == 1 ? comes : pick(across, comes, none);
+        const real sharp = i == 0 ? R(1.0) : i == 1 ? pick(across, none, R(1.0)) : none;
+        const mask counts = same_side(vec_dot(from, b->normal), over) & less(none, broad + sharp);
         if (!any_lane(counts)) continue;
-        *value = color_pick(counts, color_add(*value, color_scale(bsdf_value(b, from, tables), share)), *value);
-        *density = pick(counts, *density + share * bsdf_density(b, from), *density);
+        *value = color_pick(counts, color_add(*value, bsdf_parts(b, from, broad, sharp, tables)), *value);
+        *density = pick(counts, *density + bsdf_densities(b, from, broad, sharp), *density);
     }
 }
 
@@ -59,8 +61,15 @@ INLINE vec scatter_sample(const bsdf *b, real choice, real u, real v, real wall)
     const mask usable = less(R(0.0), density);
     const mask apart = ~same_side(vec_dot(toward, b->normal), vec_dot(toward, b->surface));
     toward = vec_pick(apart, mirrored_across(toward, b->surface), toward);
-    const mask moves = less(R(0.0), vec_dot(toward, b->surface)) & less(R(0.0), vec_dot(toward, b->leans));
-    toward = vec_pick(moves & ~less(wall, horizon_share(b, toward)), mirrored_across(toward, b->leans), toward);
+    real fades = pick(less(choice, b->by_coat + b->by_gloss), b->alpha, R(1.0));
+    fades = pick(less(choice, b->by_coat), b->coat_alpha, fades);
+#if HAS_GLASS
+    const real before = b->by_coat + b->by_gloss;
+    fades = pick(less_equal(before, choice) & less(choice, before + b->by_glass + b->by_beyond), R(0.0), fades);
+#endif
+    const mask leans = less(R(0.0), vec_dot(toward, b->surface)) & less(R(0.0), vec_dot(toward, b->leans));
+    const mask moves = leans & less(wall, fades * (R(1.0) - horizon_share(b, toward)));
+    toward = vec_pick(moves, mirrored_across(toward, b->leans), toward);
     return vec_pick(usable, toward, vec_of(R(0.0), R(0.0), R(0.0)));
 }
 #define SURFACE_NORMAL(b) ((b)->surface)
