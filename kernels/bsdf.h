@@ -39,6 +39,10 @@ typedef struct {
     real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
     real dielectric;          // part of the surface that has a body
     mask seen;                // whether the viewer is over the surface
+#if HAS_BUMP
+    vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each; see bsdf_bumped.h
+    real level;               // cosine between the normals
+#endif
 #if HAS_GLASS
     glass clear;
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
@@ -127,11 +131,11 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     return b;
 }
 
-// f * cosine of a metal, with light that is reflected more than once between its facets (Kulla and Conty 2017).
-INLINE color metal_value(const bsdf *b, vec i, vec h, real single, __global const float *tables) {
+// f * cosine of a metal, with light that is reflected more than once between its facets, `several` (Kulla and Conty 2017).
+INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several, __global const float *tables) {
     const real meeting = vec_dot(b->out, h);
     const albedo o = albedo_at(tables, b->out.z, b->rough), other = albedo_at(tables, i.z, b->rough);
-    const real again = (R(1.0) - o.of_direction) * (R(1.0) - other.of_direction) / (BSDF_PI * fmax(R(1.0) - o.mean, R(1e-6))) * i.z;
+    const real again = several * (R(1.0) - o.of_direction) * (R(1.0) - other.of_direction) / (BSDF_PI * fmax(R(1.0) - o.mean, R(1e-6))) * i.z;
     color sum;
 #define METAL_PART(c)                                                                                     \
     {                                                                                                     \
@@ -149,8 +153,18 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, __global cons
 // What coat and fuzz leave of light that crosses the boundary.
 #define THROUGH_LAYERS(b) color_scale((b)->coat_tint, (R(1.0) - (b)->coat_albedo) * (R(1.0) - (b)->fuzz_albedo))
 
-// f * cosine; 0 for directions below the surface, unless it is glass.
-INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables) {
+// How much of a lobe counts, of which facets with this width reflect: sharp ones as highlights, broad ones as diffuse bodies.
+// Without reliefs all do.
+INLINE real lobe_share(real broad, real sharp, real alpha) {
+#if HAS_BUMP
+    return sharp + (broad - sharp) * alpha;
+#else
+    return R(1.0);
+#endif
+}
+
+// f * cosine, with factors on what is diffuse and on highlights; 0 for directions below the surface, unless it is glass.
+INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __global const float *tables) {
     vec i = bsdf_local(b, toward);
     const mask over = b->seen & less(R(0.0), i.z);
     color below = color_of(R(0.0), R(0.0), R(0.0));
@@ -158,12 +172,12 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables)
     const mask under = b->seen & less(i.z, R(0.0));
     if (any_lane(under & less(R(0.0), b->clear.weight))) {
         const color passes = color_scale(glass_passes(&b->clear, b->out, i, tables), b->clear.weight);
-        below = color_pick(under, color_mul(passes, THROUGH_LAYERS(b)), below);
+        below = color_pick(under, color_scale(color_mul(passes, THROUGH_LAYERS(b)), sharp), below);
     }
 #endif
     i.z = fmax(i.z, R(1e-6));
     const vec h = middle_way(b->out, i);
-    const real single = ggx_value(b->out, i, h, b->alpha);
+    const real single = ggx_value(b->out, i, h, b->alpha) * lobe_share(broad, sharp, b->alpha);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     if (any_of(b->dielectric)) {
         const color body = eon_value(b->body, b->out, i, b->rough_body);
@@ -174,48 +188,55 @@ INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables)
             other = albedo_of_dielectric(tables, i.z, b->rough, b->root);
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }
-        sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other))),
+        sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other) * broad)),
                           b->dielectric);
     }
 #if HAS_GLASS
     if (any_of(b->clear.weight)) {
         // The tint of the boundary is that of its outer side.
         const color tint = color_pick(b->clear.inside, color_of(R(1.0), R(1.0), R(1.0)), b->gloss);
-        const real reflects = b->clear.weight * glass_reflects(&b->clear, b->out, i, h, single, tables);
+        const real facets = ggx_value(b->out, i, h, b->alpha);
+        const real reflects = b->clear.weight * glass_reflects(&b->clear, b->out, i, h, facets, tables) * sharp;
         sum = color_add(sum, color_scale(tint, reflects));
     }
 #endif
-    if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, tables), b->metalness));
+    if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, broad, tables), b->metalness));
     if (any_of(b->coat)) {
-        const real coat = b->coat * ggx_value(b->out, i, h, b->coat_alpha) * fresnel_dielectric(vec_dot(b->out, h), b->coat_ior);
+        const real facets = ggx_value(b->out, i, h, b->coat_alpha) * lobe_share(broad, sharp, b->coat_alpha);
+        const real coat = b->coat * facets * fresnel_dielectric(vec_dot(b->out, h), b->coat_ior);
         sum = color_mul(sum, color_scale(b->coat_tint, R(1.0) - b->coat_albedo));
         sum = color_add(sum, color_of(coat, coat, coat));
     }
     if (any_of(brightest(b->fuzz))) {
-        const real fibres = fuzz_value(b->out, i, b->fuzz_rough) * i.z;
+        const real fibres = fuzz_value(b->out, i, b->fuzz_rough) * i.z * broad;
         sum = color_add(color_scale(sum, R(1.0) - b->fuzz_albedo), color_scale(b->fuzz, fibres));
     }
     return color_pick(over, sum, below);
 }
 
-// Probability per steradian with which bsdf_sample chooses a direction.
-INLINE real bsdf_density(const bsdf *b, vec toward) {
+INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables) { return bsdf_parts(b, toward, R(1.0), R(1.0), tables); }
+
+// Probability per steradian with which bsdf_sample chooses a direction, with the same factors.
+INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
     const vec i = bsdf_local(b, toward), h = middle_way(b->out, i);
+    const real of_coat = b->by_coat * lobe_share(broad, sharp, b->coat_alpha), of_gloss = b->by_gloss * lobe_share(broad, sharp, b->alpha);
 #if HAS_GLASS
     const glass *g = &b->clear;
-    const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond) * fmax(i.z, R(0.0)) / BSDF_PI;
-    const real facets = b->by_gloss + b->by_glass * fresnel_across(vec_dot(b->out, h), g->mirrors);
-    const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
+    const real hemisphere = broad * (R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond) * fmax(i.z, R(0.0)) / BSDF_PI;
+    const real facets = of_gloss + b->by_glass * sharp * fresnel_across(vec_dot(b->out, h), g->mirrors);
+    const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + of_coat * ggx_density(b->out, h, b->coat_alpha);
     const vec bends = bending_facet(b->out, i, g->across);
     const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->mirrors)) * bending_density(g, b->out, i, bends);
-    const real beyond = bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI;
+    const real beyond = sharp * (bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI);
     return pick(b->seen, pick(less(R(0.0), i.z), sum, pick(less(i.z, R(0.0)), beyond, R(0.0))), R(0.0));
 #else
-    const real hemisphere = (R(1.0) - b->by_coat - b->by_gloss) * fmax(i.z, R(0.0)) / BSDF_PI;
-    const real sum = hemisphere + b->by_gloss * ggx_density(b->out, h, b->alpha) + b->by_coat * ggx_density(b->out, h, b->coat_alpha);
+    const real hemisphere = broad * (R(1.0) - b->by_coat - b->by_gloss) * fmax(i.z, R(0.0)) / BSDF_PI;
+    const real sum = hemisphere + of_gloss * ggx_density(b->out, h, b->alpha) + of_coat * ggx_density(b->out, h, b->coat_alpha);
     return pick(b->seen & less(R(0.0), i.z), sum, R(0.0));
 #endif
 }
+
+INLINE real bsdf_density(const bsdf *b, vec toward) { return bsdf_densities(b, toward, R(1.0), R(1.0)); }
 
 // A direction chosen by three numbers in (0, 1).
 INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density) {

@@ -15,28 +15,73 @@
 #include "planes.h"
 #include "stage.h"
 #include "state.h"
+#include "eye.h"
 #if ASKED > 0
 #include "asked.h"
 #endif
-#include "eye.h"
+#if HAS_MAPS
+#include "bump_places.h"
+#endif
 
 #define COLORING_ASKS (COLORING == COLORING_THICKNESS || COLORING == COLORING_LAYER_DISTANCE || COLORING == COLORING_TRAP)
+
+#if ASKED > 0 || BUMP_SURFACE
+// Keeps what the formula answers at spots, or at a place around them. On objects beside the set it has an answer for traps only.
+INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask of_set, __constant const struct Material *questions,
+                         __constant const struct Orbit *orbit, __constant const scalar *k) {
+#if ASKED > 0
+    // After the scene's own record.
+    const int count = place == AT_SPOT ? ASKED : BUMP_ASKED, first_number = place == AT_SPOT ? STATE_ASKED(0) : STATE_ASKED_BESIDE(place, 0);
+    for (int i = 0; i < count; ++i) {
+        __constant const struct Material *m = questions + i;
+        const mask answered = m->asks == MAP_TRAP ? asks : of_set;
+        const real answer = pick(answered, asked_quantity(there, answered, m, orbit, k), R(0.0));
+        numbers_keep(&answer, 1, s.state + (first_number + i) * s.stride, s.stride);
+    }
+#endif
+#if BUMP_SURFACE
+    if (place == AT_SPOT) return;
+    surface_point surface;
+    const clearance here = orbit_dual_distance(there->point, of_set, orbit, k, &surface);
+    const vec normal = vec_normalize(surface.gradient);
+    // Where there is none, as at the spot.
+    const mask flat = less(vec_dot(normal, normal), R(0.5)) | here.end.inside;
+    const vec known = vec_pick(flat, there->normal, normal);
+    const real numbers[4] = {known.x, known.y, known.z, smooth_count(here.end, surface, orbit)};
+    numbers_keep(numbers, 4, s.state + STATE_SURFACE_BESIDE(place) * s.stride, s.stride);
+#endif
+}
+#endif
 
 STAGE(color_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
     spot here = spot_kept(s.state, bounce, s.stride);
-    const mask found = mask_of(here.found) & of_the_set(OBJECT_OF(here), w);
-    if (!any_lane(found)) return;
+    const mask seen = mask_of(here.found), found = seen & of_the_set(OBJECT_OF(here), w);
+    if (!any_lane(ASKED > 0 ? seen : found)) return;
     path so_far;
     const aim a = aim_kept(s.state, s.stride);
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
-#if ASKED > 0
-    for (int i = 0; i < ASKED; ++i) {
-        // After the scene's own record.
-        const real answer = asked_quantity(&here, found, material + 1 + i, orbit, k);
-        numbers_keep(&answer, 1, s.state + STATE_ASKED(i) * s.stride, s.stride);
+#if ASKED > 0 || BUMP_SURFACE
+    spot there = here;
+#if HAS_BUMP
+    const real width = bump_width(&here, w);
+    const mask rises = less(R(0.0), width);
+    const int around = any_lane(seen & rises) ? BUMP_PLACES : 0;
+#else
+    const int around = 0;
+#endif
+    // At the spot, then around it.
+    for (int place = AT_SPOT; place < around; ++place) {
+        mask asks = seen;
+#if HAS_BUMP
+        if (place != AT_SPOT) {
+            there = bump_spot(&here, width, place);
+            asks &= rises;
+        }
+#endif
+        answers_keep(s, &there, place, asks, asks & found, material + 1, orbit, k);
     }
 #endif
 #if COLORING_ASKS

@@ -135,6 +135,15 @@ INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real
 }
 
 #if HAS_PARTS
+// The normal by which a shot's first surface has scattered light; `own` is the surface's.
+INLINE vec normal_seen(glance look, vec own) {
+#if HAS_BUMP
+    return look.normal;
+#else
+    return own;
+#endif
+}
+
 // A shot's layers: of what its path has seen in all, `comes` is in the picture.
 INLINE parts parts_of(glance look, color seen, real coverage, real comes) {
     parts found;
@@ -146,9 +155,14 @@ INLINE parts parts_of(glance look, color seen, real coverage, real comes) {
     return found;
 }
 
-// Keeps what the first spot reflects, white where it is a light, and the light seen so far.
-INLINE void glance_begin(stage s, mask surface, color albedo, color seen) {
-    const glance look = {color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0))), seen, seen};
+// Keeps what the first spot reflects, white where it is a light, the light seen so far, and the normal of its relief, where it has one.
+INLINE void glance_begin(stage s, mask surface, color albedo, color seen, vec normal) {
+    glance look;
+    look.albedo = color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0)));
+    look.emission = look.once = seen;
+#if HAS_BUMP
+    look.normal = normal;
+#endif
     STATE_KEEP(s, look, STATE_GLANCE);
 }
 
@@ -242,7 +256,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     const color past = color_add(result.of_light.albedo, color_scale(layers.behind, R(1.0) - comes));
     result.of_light.albedo = color_add(layers.front, color_scale(past, layers.front_through));
 #endif
-    result.of_light.normal = vec_pick(result.hit, vec_scale(result.normal, result.coverage), result.of_light.normal);
+    result.of_light.normal = vec_pick(result.hit, vec_scale(normal_seen(look, result.normal), result.coverage), result.of_light.normal);
 #endif
     return result;
 }

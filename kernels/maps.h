@@ -56,9 +56,38 @@ INLINE color picture_at(vec point, vec normal, real cone, __global const struct 
     return color_add(mixed, color_scale(picture_color(point.x * wide, -point.y * high, level, m, tables), z / sum));
 }
 
-INLINE real map_quantity(stage s, const spot *here, __global const struct Map *m) {
+#if HAS_BUMP
+// What the surface is around a spot: its normal and its escape count. On objects beside the set these are the object's.
+INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, real *smooth, world w) {
+    *normal = there->normal;
+    *smooth = there->smooth;
+#if BUMP_SURFACE
+    real known[4];
+    numbers_recall(known, 4, s.state + STATE_SURFACE_BESIDE(place) * s.stride, s.stride);
+    *normal = vec_of(known[0], known[1], known[2]);
+    *smooth = known[3];
+#if HAS_OBJECTS
+    const mask beside_set = ~of_the_set(there->object, w);
+    if (any_lane(beside_set)) {
+        const vec down = vec_scale(there->normal, R(-1.0));
+        const vec own = objects_normal(&there->point, &down, there->object, w.objects, w.settings->object_count);
+        *normal = vec_pick(beside_set, own, *normal);
+        *smooth = pick(beside_set, there->smooth, *smooth);
+    }
+#endif
+#endif
+}
+#endif
+
+// At a spot, where `place` is AT_SPOT, or at a place around it.
+INLINE real map_quantity(stage s, const spot *here, int place, __global const struct Map *m, world w) {
     const vec given = vec_splat(m->vector);
-    if (m->by == MAP_NORMAL) return vec_dot(here->normal, given);
+    vec normal = here->normal;
+    real smooth = here->smooth;
+#if HAS_BUMP
+    if (place != AT_SPOT && (m->by == MAP_NORMAL || m->by == MAP_ITERATIONS)) surface_beside(s, here, place, &normal, &smooth, w);
+#endif
+    if (m->by == MAP_NORMAL) return vec_dot(normal, given);
     if (m->by == MAP_HEIGHT) return vec_dot(here->point, given);
     if (m->by == MAP_DISTANCE) {
         const vec way = vec_sub(here->point, given);
@@ -67,22 +96,23 @@ INLINE real map_quantity(stage s, const spot *here, __global const struct Map *m
 #if ASKED > 0
     if (m->by >= MAP_CURVATURE) {
         real answer;
-        numbers_recall(&answer, 1, s.state + STATE_ASKED(m->asked) * s.stride, s.stride);
+        const int number = place == AT_SPOT ? STATE_ASKED(m->asked) : STATE_ASKED_BESIDE(place, m->asked);
+        numbers_recall(&answer, 1, s.state + number * s.stride, s.stride);
         return answer;
     }
 #endif
-    return here->smooth;
+    return smooth;
 }
 
 // What a map is at a spot: a colour, or three times the same number.
-INLINE color map_at(stage s, const spot *here, __global const struct Map *m, world w) {
+INLINE color map_at(stage s, const spot *here, int place, __global const struct Map *m, world w) {
     real quantity;
     if (m->levels > 0) {
         const color seen = picture_at(here->point, here->normal, here->cone, m, w.tables);
         if (m->count == 3) return seen;
         quantity = seen.r;
     } else {
-        quantity = map_quantity(s, here, m);
+        quantity = map_quantity(s, here, place, m, w);
     }
     return palette_color(place_in_palette(quantity, m->scale, m->offset, m->repeat), m->repeat, w.tables + m->table);
 }

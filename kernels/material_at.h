@@ -2,8 +2,12 @@
 #if !HAS_MAPS && MATERIALS == 1
 INLINE pbr pbr_at(stage s, const spot *here, world w) { return pbr_of(w.materials, here->tint); }
 #else
+#include "bump_places.h"
 #if HAS_MAPS
 #include "maps.h"
+#endif
+#if HAS_BUMP
+#include "bump.h"
 #endif
 
 // One of the materials that have layers, with its maps.
@@ -14,7 +18,7 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     real *numbers = (real *)&p;
     for (int i = 0; i < material->map_count; ++i) {
         __global const struct Map *m = w.maps + material->first_map + i;
-        const color found = map_at(s, here, m, w);
+        const color found = map_at(s, here, AT_SPOT, m, w);
         numbers[m->number] = found.r;
         if (m->count < 3) continue;
         numbers[m->number + 1] = found.g;
@@ -27,18 +31,6 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     p.emission_color = color_scale(p.emission_color, p.emission_luminance);
     p.base_weight = p.emission_luminance = R(1.0);
     return p;
-}
-
-// The number of a spot's material.
-INLINE real spot_material(const spot *here, world w) {
-    real number = (real)((scalar)SET_MATERIAL);
-#if HAS_OBJECTS
-    for (int i = 0; i < w.settings->object_count; ++i) {
-        const mask there = equal(here->object, (real)((scalar)(i + 1)));
-        number = pick(there, (real)((scalar)w.objects[i].material), number);
-    }
-#endif
-    return number;
 }
 
 INLINE pbr pbr_at(stage s, const spot *here, world w) {
@@ -57,7 +49,7 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
         __constant const struct Pbr *material = w.materials + i;
 #if HAS_MAPS
         if (material->blend[0] >= 0) {
-            const real second = map_at(s, here, w.maps + material->mask, w).r;
+            const real second = map_at(s, here, AT_SPOT, w.maps + material->mask, w).r;
             shares[material->blend[0]] += shares[i] * (R(1.0) - second);
             shares[material->blend[1]] += shares[i] * second;
             continue;

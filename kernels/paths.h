@@ -18,12 +18,14 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
 #endif
     const asked a = light_asked(point, from, b->normal, numbers, total, w);
     light_ray chosen = a.ray;
-    const real weight = asked_weight(&a, bsdf_density(b, chosen.toward));
-    *brings = color_scale(color_mul(bsdf_value(b, chosen.toward, w.albedos), chosen.light), weight);
+    real density;
+    color scattered;
+    scatter_value(b, &chosen.toward, w.albedos, &scattered, &density);
+    *brings = color_scale(color_mul(scattered, chosen.light), asked_weight(&a, density));
     mask dark = ~less(R(0.0), brightest(*brings));
 #if HAS_GLASS
     // A body hides what is behind its surface.
-    dark |= ~leads_out(chosen.toward, b->normal, behind);
+    dark |= ~leads_out(chosen.toward, SURFACE_NORMAL(b), behind);
 #endif
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
@@ -36,9 +38,18 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     real u, v, choice, roulette;
     path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
+#if HAS_BUMP
+    real wall, unused;
+    color value;
+    path_square(s, at, PURPOSE_WALL, w, &wall, &unused);
+    so_far->direction = scatter_sample(b, choice, u, v, wall);
+    scatter_value(b, &so_far->direction, w.albedos, &value, &with->density);
+#else
     so_far->direction = bsdf_sample(b, choice, u, v, &with->density);
+    const color value = bsdf_value(b, so_far->direction, w.albedos);
+#endif
     mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density);
-    const color part = color_scale(bsdf_value(b, so_far->direction, w.albedos), R(1.0) / with->density);
+    const color part = color_scale(value, R(1.0) / with->density);
     so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
     on_path &= less(R(0.0), brightest(so_far->through));
     if (s.bounce >= w.settings->roulette) {
@@ -57,6 +68,19 @@ INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mas
     past = color_pick(before->met, color_scale(before->shows, share), past);
     const color more = limited(color_mul(past, so_far->through), w.settings);
     so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
+}
+
+// A spot's material, ready to scatter by the normal `shading`, which is the surface's own, or that of its relief. `behind`: in glass,
+// whether the spot is seen from inside its body.
+INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, vec to_viewer, vec *shading, world w) {
+#if HAS_BUMP
+    bumped_normal(s, here, &behind, &to_viewer, shading, w);
+    bsdf b = bsdf_at(p, *shading, to_viewer, w.albedos);
+    bsdf_lean(&b, here->normal);
+    return b;
+#else
+    return bsdf_at(p, *shading, to_viewer, w.albedos);
+#endif
 }
 
 // The light of the path's present spot: what shines there, what one light brings, and where the path goes on.
@@ -93,6 +117,7 @@ STAGE(scatter_paths) {
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
+    vec outward = found.normal, shading = outward;
 #if HAS_PARTS
     color reflects = color_of(R(1.0), R(1.0), R(1.0));
 #endif
@@ -101,7 +126,6 @@ STAGE(scatter_paths) {
         found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
 #endif
         pbr p = pbr_at(s, &found, w);
-        vec outward = found.normal;
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
         real wave, unused;
@@ -116,7 +140,7 @@ STAGE(scatter_paths) {
 #if HAS_PARTS
         reflects = pbr_albedo(&p, w.albedos);
 #endif
-        const bsdf b = bsdf_at(&p, found.normal, vec_scale(arrived.direction, R(-1.0)), w.albedos);
+        const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_scale(arrived.direction, R(-1.0)), &shading, w);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
         with.total = weight_of_all(so_far.origin, w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, behind, w, &with.awaited);
@@ -148,7 +172,7 @@ STAGE(scatter_paths) {
         so_far.spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, a.time, w.view), found.cone);
     }
 #if HAS_PARTS
-    if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen);
+    if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
     if (bounce == 1) glance_once(s, so_far.seen);
 #endif
     with.awaited = color_pick(lands, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));

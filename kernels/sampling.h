@@ -38,6 +38,7 @@ typedef JOIN(uint, LANES) bits;
 #define PURPOSE_FLIGHT 12u
 #define PURPOSE_GLOW 13u
 #define PURPOSE_SET_LIGHT 14u
+#define PURPOSE_WALL 15u
 #define PURPOSE_TIME 0xffffffffu
 
 #define FILTER_BOX 0

@@ -87,6 +87,9 @@ typedef struct {
     color albedo;     // of the first surface
     color emission;   // what the path had seen before any light was reflected ...
     color once;       // ... and before any was reflected twice
+#if HAS_BUMP
+    vec normal;       // by which the first surface has scattered light
+#endif
 } glance;
 #endif
 
@@ -106,7 +109,13 @@ typedef struct {
 #define STATE_AIR (STATE_CARRIED + (HAS_PATHS ? NUMBERS_OF(carried) : 0))
 // What the formula was asked for the present spot's material.
 #define STATE_ASKED(i) (STATE_AIR + (HAS_SHAFTS ? NUMBERS_OF(color) : 0) + (i))
-#define STATE_GLOW STATE_ASKED(ASKED)
+// The same around it, and the normal and escape count there, for the slopes of its material's relief; see bump_places.h.
+#define AT_SPOT (-1)
+#define BUMP_PLACES 3
+#define BESIDE_NUMBERS (BUMP_ASKED + (BUMP_SURFACE ? 4 : 0))
+#define STATE_ASKED_BESIDE(place, i) (STATE_ASKED(ASKED) + (place) * BESIDE_NUMBERS + (i))
+#define STATE_SURFACE_BESIDE(place) STATE_ASKED_BESIDE(place, BUMP_ASKED)
+#define STATE_GLOW (STATE_ASKED(ASKED) + BUMP_PLACES * BESIDE_NUMBERS)
 #define STATE_PARTS (STATE_GLOW + (HAS_GLOW ? NUMBERS_OF(color) : 0))
 #if HAS_PARTS
 #define STATE_GLANCE (STATE_PARTS + NUMBERS_OF(parts))

@@ -32,6 +32,7 @@
 #include "lit.h"
 #if HAS_PATHS
 #include "bsdf.h"
+#include "bsdf_bumped.h"
 #include "material_at.h"
 #include "lights.h"
 #if HAS_GLASS
@@ -183,7 +184,7 @@ STAGE(light_spots) {
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
     }
 #if HAS_PARTS
-    if (bounce == 0) glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)));
+    if (bounce == 0) glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
 #endif
     const int last = bounce == settings->bounces;
     const color mirrored = mirrored_at(&found, direction, w);

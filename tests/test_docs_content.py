@@ -132,6 +132,7 @@ PATHS = {
     "fuzz": "Fuzz",
     "transmission": "Transmission",
     "emission": "Emission",
+    "bump": "Bump",
     "A number": "NumberMap",
     "A colour": "ColorMap",
 }

@@ -39,10 +39,13 @@ MAP = Struct(
     ],
 )
 MAP_DEFINES = {f"MAP_{name.upper()}": number for number, name in enumerate(QUANTITIES)}
+BUMP_PLACES = 3
+"""Places around a spot where heights are compared."""
 TABLE = 256
 """Colours of a table, as of a palette."""
 
 Floats = npt.NDArray[np.float32]
+_HEIGHT = "bump_height"
 _GREY = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, item 3.2
 
 
@@ -63,13 +66,61 @@ class MappedMaterials:
         found: list[list[tuple[str, Map]]] = []
         for material, parts in zip(self.blends.materials, self.blends.parts, strict=True):
             if parts is None:
-                found.append([(path.replace(".", "_"), each) for path, each in maps_of(material)])
+                own = [(path.replace(".", "_"), each) for path, each in maps_of(material)]
+                own = [each for each in own if each[0] != _HEIGHT]
+                if self.has_bump:
+                    own.append((_HEIGHT, _map_of(material.bump.height)))
+                found.append(own)
                 continue
-            mask = material.mask
-            if not isinstance(mask, NumberMap):
-                mask = NumberMap(by="iterations", curve=((0.0, mask), (1.0, mask)))
-            found.append([("mask", mask)])
+            found.append([("mask", _map_of(material.mask))])
         return found
+
+    @cached_property
+    def has_bump(self) -> bool:
+        """Whether light sees a relief."""
+        return any(self._rises(root) for root in self.blends.roots)
+
+    def _rises(self, number: int) -> bool:
+        """Whether a material's height differs from place to place: by a map, or because its parts have others."""
+        heights = self._heights(number)
+        return len(heights) > 1 or any(isinstance(each, NumberMap) for each in heights)
+
+    def _heights(self, number: int) -> set[float | NumberMap]:
+        """Heights of which that of a material is made."""
+        parts, height = self.blends.parts[number], self.blends.materials[number].bump.height
+        if parts is not None:
+            return self._heights(parts[0]) | self._heights(parts[1])
+        return {height.curve[0][1] if isinstance(height, NumberMap) and height.is_flat else height}
+
+    @cached_property
+    def relief(self) -> list[NumberMap]:
+        """What heights follow: their own maps, and the masks of blends."""
+        if not self.has_bump:
+            return []
+        found = [each for name, each in self.maps if name in (_HEIGHT, "mask")]
+        return [each for each in found if isinstance(each, NumberMap) and not each.is_flat]
+
+    @property
+    def relief_asked(self) -> int:
+        """How many of `asked`, from the first on, are asked around spots too."""
+        return len({_question(each) for each in self.relief if each.by in ASKED})
+
+    @property
+    def relief_of_surface(self) -> bool:
+        """Whether heights follow what the surface itself is around spots: its normals and escape counts."""
+        return any(each.by in ("iterations", "normal") for each in self.relief)
+
+    def _width(self, number: int) -> float:
+        """The least distance over which a material's slopes are measured, scene units.
+
+        A picture's pixels are blended linearly: over less than one of them slopes would have edges.
+        """
+        material, parts = self.blends.materials[number], self.blends.parts[number]
+        follows = material.bump.height if parts is None else material.mask
+        widths = [material.bump.width or 0.0, *(self._width(part) for part in parts or ())]
+        if isinstance(follows, Map) and follows.texture is not None:
+            widths.append(follows.scale / self.scene.textures[follows.texture].pixels.shape[1])
+        return max(widths)
 
     @property
     def maps(self) -> list[tuple[str, Map]]:
@@ -79,24 +130,30 @@ class MappedMaterials:
     @cached_property
     def asked(self) -> list[Map]:
         """One map of each quantity for which the formula is asked."""
-        return list({_question(each): each for _, each in self.maps if each.by in ASKED}.values())
+        every = [*self.relief, *(each for _, each in self.maps)]
+        return list({_question(each): each for each in every if each.by in ASKED}.values())
 
     def records(self, precision: Precision) -> Record:
         """The materials' records."""
         rows, first = [], 0
-        for material, parts, own in zip(self.blends.materials, self.blends.parts, self._own, strict=True):
-            values = material_values(material)
+        for number, (material, own) in enumerate(zip(self.blends.materials, self._own, strict=True)):
+            values, parts = material_values(material), self.blends.parts[number]
             if parts is not None:
                 values |= {"blend": parts, "mask": first}
             elif own:
-                values |= {"first_map": first, "map_count": len(own)}
+                count = len(own) - int(self.has_bump)
+                values |= {"first_map": first, "map_count": count}
+                if self.has_bump:
+                    values["bump"] = first + count
+            if self._rises(number):
+                values["bump_width"] = self._width(number)
             rows.append(values)
             first += len(own)
         return PBR.array(precision, rows)
 
     def map_records(self, precision: Precision) -> Record:
         """The maps' records."""
-        numbers = {**parameter_numbers(), "mask": (-1, 1)}
+        numbers = {**parameter_numbers(), "mask": (-1, 1), _HEIGHT: (-1, 1)}
         questions = [_question(each) for each in self.asked]
         pictures, place = {}, len(self.maps) * TABLE * 3
         for key in self._pictures():
@@ -186,11 +243,15 @@ def glass_bodies(scene: Scene) -> list[bool]:
 def map_defines(scene: Scene) -> dict[str, object]:
     """The defines of programs that may read maps."""
     if not isinstance(scene.lighting, PathLighting):
-        return {"HAS_MAPS": 0, "ASKED": 0, "MATERIALS": 1, "SET_MATERIAL": 0}
+        none = dict.fromkeys(("HAS_MAPS", "ASKED", "HAS_BUMP", "BUMP_ASKED", "BUMP_SURFACE"), 0)
+        return {**none, "MATERIALS": 1, "SET_MATERIAL": 0}
     found = MappedMaterials(scene)
     return {
         "HAS_MAPS": int(bool(found.maps)),
         "ASKED": len(found.asked),
+        "HAS_BUMP": int(found.has_bump),
+        "BUMP_ASKED": found.relief_asked,
+        "BUMP_SURFACE": int(found.relief_of_surface),
         "MATERIALS": len(found.blends.materials),
         "SET_MATERIAL": found.blends.roots[0],
         **MAP_DEFINES,
@@ -201,6 +262,19 @@ def asked_maps(scene: Scene) -> list[Map]:
     """See `MappedMaterials.asked`."""
     found = mapped_materials(scene)
     return found.asked if found is not None else []
+
+
+def bump_numbers(scene: Scene) -> int:
+    """Numbers of a pixel that are kept of the places around its spot; see `kernels/bump_places.h`."""
+    if not isinstance(scene.lighting, PathLighting):
+        return 0
+    found = MappedMaterials(scene)
+    return BUMP_PLACES * (found.relief_asked + 4 * found.relief_of_surface)
+
+
+def has_bump(scene: Scene) -> bool:
+    """Whether paths see a relief."""
+    return isinstance(scene.lighting, PathLighting) and MappedMaterials(scene).has_bump
 
 
 def level_sizes(width: int, height: int) -> list[tuple[int, int]]:
@@ -231,6 +305,13 @@ def _narrowed(pixels: Floats, count: int) -> Floats:
     first, second, third = pixels[:-2:2], pixels[1:-1:2], pixels[2::2]
     mixed = (count - rows) * first + count * second + (rows + 1) * third
     return np.asarray(mixed / (2 * count + 1), np.float32)
+
+
+def _map_of(value: float | NumberMap) -> NumberMap:
+    """A number as a map."""
+    if isinstance(value, NumberMap):
+        return value
+    return NumberMap(by="iterations", curve=((0.0, value), (1.0, value)))
 
 
 def _table(each: Map) -> Floats:

@@ -57,9 +57,16 @@ PBR = Struct(
             "the numbers of the materials that this one is made of; -1: it has layers of its own",
         ),
         Field("mask", "int", 0, "the map of the second one's share"),
+        Field("bump", "int", 0, "the map of its height; -1: there is none"),
+        Field(
+            "bump_width",
+            "real",
+            0,
+            "least distance over which slopes are measured, scene units; below 0: there are none",
+        ),
     ],
 )
-PARAMETERS = tuple(field for field in PBR.fields if field.type == "real")
+PARAMETERS = tuple(field for field in PBR.fields if field.type == "real" and field.name != "bump_width")
 """What a material has in each lane, in the order of its numbers there."""
 
 
@@ -147,6 +154,7 @@ def material_values(material: PbrMaterial) -> dict[str, object]:
     else:
         values |= {"emission_luminance": 1.0, "emission_color": tuple(luminance * part for part in color)}
     values |= {"first_map": 0, "map_count": 0, "blend": (-1, -1), "mask": -1}
+    values |= {"bump": -1, "bump_width": -1.0}
     # What differs from place to place is put in where it is known.
     sizes = {field.name: field.count for field in PARAMETERS}
     for name, value in values.items():

@@ -27,6 +27,8 @@ from clfractal.renderers.maps import (
     MAP,
     MappedMaterials,
     asked_maps,
+    bump_numbers,
+    has_bump,
     has_glass,
     has_glass_set,
     map_defines,
@@ -192,7 +194,9 @@ def normal_count(scene: Scene) -> int:
 
 def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    more = len(asked_maps(scene)) + 2 * bool(scene.objects) + (_PARTS_NUMBERS if has_parts(plan) else 0)
+    more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * bool(scene.objects)
+    if has_parts(plan):
+        more += _PARTS_NUMBERS + 3 * has_bump(scene)
     more += (_MATTE_NUMBERS + 2) * has_mattes(plan)
     return STATE_NUMBERS + 4 * normal_count(scene) + more
 

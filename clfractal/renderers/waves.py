@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.renderers.kernel import Stage
-from clfractal.renderers.maps import asked_maps, has_glass_set
+from clfractal.renderers.maps import asked_maps, bump_numbers, has_glass_set
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.renderers.set_lights import single_lights
@@ -51,7 +51,9 @@ def rays_group(lanes: int) -> tuple[int, ...]:
 
 def asks_formula(scene: Scene) -> bool:
     """Whether a quantity that chooses colours, or a material's, is found by asking the formula."""
-    return scene.coloring.by in ("thickness", "layer_distance", "trap") or bool(asked_maps(scene))
+    return scene.coloring.by in ("thickness", "layer_distance", "trap") or bool(
+        asked_maps(scene) or bump_numbers(scene)
+    )
 
 
 def has_cones(scene: Scene, plan: Plan) -> bool:

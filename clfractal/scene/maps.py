@@ -135,6 +135,11 @@ class NumberMap(Map):
                 )
         return self
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether it is the same everywhere."""
+        return len({value for _, value in self.curve}) == 1
+
     def check(self, high: float, low: float) -> None:
         """Of the curve's values."""
         for index, (_, value) in enumerate(self.curve):

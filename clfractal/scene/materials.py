@@ -4,7 +4,7 @@ from typing import Annotated, Self
 
 from pydantic import AfterValidator, Field, Tag, model_validator
 
-from clfractal.scene.base import Color, problem
+from clfractal.scene.base import Color, Coordinate, Length, problem
 from clfractal.scene.maps import FORM, AmountMap, ColorMap, FractionMap, Mapped, NumberMap, ReflectanceMap
 
 Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]
@@ -15,6 +15,7 @@ Depth = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 DepthMap = Annotated[Annotated[Depth, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 Abbe = Annotated[float, Field(strict=True, ge=1, le=1000, allow_inf_nan=False)]
 AbbeMap = Annotated[Annotated[Abbe, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
+HeightMap = Annotated[Annotated[Coordinate, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 ShineMap = Annotated[Annotated[Color, Tag("given")] | Annotated[ColorMap, Tag("map")], FORM]
 WHITE = (1.0, 1.0, 1.0)
 
@@ -85,6 +86,18 @@ class Emission(Mapped):
     color: ShineMap = Field(WHITE, description="factor on the luminance, linear Rec. 709")
 
 
+class Bump(Mapped):
+    """A relief that only light sees: the surface stays where it is, and its shading normal is that of the relief."""
+
+    height: HeightMap = Field(
+        0.0, description="of the relief over the surface, scene units; below 0: in it; only slopes are seen"
+    )
+    width: Length | None = Field(
+        None,
+        description="least distance over which slopes are measured, scene units; null: a pixel's, or a texture's",
+    )
+
+
 MAX_MATERIALS, MAX_NAME = 64, 100
 
 
@@ -114,6 +127,9 @@ class PbrMaterial(Mapped):
     emission: Emission = Field(
         default_factory=dict, validate_default=True, description="light of the material's own"
     )
+    bump: Bump = Field(
+        default_factory=dict, validate_default=True, description="a relief that only light sees"
+    )
     blend: Annotated[tuple[MaterialName, ...], Field(strict=False, min_length=2, max_length=2)] | None = (
         Field(
             None,
@@ -128,7 +144,7 @@ class PbrMaterial(Mapped):
             if self.mask != 0.5:
                 raise problem("applies to a blend of two materials", "mask")
             return self
-        for name in ("base", "specular", "coat", "fuzz", "emission"):
+        for name in ("base", "specular", "coat", "fuzz", "transmission", "emission", "bump"):
             given = getattr(self, name)
             if given != type(given)():
                 raise problem("cannot be combined with blend: a blend takes its layers from others", name)

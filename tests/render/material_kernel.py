@@ -29,6 +29,7 @@ _TEXT = """\
 #include "sampling.h"
 #include "color.h"
 #include "bsdf.h"
+#include "bsdf_bumped.h"
 
 """
 LOADS = """\
@@ -49,10 +50,10 @@ _SCATTER = """\
     store(out + (place + 1) * count, c.g); \\
     store(out + (place + 2) * count, c.b)
 
-// Planes of `count` numbers. In: viewer, light (x, y, z each), choice, u, v. Out: value and density of the light's
-// direction; the sampled direction, its density, its value.
+// Planes of `count` numbers. In: viewer, light (x, y, z each), choice, u, v, wall. Out: value and density of the light's
+// direction; the sampled direction, its density, its value. `leans`: the normal of a relief.
 __kernel void scatter(__global const scalar *in, __global scalar *out, __constant struct Pbr *material,
-                      __global const float *albedos, int count, int inside) {
+                      __global const float *albedos, __constant scalar *leans, int count, int inside) {
     const int lane = (int)get_global_id(0) * LANES;
     in += lane;
     out += lane;
@@ -61,17 +62,30 @@ __kernel void scatter(__global const scalar *in, __global scalar *out, __constan
     const vec normal = vec_of(R(0.0), R(0.6), R(0.8));
     pbr p = pbr_of(material, color_splat(material->base_color));
     p.inside = (real)((scalar)inside);
+#if HAS_BUMP
+    bsdf b = bsdf_at(&p, vec_splat(leans), viewer, albedos);
+    bsdf_lean(&b, normal);
+#else
     const bsdf b = bsdf_at(&p, normal, viewer, albedos);
-    const color value = bsdf_value(&b, light, albedos);
-    PUT_COLOR(0, value);
-    store(out + 3 * count, bsdf_density(&b, light));
+#endif
+    color value;
     real density;
+    scatter_value(&b, &light, albedos, &value, &density);
+    PUT_COLOR(0, value);
+    store(out + 3 * count, density);
+#if HAS_BUMP
+    const real wall = load(in + 9 * count);
+    const vec chosen = scatter_sample(&b, load(in + 6 * count), load(in + 7 * count), load(in + 8 * count), wall);
+    color there;
+    scatter_value(&b, &chosen, albedos, &there, &density);
+#else
     const vec chosen = bsdf_sample(&b, load(in + 6 * count), load(in + 7 * count), load(in + 8 * count), &density);
+    const color there = bsdf_value(&b, chosen, albedos);
+#endif
     store(out + 4 * count, chosen.x);
     store(out + 5 * count, chosen.y);
     store(out + 6 * count, chosen.z);
     store(out + 7 * count, density);
-    const color there = bsdf_value(&b, chosen, albedos);
     PUT_COLOR(8, there);
 }
 """
@@ -81,8 +95,9 @@ NORMAL = np.array([0.0, 0.6, 0.8])
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int, *, glass: bool) -> Any:
+def _program(device: Device, precision: Precision, lanes: int, *, glass: bool, bump: bool) -> Any:
     defines = {
+        "HAS_BUMP": int(bump),
         "HAS_GLASS": int(glass),
         "LANES": lanes,
         "REAL_IS_DOUBLE": int(precision == "float64"),
@@ -121,30 +136,31 @@ def ask(
     precision: Precision = "float32",
     lanes: int = 1,
     inside: bool = False,
+    leans: Floats | None = None,
 ) -> Answers:
-    """Runs the kernel on world directions, shape (n, 3) each, and numbers in (0, 1), shape (n, 3).
+    """Runs the kernel on world directions, shape (n, 3) each, and numbers in (0, 1), shape (n, 3), or (n, 4) with a relief.
 
-    The normal is on the viewer's side, also where the viewer is `inside` glass.
+    The normal is on the viewer's side, also where the viewer is `inside` glass; `leans`: that of a relief.
     """
     weight = material.transmission.weight
     glass = not isinstance(weight, float) or weight > 0
     tables = np.concatenate([albedo_tables(), glass_tables()]) if glass else albedo_tables()
     given = max(len(viewer), len(light))
     count = -(-given // lanes) * lanes
-    planes = np.full((9, count), 0.5, precision)
+    planes = np.full((10, count), 0.5, precision)
     planes[0:3, :given] = viewer.T
     planes[3:6, :given] = light.T
     if numbers is not None:
-        planes[6:9, :given] = numbers.T
+        planes[6 : 6 + numbers.shape[1], :given] = numbers.T
     device = choose()
     result = np.full((11, count), np.nan, precision)
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     record = PBR.array(precision, [material_values(material)])
     buffers = [
         cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
-        for array in (planes, result, record, tables)
+        for array in (planes, result, record, tables, np.array(NORMAL if leans is None else leans, precision))
     ]
-    kernel = cl.Kernel(_program(device, precision, lanes, glass=glass), "scatter")
+    kernel = cl.Kernel(_program(device, precision, lanes, glass=glass, bump=leans is not None), "scatter")
     kernel.set_args(*buffers, np.int32(count), np.int32(inside))
     cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
     cl.enqueue_copy(device.queue, result, buffers[1])

@@ -77,6 +77,8 @@ _USUAL: dict[str, tuple[float, float]] = {
     "Specular.ior": (1, 3),
     "Coat.ior": (1, 3),
     "Emission.luminance": (0, 4),
+    "Bump.height": (-0.1, 0.1),
+    "Bump.width": (0.001, 1),
     "Map.layer": (1, 64),
     "Map.scale": (0.01, 10),
     "Waves.spread": (0, 90),

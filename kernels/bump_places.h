@@ -1,0 +1,45 @@
+// Which material a spot has, and places around it where the heights of that material's relief are compared.
+
+// The number of a spot's material.
+INLINE real spot_material(const spot *here, world w) {
+    real number = (real)((scalar)SET_MATERIAL);
+#if HAS_OBJECTS
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask there = equal(here->object, (real)((scalar)(i + 1)));
+        number = pick(there, (real)((scalar)w.objects[i].material), number);
+    }
+#endif
+    return number;
+}
+
+#if HAS_BUMP
+// How far apart these places are: a pixel's footprint, so that details which a pixel cannot show are no noise, or what the material
+// asks for. Below 0 where there is no relief.
+INLINE real bump_width(const spot *here, world w) {
+    real width = (real)(w.materials->bump_width);
+#if MATERIALS > 1
+    const real root = spot_material(here, w);
+    for (int i = 1; i < MATERIALS; ++i) width = pick(equal(root, (real)((scalar)i)), (real)(w.materials[i].bump_width), width);
+#endif
+    return pick(less(width, R(0.0)), R(-1.0), fmax(width, here->cone));
+}
+
+// The way to one of them, length 1: they are the corners of a triangle with equal sides around the spot.
+INLINE vec bump_way(vec normal, int place) {
+    vec side, up;
+    make_frame(normal, &side, &up);
+    if (place == 0) return side;
+    return vec_along(vec_scale(side, R(-0.5)), place == 1 ? R(0.8660254037844386) : R(-0.8660254037844386), up);
+}
+
+// From the middle of a triangle to its corners, in sides.
+#define BUMP_REACH R(0.5773502691896258)
+
+// The spot at one of them, in the plane that touches the surface at `here`.
+INLINE spot bump_spot(const spot *here, real width, int place) {
+    spot there = *here;
+    there.point = vec_along(here->point, BUMP_REACH * width, bump_way(here->normal, place));
+    there.cone = width;
+    return there;
+}
+#endif

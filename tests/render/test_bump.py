@@ -1,0 +1,533 @@
+"""Reliefs of materials, against normals of displaced surfaces in closed form, and differences in NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import OpenEXR
+import pytest
+from PIL import Image
+
+import clfractal
+from clfractal.device.select import choose, has_float64
+from clfractal.device.tune import accepted_lanes
+from clfractal.errors import ClfractalError
+from clfractal.renderers.points import distances
+from clfractal.scene.load import dump_scene
+from clfractal.scene.model import Scene
+from tests.render.test_maps import BULB, ramp
+from tests.render.test_paths import GREY, path, scene_of, seen
+
+Floats = npt.NDArray[np.float64]
+
+EYE = np.array([0.0, -4.0, 0.0])
+CHANNELS = tuple(f"{name}.{axis}" for name in ("N", "P", "normal") for axis in "XYZ")
+TRAP: dict[str, Any] = {"by": "trap", "trap": {"shape": "plane"}, "curve": [[0, 0], [1, 0.3]]}
+
+
+def relief(height: Any, width: float | None = None, **sections: Any) -> Scene:
+    """A ball with a relief."""
+    bump = {"height": height, "width": width}
+    values = {
+        "lighting": path(),
+        "background": GREY,
+        "materials": {"m": {"bump": bump}},
+        "material": {"name": "m"},
+        "renderer": {"samples": 1, "detail": 0.01},
+        **sections,
+    }
+    return scene_of(**values)
+
+
+def facts(scene: Scene, **options: Any) -> dict[str, Floats]:
+    """The surface's own normals (`N`), places (`P`) and the relief's normals (`normal`), shape (n, 3) each."""
+    film = clfractal.render(scene, channels=("A", *CHANNELS), **options)
+    whole = np.asarray(film["A"]) == 1
+    assert whole.sum() > 300
+    return {
+        name: np.stack([np.asarray(film[f"{name}.{axis}"], np.float64)[whole] for axis in "XYZ"], axis=-1)
+        for name in ("N", "P", "normal")
+    }
+
+
+def unit(a: Floats) -> Floats:
+    return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))
+
+
+def displaced(found: dict[str, Floats], gradient: Floats, eye: Floats = EYE) -> Floats:
+    """Normals of the surface moved up by a height with that gradient in space, lowered where they turn from the viewer."""
+    n = found["N"]
+    slope = gradient - n * (n * gradient).sum(axis=-1, keepdims=True)
+    toward = unit(eye - found["P"])
+    facing, turned = (n * toward).sum(axis=-1), (slope * toward).sum(axis=-1)
+    lowered = np.where(turned > 0.9 * facing, 0.9 * facing / np.where(turned > 0, turned, 1), 1.0)
+    return unit(n - lowered[:, None] * slope)
+
+
+def degrees(a: Floats, b: Floats) -> Floats:
+    return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))
+
+
+Z = np.array([0.0, 0.0, 1.0])
+SKEW = np.array([1.0, 0.0, 2.0]) / np.sqrt(5.0)
+PLACE = np.array([0.6, -1.4, 0.5])
+HEIGHTS: dict[str, tuple[dict[str, Any], Callable[[dict[str, Floats]], Floats]]] = {
+    "height": (
+        {"by": "height", "range": [-1, 1], "curve": [[0, 0], [1, 1]]},
+        lambda found: np.tile(0.5 * Z, (len(found["P"]), 1)),
+    ),
+    "distance": (
+        {"by": "distance", "center": PLACE.tolist(), "range": [0, 4], "curve": [[0, 0], [1, -2]]},
+        lambda found: -0.5 * unit(found["P"] - PLACE),
+    ),
+    "normal": (
+        {"by": "normal", "direction": [1, 0, 2], "curve": [[0, 0], [1, 0.8]]},
+        # The normal of a ball of radius 1 changes as the place does.
+        lambda found: np.tile(0.4 * SKEW, (len(found["P"]), 1)),
+    ),
+}
+
+
+@pytest.mark.parametrize("by", HEIGHTS)
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_normals_are_those_of_the_displaced_ball(by: str, precision: str) -> None:
+    if precision == "float64" and not has_float64(choose().info):
+        pytest.skip("the device has no float64")
+    height, gradient = HEIGHTS[by]
+    found = facts(relief(height), precision=precision)
+    assert degrees(found["N"], found["normal"]).max() > 20
+    apart = degrees(displaced(found, gradient(found)), found["normal"])
+    # Over a footprint, 1/20 of the radius, a height that bends changes its slope.
+    assert np.median(apart) < 0.2
+    assert apart.max() < 1.0
+
+
+def around(n: Floats) -> tuple[Floats, Floats, Floats]:
+    """Ways to the places around spots: corners of a triangle, in the frame of Duff and others 2017."""
+    x, y, z = n.T
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    side = np.stack([1 + sign * x * x * a, sign * x * y * a, -sign * x], axis=-1)
+    up = np.stack([x * y * a, sign + y * y * a, -y], axis=-1)
+    return side, -0.5 * side + np.sqrt(0.75) * up, -0.5 * side - np.sqrt(0.75) * up
+
+
+def differences(found: dict[str, Floats], width: float, height: Callable[[Floats], Floats]) -> Floats:
+    """The gradient of the plane through a height at three places that are `width` apart."""
+    reach = width / np.sqrt(3)
+    ways = around(found["N"])
+    return np.asarray(sum(height(found["P"] + reach * way)[:, None] * way for way in ways) / (1.5 * reach))
+
+
+def least_height(points: Floats, applications: int = 12) -> Floats:
+    """The trap of `TRAP` on the ball of z^2 + 0: the least |z| of all applications."""
+    q = np.concatenate([points, np.zeros((len(points), 1))], axis=-1)
+    least = np.full(len(q), np.inf)
+    alive = np.linalg.norm(q, axis=-1) <= 4
+    for _ in range(applications):
+        a, rest = q[:, :1], q[:, 1:]
+        q = np.where(
+            alive[:, None],
+            np.concatenate([a * a - (rest**2).sum(axis=-1, keepdims=True), 2 * a * rest], -1),
+            q,
+        )
+        least = np.where(alive, np.minimum(least, np.abs(q[:, 2])), least)
+        alive &= np.linalg.norm(q, axis=-1) <= 4
+    return np.where(np.isfinite(least), least, np.abs(points[:, 2]))
+
+
+def test_traps_are_compared_over_the_width() -> None:
+    """The same differences of the same orbits in NumPy."""
+    ball = {"name": "quaternion_julia", "iterations": 3, "julia": [0, 0, 0, 0]}
+    found = facts(relief(TRAP, width=0.1, formula=ball), precision="float64")
+    expected = displaced(found, differences(found, 0.1, lambda p: 0.3 * np.clip(least_height(p, 3), 0, 1)))
+    apart = degrees(expected, found["normal"])
+    assert degrees(found["N"], found["normal"]).max() > 15
+    assert np.median(apart) < 0.2
+    assert (apart < 2).mean() > 0.9
+
+
+def test_iterations_of_a_fractal() -> None:
+    """The smooth count at the places around, by the list of points; exactly so where light is computed at the hit."""
+    height = {"by": "iterations", "range": [1, 5], "curve": [[0, 0], [1, 0.1]]}
+    scene = relief(height, width=0.1, **{**BULB, "formula": {"name": "mandelbulb", "iterations": 3}})
+    found = facts(scene, precision="float64")
+
+    def count(points: Floats) -> Floats:
+        known = distances(scene.chain, points, 3, device=choose(), lanes=1, precision="float64")
+        return np.asarray(np.clip((known.smooth - 1) / 4, 0, 1) * 0.1)
+
+    expected = displaced(found, differences(found, 0.1, count), np.array(BULB["camera"]["position"]))
+    apart = degrees(expected, found["normal"])
+    assert np.median(degrees(found["N"], found["normal"])) > 2
+    assert (apart < 1e-3).mean() > 0.3
+    assert (apart < 1).mean() > 0.95
+
+
+OBJECTS: dict[str, dict[str, Any]] = {
+    "floor": {"type": "plane", "position": [0, 0, -1.1], "material": "m"},
+    "ball": {
+        "type": "sphere",
+        "position": [1.2, -0.8, 0.4],
+        "radius": 0.4,
+        "scale": [1, 1, 0.6],
+        "material": "m",
+    },
+    "box": {
+        "type": "box",
+        "position": [-1.2, -0.8, 0.4],
+        "size": [0.6, 0.6, 0.6],
+        "rotation": [10, 20, 30],
+        "material": "m",
+    },
+    "post": {
+        "type": "cylinder",
+        "position": [1.2, -0.8, -0.7],
+        "radius": 0.2,
+        "height": 0.6,
+        "material": "m",
+    },
+    "drop": {
+        "type": "sphere",
+        "join": "smooth_union",
+        "position": [-0.9, 0, -0.6],
+        "radius": 0.4,
+        "material": "m",
+    },
+    "twin": {
+        "type": "formula",
+        "formula": {"name": "mandelbulb", "iterations": 3},
+        "position": [-1.3, 0, -0.4],
+        "scale": 0.4,
+    },
+}
+
+
+@pytest.mark.parametrize("by", ["height", "normal"])
+def test_objects_have_reliefs(by: str) -> None:
+    """Planes, balls, boxes, cylinders, joined ones and formulas, by their own normals."""
+    height = {"by": by, "direction": [0, 1, 2], "range": [-2, 2], "curve": [[0, -1], [1, 1]]}
+    scene = relief(height, objects=OBJECTS, image={"width": 96, "height": 96})
+    found = facts(scene)
+    flat = np.abs(found["P"][:, 2] + 1.1) < 1e-4
+    if by == "normal":
+        # Flat faces have none by their normal; a round one has, as test_normals_are_those_of_the_displaced_ball says.
+        assert flat.sum() > 300
+        assert degrees(found["N"], found["normal"])[flat].max() < 0.1
+        assert np.median(degrees(found["N"], found["normal"])[~flat]) > 5
+        return
+    gradient = np.tile(0.5 * np.array([0.0, 1.0, 2.0]) / np.sqrt(5.0), (len(flat), 1))
+    apart = degrees(displaced(found, gradient), found["normal"])[np.abs(found["P"] @ gradient[0]) < 0.9]
+    assert len(apart) > 3000
+    assert degrees(found["N"], found["normal"]).max() > 20
+    assert np.quantile(apart, 0.99) < 0.5
+
+
+def test_water_has_waves_and_a_relief() -> None:
+    sea = {"type": "water", "position": [0, 0, -0.9], "material": "m", "waves": {"height": 0.2, "length": 2}}
+    found = facts(
+        relief(
+            {"by": "height", "direction": [1, 0, 0], "curve": [[0, 0], [1, 0.4]], "range": [-2, 2]},
+            objects={"sea": sea},
+        )
+    )
+    of_sea = np.linalg.norm(found["P"], axis=-1) > 1.05
+    assert of_sea.sum() > 200
+    waves = degrees(found["N"], np.tile(Z, (len(of_sea), 1)))[of_sea]
+    assert waves.max() > 5
+    inside = np.abs(found["P"][:, 0]) < 1.8
+    gradient = np.tile([0.1, 0.0, 0.0], (len(of_sea), 1))
+    apart = degrees(displaced(found, gradient), found["normal"])[of_sea & inside]
+    assert np.quantile(apart, 0.98) < 0.2
+
+
+# -- pictures
+
+
+def waves(folder: Path, count: int = 256) -> None:
+    """A picture of one wave to the right, whose numbers are as they are."""
+    row = 0.5 + 0.5 * np.sin(2 * np.pi * (np.arange(count) + 0.5) / count)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    pixels = np.tile(row.astype(np.float32), (count, 1))
+    OpenEXR.File(header, dict.fromkeys("RGB", pixels)).write(str(folder / "waves.exr"))
+
+
+def floor(folder: Path, scale: float, **sections: Any) -> Scene:
+    """A plane from above, with a relief by that picture."""
+    height = {"texture": "waves.exr", "scale": scale, "curve": [[0, 0], [1, 0.1]]}
+    scene = relief(
+        height,
+        camera={"position": [0.1, 0.2, 4], "target": [0.1, 0.2, 0], "up": [0, 1, 0], "fov": 30},
+        objects={"floor": {"type": "plane", "position": [0, 0, 1.2], "material": "m"}},
+        image={"width": 64, "height": 64},
+        **sections,
+    )
+    return clfractal.load_scene(dump_scene(scene.placed(folder)), folder=folder)
+
+
+def test_a_picture_is_a_relief(tmp_path: Path) -> None:
+    """A plane with a wave: its normals in closed form; a footprint is 1/43 of the wave."""
+    waves(tmp_path)
+    found = facts(floor(tmp_path, 1.0))
+    x = found["P"][:, 0]
+    gradient = np.stack([0.1 * np.pi * np.cos(2 * np.pi * x), 0 * x, 0 * x], axis=-1)
+    expected = displaced(found, gradient, np.array([0.1, 0.2, 4]))
+    assert degrees(found["N"], found["normal"]).max() > 16
+    assert degrees(expected, found["normal"]).max() < 1.0
+
+
+def test_near_pictures_have_no_edges(tmp_path: Path) -> None:
+    """Their slopes are measured over a pixel of theirs at least: else each pixel would be a step."""
+    waves(tmp_path, 8)
+    found = facts(floor(tmp_path, 1.0))
+    x = found["P"][:, 0]
+    steps = np.abs(np.diff(found["normal"][np.argsort(x), 0]))
+    assert np.ptp(found["normal"][:, 0]) > 0.4
+    assert steps.max() < 0.06
+
+
+def test_far_pictures_are_flat(tmp_path: Path) -> None:
+    """What a pixel cannot show is not seen: nothing shimmers."""
+    waves(tmp_path)
+    found = facts(floor(tmp_path, 0.01))
+    assert degrees(found["N"], found["normal"]).max() < 0.2
+
+
+def test_codes_of_a_picture_are_heights(tmp_path: Path) -> None:
+    """A grey ramp of codes rises evenly."""
+    codes = np.tile(np.arange(256, dtype=np.uint8), (64, 1))
+    Image.fromarray(codes).save(tmp_path / "ramp.png")
+    height = {"texture": "ramp.png", "scale": 4, "curve": [[0, 0], [1, 0.8]]}
+    scene = relief(height, objects={"floor": {"type": "plane", "position": [0, 0, -0.8], "material": "m"}})
+    scene = clfractal.load_scene(dump_scene(scene.placed(tmp_path)), folder=tmp_path)
+    found = facts(scene)
+    on_floor = (np.abs(found["P"][:, 2] + 0.8) < 1e-4) & (np.abs((found["P"][:, 0] + 2) % 4 - 2) > 0.3)
+    on_floor &= found["P"][:, 1] > -2
+    assert on_floor.sum() > 50
+    expected = displaced(found, np.tile([0.2, 0.0, 0.0], (len(on_floor), 1)))
+    assert np.quantile(degrees(expected, found["normal"])[on_floor], 0.9) < 0.3
+
+
+# -- blends
+
+
+def test_masks_make_edges() -> None:
+    """A material that lies 0.3 over another: the mask's slope is the edge's."""
+    materials = {
+        "low": {},
+        "high": {"bump": {"height": 0.3}},
+        "m": {"blend": ["low", "high"], "mask": {"by": "height", "range": [-0.3, 0.3]}},
+    }
+    found = facts(relief(0, materials=materials))
+    z = found["P"][:, 2]
+    gradient = np.where((np.abs(z) < 0.25)[:, None], 0.5 * Z, 0.0)
+    sure = np.abs(np.abs(z) - 0.3) > 0.06
+    apart = degrees(displaced(found, gradient), found["normal"])
+    edge = np.abs(z) < 0.25
+    assert edge.sum() > 100
+    assert apart[sure].max() < 0.5
+    assert degrees(found["N"], found["normal"])[edge].min() > 10
+
+
+def test_parts_of_a_blend_share_their_reliefs() -> None:
+    """Half of one relief is a relief of half the height."""
+    height = {"by": "height", "range": [-1, 1], "curve": [[0, 0], [1, 1]]}
+    half = {**height, "curve": [[0, 0], [1, 0.5]]}
+    materials = {"a": {"bump": {"height": height}}, "b": {}, "m": {"blend": ["a", "b"], "mask": 0.5}}
+    one = facts(relief(0, materials=materials))["normal"]
+    two = facts(relief(half))["normal"]
+    assert np.abs(one - two).max() < 1e-4
+
+
+# -- light
+
+
+FURNACES: dict[str, dict[str, Any]] = {
+    "clay": {"base": {"color": [1, 1, 1], "diffuse_roughness": 0.4}, "specular": {"weight": 0}},
+    "metal": {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0.4}},
+    "lacquer": {
+        "base": {"color": [1, 1, 1]},
+        "coat": {"weight": 1, "roughness": 0.1},
+        "fuzz": {"weight": 0.3},
+    },
+}
+
+
+@pytest.mark.parametrize("name", FURNACES)
+def test_white_before_white_is_not_seen(name: str) -> None:
+    """A steep relief on a convex body loses no light, and makes none."""
+    steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.3], [1, 0]]}
+    material = {**FURNACES[name], "bump": {"height": steep}}
+    scene = relief(0, materials={"m": material}, lighting=path(2), renderer={"samples": 1})
+    assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
+
+
+def test_glass_before_white_is_not_seen() -> None:
+    steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.1], [1, 0]]}
+    glass = {
+        "transmission": {"weight": 1},
+        "specular": {"roughness": 0.2, "ior": 1.4},
+        "bump": {"height": steep, "width": 0.05},
+    }
+    scene = relief(
+        0, materials={"m": glass}, lighting=path(64, roulette=64), renderer={"samples": 1, "search": "steps"}
+    )
+    assert abs(seen(scene, 64)[0].mean() - 1) < 0.015
+
+
+def test_what_is_lit_is_brighter() -> None:
+    """A light from above: slopes up to it are lighter than the ball, slopes down darker; none is lit below the horizon."""
+    light: dict[str, Any] = {
+        "lights": [{"direction": [0, 0.5, -1]}],
+        "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]},
+    }
+    material = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
+    wave = {"by": "height", "range": [0, 0.8], "repeat": True, "curve": [[0, 0], [0.5, 0.2], [1, 0]]}
+    scene = relief(0, materials={"m": {**material, "bump": {"height": wave}}}, **light)
+    bumped, normals, _ = seen(scene, 4)
+    plain = seen(relief(0, materials={"m": material}, **light), 4)[0]
+    toward = np.array([0, -0.5, 1]) / np.hypot(1, 0.5)
+    cosine = normals @ toward
+    assert np.abs(bumped[cosine < -0.1]).max() == 0
+    assert (bumped - plain).max() > 0.1
+    assert (bumped - plain).min() < -0.1
+
+
+def test_a_flat_relief_changes_nothing() -> None:
+    """Bit for bit: its text is the same."""
+    plain = seen(relief(0), 4)[0]
+    assert np.array_equal(plain, seen(relief(0.5), 4)[0])
+    assert np.array_equal(plain, seen(relief({"by": "normal", "curve": [[0, 2], [1, 2]]}), 4)[0] * 1.0)
+
+
+def test_geometry_stays() -> None:
+    """Channels N and P are the surface's."""
+    plain, bumped = facts(relief(0)), facts(relief(TRAP))
+    assert np.array_equal(plain["N"], bumped["N"])
+    assert np.array_equal(plain["P"], bumped["P"])
+    assert np.array_equal(plain["normal"], plain["N"])
+    assert not np.allclose(bumped["normal"], bumped["N"], atol=0.05)
+
+
+def test_normals_face_the_viewer() -> None:
+    steep = {"by": "height", "range": [0, 0.4], "repeat": True, "curve": [[0, 0], [0.5, 2], [1, 0]]}
+    found = facts(relief(steep))
+    assert degrees(found["N"], found["normal"]).max() > 60
+    faces = (found["N"] * unit(EYE - found["P"])).sum(axis=-1) > 0
+    assert ((found["normal"] * unit(EYE - found["P"])).sum(axis=-1) > 0)[faces].all()
+    assert np.allclose(np.linalg.norm(found["normal"], axis=-1), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize("lanes", [4, 8, 16])
+def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    if lanes not in accepted_lanes(choose(), "float32"):
+        pytest.skip("the device has no such packets")
+    pictures = []
+    for each in (1, lanes):
+        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
+        film = clfractal.render(
+            relief({"by": "normal", "curve": [[0, 0], [1, 0.2]]}, width=0.05, lighting=path(1), **BULB),
+            channels=("R", "normal.X"),
+        )
+        pictures.append(np.stack([np.asarray(film[name]) for name in ("R", "normal.X")]))
+    assert np.ptp(pictures[0][1]) > 1
+    assert np.abs(pictures[0] - pictures[1]).mean() < 1e-3
+
+
+def test_traps_on_objects_beside_the_set() -> None:
+    """A plane through the set's space shows the trap of each of its places; what only the set has is 0 there."""
+    board = {"type": "plane", "position": [0, 1.5, 0], "normal": [0, -1, 0], "material": "m"}
+    dark = {"base": {"weight": 0}, "specular": {"weight": 0}}
+    for by, expected in (("trap", None), ("curvature", 0.0)):
+        emission = {
+            "luminance": 1,
+            "color": {"by": by, "trap": {"shape": "plane"}, "palette": [[0, 0, 0], [1, 1, 1]]},
+        }
+        scene = relief(0, materials={"m": {**dark, "emission": emission}}, objects={"board": board})
+        film = clfractal.render(scene, channels=("R", "P.X", "P.Y", "P.Z"))
+        place = np.stack([np.asarray(film[f"P.{axis}"], np.float64) for axis in "XYZ"], axis=-1)
+        beside = np.abs(place[..., 1] - 1.5) < 1e-3
+        assert beside.sum() > 300
+        shown = np.asarray(film["R"])[beside]
+        if expected is not None:
+            assert np.abs(shown - expected).max() < 1e-6
+            continue
+        low = least_height(place[beside])
+        value = ramp(np.clip(low, 0, 1), [[0, 0, 0], [1, 1, 1]])[:, 0]
+        assert np.abs(shown - value).max() < 0.01
+        assert np.ptp(value) > 0.5
+
+
+# -- what is told
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{bump: {height: §2e6}}", "materials.m.bump.height: must be at most 1000000, got 2000000.0"),
+        ("{bump: {height: §tall}}", "materials.m.bump.height: must be a number, got 'tall'"),
+        ("{bump: {§hight: 1}}", "materials.m.bump: unknown key 'hight'; did you mean 'height'?"),
+        ("{bump: {width: §0}}", "materials.m.bump.width: must be above 0, got 0"),
+        ("{bump: {height: §{}}}", "materials.m.bump.height: needs one of by or texture"),
+        (
+            "{bump: {height: {by: trap, curve: [[0, 0], [1, §-2e6]]}}}",
+            "materials.m.bump.height.curve.1.1: must be at least -1e+06, got -2e+06",
+        ),
+        (
+            "{bump: {height: {texture: §none.png}}}",
+            "materials.m.bump.height.texture: none.png cannot be read: No such file or directory",
+        ),
+        (
+            "{blend: [a, a], bump: §{height: 1}}",
+            "materials.m.bump: cannot be combined with blend: a blend takes its layers from others",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told(
+    text: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    head = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\nmaterials:\n  a: {}\n"
+    line = f"  m: {text}"
+    with pytest.raises(ClfractalError) as caught:
+        clfractal.load_scene(head + line.replace("§", "") + "\n")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert caught.value.status == 2
+    assert str(caught.value).startswith(f"scene:6:{line.index('§') + 1}: ")
+
+
+def test_direct_light_refuses_reliefs_of_objects() -> None:
+    text = """version: 1
+formula: {name: mandelbulb}
+camera: {}
+materials: {m: {bump: {height: {by: trap}}}}
+objects: {b: {material: m}}
+"""
+    with pytest.raises(
+        ClfractalError,
+        match=r"objects\.b\.material: 'm' differs from place to place, which needs lighting\.mode: path",
+    ):
+        clfractal.load_scene(text)
+
+
+def test_reliefs_move_in_films() -> None:
+    tracks = {
+        "materials.m.bump.height.curve.1.1": {"keys": [{"time": 0, "value": 0.1}, {"time": 1, "value": 0.5}]},
+        "materials.m.bump.width": {"keys": [{"time": 0, "value": 0.1}, {"time": 1, "value": 0.3}]},
+    }
+    scene = relief(TRAP, width=0.1, animation={"frames": 3, "fps": 2, "tracks": tracks})
+    from clfractal.scene.movement import Movement
+
+    middle = Movement(scene).scene(1).materials["m"].bump
+    assert middle.width == pytest.approx(0.2, abs=0.05)
+    assert middle.height.curve[1][1] == pytest.approx(0.3, abs=0.05)  # type: ignore[union-attr]
+
+
+def test_a_scene_with_a_relief_is_written_and_read() -> None:
+    scene = relief(TRAP, width=0.02)
+    assert clfractal.load_scene(dump_scene(scene)) == scene
