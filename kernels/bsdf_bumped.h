@@ -3,8 +3,8 @@
 // leans to, diffuse light fades as by Chiang, Li and Burley 2019 ("Taming the shadow terminator"), and what is taken there goes to the other
 // side: it is mirrored by a wall across the way in which the normal leans, as the specular tangent facet of Schuessler and others 2017
 // ("Microfacet-based normal mapping for robust Monte Carlo path tracing") does. Highlights do not fade, or they would come back as sparks;
-// wide ones fade by the square of their alpha. All these are mirror images of directions, so what a material reflects in all is what it reflects without
-// them, and values and densities change alike.
+// wide ones do in part, by the square of their alpha. All these are mirror images of directions: what a material reflects in all stays, and
+// values and densities change alike.
 #if HAS_BUMP
 
 // The material of a relief, `b`, on the surface with that normal.

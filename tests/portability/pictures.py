@@ -82,7 +82,8 @@ _MORE = {
     " ball: {position: [0.6, -0.9, 0.2], radius: 0.3, scale: [1, 1, 2], material: clay}}\n",
     "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
     "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
-    " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5}}}\nmaterial: {name: glass}\n",
+    " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5},"
+    " bump: {height: {by: iterations, range: [0, 9], curve: [[0, 0], [1, 0.1]]}, width: 0.1}}}\nmaterial: {name: glass}\n",
     "joined": "coloring: {by: trap, scale: 1, palette: opal}\n"
     "objects: {hole: {type: sphere, position: [0.3, -0.8, 0.3], radius: 0.4, join: cut},"
     " drop: {type: box, join: smooth_union, position: [-0.7, -0.6, 0.6], size: [0.4, 0.3, 0.5]},"
