@@ -157,7 +157,7 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several,
 // Without reliefs all do.
 INLINE real lobe_share(real broad, real sharp, real alpha) {
 #if HAS_BUMP
-    return sharp + (broad - sharp) * alpha;
+    return sharp + (broad - sharp) * alpha * alpha;
 #else
     return R(1.0);
 #endif

@@ -3,8 +3,8 @@
 // leans to, diffuse light fades as by Chiang, Li and Burley 2019 ("Taming the shadow terminator"), and what is taken there goes to the other
 // side: it is mirrored by a wall across the way in which the normal leans, as the specular tangent facet of Schuessler and others 2017
 // ("Microfacet-based normal mapping for robust Monte Carlo path tracing") does. Highlights do not fade, or they would come back as sparks;
-// wide ones fade by their alpha. All these are mirror images of directions, so what a material reflects in all is what it reflects without
-// them, and values and densities change alike.
+// wide ones do in part, by the square of their alpha. All these are mirror images of directions: what a material reflects in all stays, and
+// values and densities change alike.
 #if HAS_BUMP
 
 // The material of a relief, `b`, on the surface with that normal.
@@ -61,8 +61,8 @@ INLINE vec scatter_sample(const bsdf *b, real choice, real u, real v, real wall)
     const mask usable = less(R(0.0), density);
     const mask apart = ~same_side(vec_dot(toward, b->normal), vec_dot(toward, b->surface));
     toward = vec_pick(apart, mirrored_across(toward, b->surface), toward);
-    real fades = pick(less(choice, b->by_coat + b->by_gloss), b->alpha, R(1.0));
-    fades = pick(less(choice, b->by_coat), b->coat_alpha, fades);
+    real fades = pick(less(choice, b->by_coat + b->by_gloss), b->alpha * b->alpha, R(1.0));
+    fades = pick(less(choice, b->by_coat), b->coat_alpha * b->coat_alpha, fades);
 #if HAS_GLASS
     const real before = b->by_coat + b->by_gloss;
     fades = pick(less_equal(before, choice) & less(choice, before + b->by_glass + b->by_beyond), R(0.0), fades);

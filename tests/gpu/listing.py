@@ -57,7 +57,7 @@ _MAPS = {
             "base": {"color": {"by": "trap", "palette": ["#fff", "#840"]}, "metalness": 1},
             "specular": {"roughness": {"by": "iterations", "curve": [[0, 0.1], [1, 0.6]]}},
         },
-        "clay": {"base": {"weight": {"by": "curvature"}}},
+        "clay": {"base": {"weight": {"by": "curvature"}}, "bump": {"height": {"by": "trap"}}},
         "both": {"blend": ["gold", "clay"], "mask": {"by": "normal"}},
     },
     "material": {"name": "both"},

@@ -386,18 +386,26 @@ def test_a_material_that_differs_from_place_to_place_is_shown() -> None:
     maps = {
         "base": {"color": {"by": "trap", "palette": "viridis"}, "weight": {"by": "height", "range": [-1, 1]}},
         "emission": {"luminance": {"by": "normal", "curve": [[0, 0], [1, 3]]}},
+        "bump": {"height": {"by": "trap", "curve": [[0, 0], [1, 0.1]]}},
     }
     ui.studio.edit({"lighting": {"mode": "path"}, "materials.rock": maps, "material.name": "rock"})
     stage.frame()
     found = ui.studio.scene.materials["rock"]
     assert found.emission.luminance.curve[1] == (1, 3)  # type: ignore[union-attr]
     assert ui.studio.edit(
-        {"materials.rock.base.weight.range": [-2, 2], "materials.rock.specular.roughness": 0.7}
+        {
+            "materials.rock.base.weight.range": [-2, 2],
+            "materials.rock.specular.roughness": 0.7,
+            "materials.rock.bump.height.curve.1.1": 0.2,
+            "materials.rock.bump.width": 0.05,
+        }
     )
     stage.frame()
     found = ui.studio.scene.materials["rock"]
     assert found.base.weight.range == (-2, 2)  # type: ignore[union-attr]
     assert found.specular.roughness == 0.7
+    assert found.bump.height.curve[1] == (1, 0.2)  # type: ignore[union-attr]
+    assert found.bump.width == 0.05
     ui.studio.edit(
         {"materials.moss": {}, "materials.both": {"blend": ["rock", "moss"]}, "material.name": "both"}
     )
