@@ -65,6 +65,21 @@ INLINE void path_absorbs(path *so_far, const carried *with, real way, world w) {
     so_far->through = color_pick(less(R(0.0), with->medium), absorbed(so_far->through, with->absorption, far), so_far->through);
 }
 
+// Lets the glass on the outer side of a boundary absorb the light that was asked for there.
+INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
+    const mask through_glass = less(R(0.0), pick(edge.leaving, edge.around, with->medium));
+    if (!any_lane(through_glass)) return;
+    const color around = color_pick(edge.leaving, medium_of(edge.around, w).absorption, with->absorption);
+    with->awaited = color_pick(through_glass, absorbed(with->awaited, around, way), with->awaited);
+}
+
+// Over a boundary that is hidden a path goes on as it came.
+INLINE void path_goes_straight(path *so_far, const path *before, vec direction, mask hidden) {
+    so_far->direction = vec_pick(hidden, direction, so_far->direction);
+    so_far->through = color_pick(hidden, before->through, so_far->through);
+    so_far->on_path = pick(hidden, before->on_path, so_far->on_path);
+}
+
 // Brings a path over the boundary if its direction leads there.
 INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, color weights, real wave, world w) {
     const mask over = less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;

@@ -83,6 +83,25 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 #endif
 }
 
+// Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set.
+INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, world w) {
+    const mask on_path = mask_of(so_far->on_path);
+    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+    lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
+    before.met &= on_path;
+    const mask lands = on_path & mask_of(found->found) & ~before.met;
+#if HAS_GLASS
+    path_absorbs(so_far, with, far, w);
+#endif
+    if (s.bounce > 0) {
+        path_ends(so_far, with, &before, on_path & ~lands, picture_y, w);
+    } else {
+        so_far->seen = color_pick(before.met, color_mul(before.shows, so_far->through), so_far->seen);
+        spot_of_light(s, found, arrived.origin, arrived.direction, far, before.met);
+    }
+    return lands;
+}
+
 // The light of the path's present spot: what shines there, what one light brings, and where the path goes on.
 STAGE(scatter_paths) {
     if (IS_BEYOND) return;
@@ -97,23 +116,8 @@ STAGE(scatter_paths) {
 #if HAS_GLASS
     if (bounce == 0) media_begin(&with, arrived.origin, w);
 #endif
-    mask on_path = mask_of(so_far.on_path);
-    real far = pick(mask_of(found.found), vec_dot(vec_sub(found.seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
-    lamp before = lamp_met(arrived.origin, arrived.direction, bounce == 0, &far, w);
-    before.met &= on_path;
-    const mask lands = on_path & mask_of(found.found) & ~before.met;
-    if (bounce > 0) {
-        STATE_RECALL(s, with, STATE_CARRIED);
-    }
-#if HAS_GLASS
-    path_absorbs(&so_far, &with, far, w);
-#endif
-    if (bounce > 0) {
-        path_ends(&so_far, &with, &before, on_path & ~lands, a.y, w);
-    } else {
-        so_far.seen = color_pick(before.met, color_mul(before.shows, so_far.through), so_far.seen);
-        spot_of_light(s, &found, arrived.origin, arrived.direction, far, before.met);
-    }
+    if (bounce > 0) STATE_RECALL(s, with, STATE_CARRIED);
+    const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, w);
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
@@ -151,19 +155,12 @@ STAGE(scatter_paths) {
         asks.far = pick(shows, light.distance, R(-1.0));
         asks.footprint = found.cone * (real)(w.settings->shadow_detail);
 #if HAS_GLASS
-        // On the outer side, where light is asked for, there may be glass too.
-        const mask through_glass = less(R(0.0), pick(behind, edge.around, with.medium));
-        if (any_lane(through_glass)) {
-            const color around = color_pick(behind, medium_of(edge.around, w).absorption, with.absorption);
-            with.awaited = color_pick(through_glass, absorbed(with.awaited, around, light.distance), with.awaited);
-        }
+        awaited_absorbed(&with, edge, light.distance, w);
         const path before_it = so_far;
 #endif
         path_goes_on(s, &here.at, &so_far, &with, &b, w);
 #if HAS_GLASS
-        so_far.direction = vec_pick(edge.hidden, arrived.direction, so_far.direction);
-        so_far.through = color_pick(edge.hidden, before_it.through, so_far.through);
-        so_far.on_path = pick(edge.hidden, before_it.on_path, so_far.on_path);
+        path_goes_straight(&so_far, &before_it, arrived.direction, edge.hidden);
         path_crosses(&so_far, &with, &found, edge, &p, weights, wave, w);
 #endif
         spot seen_first = found;
