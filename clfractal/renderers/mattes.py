@@ -102,9 +102,13 @@ def ranked(pairs: Floats, numbers: npt.NDArray[np.int64], identifiers: Floats) -
     return made
 
 
-def attributes(scene: Scene, channels: Sequence[str]) -> dict[str, str]:
-    """What a file's header tells of its Cryptomatte layers: their names, and which identifier each thing's name has."""
-    found: dict[str, str] = {}
+def attributes(scene: Scene, channels: Sequence[str]) -> dict[str, str | list[str]]:
+    """What a file's header tells of things: their names, and of Cryptomatte layers which identifier each name has."""
+    found: dict[str, str | list[str]] = {}
+    if "object" in channels:
+        found["objects"] = list(objects_of(scene).names)
+    if "material" in channels:
+        found["materials"] = list(materials_of(scene).names)
     for name, layer, things in (
         ("CryptoObject", OBJECT_MATTES, objects_of(scene)),
         ("CryptoMaterial", MATERIAL_MATTES, materials_of(scene)),

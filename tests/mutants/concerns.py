@@ -33,6 +33,10 @@ kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog rend
 kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
 kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/objects.h: render/objects render/objects_light
+kernels/media.h: render/glass_objects
+kernels/glass_paths.h: render/glass_paths render/glass_objects
+kernels/bump.h: render/bump
+kernels/bsdf_bumped.h: render/bumped_materials
 kernels/water.h: render/objects
 kernels/look.h: render/objects_light render/surface_light
 kernels/march_steps.h: render/searches

@@ -37,8 +37,15 @@ def fill(film: Film) -> np.ndarray:
 def test_the_table_of_channels() -> None:
     assert " ".join(ALL) == (
         "R G B A Z N.X N.Y N.Z P.X P.Y P.Z iterations steps samples albedo.R albedo.G albedo.B emission.R emission.G"
-        " emission.B direct.R direct.G direct.B indirect.R indirect.G indirect.B normal.X normal.Y normal.Z noisy.R"
-        " noisy.G noisy.B"
+        " emission.B direct.R direct.G direct.B indirect.R indirect.G indirect.B normal.X normal.Y normal.Z object"
+        " material "
+        + " ".join(
+            f"Crypto{things}0{pair}.{part}"
+            for things in ("Object", "Material")
+            for pair in range(3)
+            for part in "RGBA"
+        )
+        + " noisy.R noisy.G noisy.B"
     )
     assert DEFAULT_CHANNELS == ("R", "G", "B", "A", "Z")
     assert [name for name in ALL if CHANNELS[name].fill != 0] == ["Z"]

@@ -15,7 +15,7 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import SceneError
-from clfractal.files.channels import MATERIAL_MATTES, MATTES, OBJECT_MATTES
+from clfractal.files.channels import MATERIAL_MATTES, MATTES, NUMBERED, OBJECT_MATTES
 from clfractal.files.exr import read_exr
 from clfractal.pictures.film import Film
 from clfractal.renderers.mattes import bits_of, identifier, murmur3, ranked
@@ -131,10 +131,12 @@ def test_lights_that_are_seen_are_nothing(lighting: dict[str, Any]) -> None:
 
 def test_files_follow_the_specification(tmp_path: Path) -> None:
     scene = scene_of(**SECTIONS)
-    film = clfractal.render(scene, channels=["R", "G", "B", "A", "CryptoObject", "CryptoMaterial"])
+    film = clfractal.render(scene, channels=["R", "G", "B", "A", *NUMBERED, "CryptoObject", "CryptoMaterial"])
     film.save(tmp_path / "a.exr")
     planes, header = read_exr(tmp_path / "a.exr")
     assert {planes[name].dtype for name in OBJECT_MATTES} == {np.dtype(np.float32)}
+    assert header["clfractalObjects"] == ["set", *OBJECTS]
+    assert header["clfractalMaterials"] == ["red", "blue", "material"]
     for layer, names in (
         ("CryptoObject", ["set", *OBJECTS]),
         ("CryptoMaterial", ["red", "blue", "material"]),
