@@ -135,8 +135,8 @@ def test_files_follow_the_specification(tmp_path: Path) -> None:
     film.save(tmp_path / "a.exr")
     planes, header = read_exr(tmp_path / "a.exr")
     assert {planes[name].dtype for name in OBJECT_MATTES} == {np.dtype(np.float32)}
-    assert header["clfractalObjects"] == ["set", *OBJECTS]
-    assert header["clfractalMaterials"] == ["red", "blue", "material"]
+    assert header["clfractalObjects"] == ("set", *OBJECTS)
+    assert header["clfractalMaterials"] == ("red", "blue", "material")
     for layer, names in (
         ("CryptoObject", ["set", *OBJECTS]),
         ("CryptoMaterial", ["red", "blue", "material"]),
