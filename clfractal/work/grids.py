@@ -17,6 +17,7 @@ from clfractal.files.volume import SCENE_KEY, Volume
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
+from clfractal.scene.object_checks import check_objects
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import FillProgress, fill_grid
 from clfractal.voxels.grid import Grid
@@ -66,9 +67,14 @@ def as_volume(scene: Scene) -> tuple[Scene, Coloring]:
 
     The scene gets the volume renderer, with default values if it had another one, and a plain coloring: this renderer does
     not support every coloring.
+
+    Raises:
+        SceneError: the scene has objects, which grids do not know; at `objects`.
     """
     renderer: Any = scene.renderer if isinstance(scene.renderer, VolumeRenderer) else {"type": "volume"}
     changed = scene.model_copy(update={"renderer": renderer, "coloring": {}, "layout": None})
+    # Else objects would be missing without a word.
+    check_objects(changed)
     return changed, scene.coloring
 
 
