@@ -84,6 +84,8 @@ STATE_NUMBERS = 120
 _PARTS_NUMBERS = 15 + 9
 # Of mattes likewise; and each spot's object.
 _MATTE_NUMBERS = 13
+# And of what a path carries through glass.
+_GLASS_NUMBERS = 8
 
 Floats = npt.NDArray[np.float32]
 
@@ -197,7 +199,7 @@ def state_numbers(scene: Scene, plan: Plan) -> int:
     more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * bool(scene.objects)
     if has_parts(plan):
         more += _PARTS_NUMBERS + 3 * has_bump(scene)
-    more += (_MATTE_NUMBERS + 2) * has_mattes(plan)
+    more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
     return STATE_NUMBERS + 4 * normal_count(scene) + more
 
 
