@@ -11,6 +11,7 @@ import yaml
 
 import clfractal
 from clfractal.errors import SceneError
+from clfractal.files.channels import CHANNELS, NOISY
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
@@ -172,6 +173,26 @@ def test_objects_within_a_set_of_glass_are_seen() -> None:
     )
     assert abs(colors[16, 16].mean() - 3) < 0.01
     assert abs(colors[16, 26].mean() - 1) < 0.02
+
+
+def test_all_that_pixels_keep_has_room() -> None:
+    """Glass with a relief and waves in fog that shines, through a lens, with a glow and all channels."""
+    relief = {"height": {"by": "trap", "curve": [[0, 0], [1, 0.1]]}}
+    found = scene_of(
+        materials={"glass": {**glass(0.1, dispersion_scale=1), "bump": relief}},
+        material={"name": "glass"},
+        lighting=path(2),
+        glow={"by": "trap"},
+        fog={"density": 0.05, "scattering": {}},
+        objects={"sea": {"type": "water", "position": [0, 0, -1], "material": "glass"}},
+        lights=[{"direction": [1, 1, -1]}, {"type": "sphere", "position": [3, 0, 3], "radius": 0.2}],
+        coloring={"by": "trap"},
+        camera={"position": [0, -4, 0], "f_number": 4},
+        image={"width": 16, "height": 16},
+    )
+    film = clfractal.render(found, channels=[name for name in CHANNELS if name not in NOISY])
+    assert film["A"].max() == 1
+    assert all(np.isfinite(film[name]).all() for name in CHANNELS if name not in ("Z", *NOISY))
 
 
 def test_sets_that_are_no_glass_have_no_march_within() -> None:
