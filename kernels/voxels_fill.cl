@@ -9,36 +9,7 @@
 #include "voxels.h"
 
 #if FILL_KIND == FILL_ITERATIONS
-// Smooth escape counts as `orbit_dual_distance` and `smooth_count` find them, without derivatives.
-INLINE real solid_count(vec point, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    state c, z;
-    start(point, k, &c, &z);
-    surface_point end;
-    end.square = state_square(z);
-    end.square_before = end.square;
-    real count = (real)((scalar)FIRST_COUNT);
-    mask alive = less_equal(end.square, (real)(orbit->distance_square));
-    mask inside = alive & ~alive;
-    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
-        if (n == orbit->iterations) {
-            inside = alive & settled(end.square, orbit);
-            alive &= ~inside;
-        }
-        if (!any_lane(alive)) break;
-        const state next = apply(n, z, c, k);
-        z = state_pick(alive, next, z);
-        end.square_before = pick(alive, end.square, end.square_before);
-        end.square = pick(alive, state_square(next), end.square);
-        count = pick(alive, (real)((scalar)(n + 1)), count);
-        alive &= less_equal(end.square, (real)(orbit->distance_square));
-    }
-    if (orbit->longest <= orbit->iterations) inside |= alive & settled(end.square, orbit);
-#if HAS_SHAPE
-    inside = less_equal(solid_distance(z, k), R(0.0));
-#endif
-    const orbit_end found = {count, inside};
-    return clamp(smooth_count(found, end, orbit), R(0.0), (real)((scalar)orbit->iterations));
-}
+#include "solid_count.h"
 #endif
 
 // The values of PACKETS packets from voxel `first` on: 0 to 1 for a share, else as they are.
@@ -47,7 +18,8 @@ INLINE void packet_values(ulong place, int first, real *values, __global const s
                           __constant const scalar *k) {
 #if FILL_KIND == FILL_ITERATIONS
     for (int p = 0; p < TURNS(PACKETS); ++p) {
-        values[p] = solid_count(voxel_points(place, first + p * LANES, (int4)(0), axes, lattice), orbit, k);
+        mask inside;
+        values[p] = solid_count(voxel_points(place, first + p * LANES, (int4)(0), axes, lattice), &inside, orbit, k);
     }
 #else
     const int n = FILL_KIND == FILL_COVERAGE ? lattice->sub_points : 1;

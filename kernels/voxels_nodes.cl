@@ -8,10 +8,9 @@
 #include "formula.h"
 #include "orbit.h"
 #include "voxels.h"
+#include "node_proof.h"
 
 #define OCTANT 4  // its voxels a side
-// How far a full node's image may bend, over its size. At 0.15 no voxel of 30 grids is wrong, at 0.4 many of some are.
-#define BEND S(0.1)
 
 // Middle of a node's first and last voxel along an axis, and half their distance. An octant of a brick ends before its
 // neighbour's first voxel; larger nodes share that one.
@@ -20,143 +19,6 @@ INLINE void middle_of(__global const scalar *along, int cells, int node, int las
     *middle = S(0.5) * (along[low] + along[high]);
     *half_side = S(0.5) * (along[high] - along[low]);
 }
-
-// A node whose image, of radius r, comes near 0 in z: there a map of a degree above 1 has hardly any slope, as its middle
-// tells, but it has elsewhere in the node, and the distance would be too large.
-INLINE mask doubtful(real square, real radius_square) {
-#if LOGARITHMIC
-    return less(R(0.25) * square, radius_square) & less(square, R(4.0));
-#else
-    return less(R(1.0), R(0.0));
-#endif
-}
-
-#if HAS_SHAPE
-INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    return orbit_distance(point, equal(R(0.0), R(0.0)), orbit, k).step;
-}
-#else
-
-#if STATE_SIZE == 4
-#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b + z.s3.a * z.s3.b)
-#else
-#define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b)
-#endif
-
-// The distance as `orbit_distance` finds it, but the growth is that in any direction. The growth of |z| alone may vanish by
-// chance: a ray that steps too far is told so by its next step, a node by nothing.
-INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
-#if HAS_DERIVATIVE
-    state c, z;
-    start(point, k, &c, &z);
-    real growth = R(1.0), square = state_square(z);
-#else
-    dual_state c, z;
-    dual_start(point, k, &c, &z);
-    real square = dual_state_square(z);
-#endif
-    real count = (real)((scalar)FIRST_COUNT);
-    mask alive = less_equal(square, (real)(orbit->distance_square));
-    mask near = alive & ~alive;
-    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
-        if (n % ORBIT_LOOK == ORBIT_LOOK - 1 && orbit_cancelled(orbit)) break;
-        if (n == orbit->iterations) near |= alive & settled(square, orbit);
-#if HAS_DERIVATIVE
-        near |= alive & doubtful(square, (reach * growth) * (reach * growth));
-#else
-        near |= alive & doubtful(square, reach * reach * (STATE_DOT(dx, dx) + STATE_DOT(dy, dy) + STATE_DOT(dz, dz)));
-#endif
-        alive &= ~near;
-        if (!any_lane(alive)) break;
-#if HAS_DERIVATIVE
-        real next_growth = growth;
-        const state next = apply_derivative(n, z, c, &next_growth, k);
-        z = state_pick(alive, next, z);
-        growth = pick(alive, next_growth, growth);
-        square = pick(alive, state_square(next), square);
-#else
-        const dual_state next = dual_apply(n, z, c, k);
-        z = dual_state_pick(alive, next, z);
-        square = pick(alive, dual_state_square(next), square);
-#endif
-        count = pick(alive, (real)((scalar)(n + 1)), count);
-        alive &= less_equal(square, (real)(orbit->distance_square));
-    }
-    if (orbit->longest <= orbit->iterations) near |= alive & settled(square, orbit);
-#if !HAS_DERIVATIVE
-    // The root of the largest sum of a row of |J^T J| is no less than J's largest singular value, and equal to it where the
-    // map is conformal.
-    const real xx = STATE_DOT(dx, dx), yy = STATE_DOT(dy, dy), zz = STATE_DOT(dz, dz);
-    const real xy = fabs(STATE_DOT(dx, dy)), yz = fabs(STATE_DOT(dy, dz)), zx = fabs(STATE_DOT(dz, dx));
-    const real growth = sqrt(fmax(fmax(xx + xy + zx, yy + xy + yz), zz + yz + zx));
-#endif
-    const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
-    return pick(near, R(0.0), distance);
-}
-#endif
-
-#if LOGARITHMIC && !HAS_SHAPE
-#define CORNERS 8
-// One lane keeps its corners in registers, whose places the compiler has to know. Those of packets do not fit there.
-#if LANES == 1
-#define UNROLLED_ALONE _Pragma("unroll")
-#else
-#define UNROLLED_ALONE
-#endif
-
-INLINE real halved_difference_square(state a, state b) {
-    state d = {R(0.5) * (a.s0 - b.s0), R(0.5) * (a.s1 - b.s1), R(0.5) * (a.s2 - b.s2)};
-#if STATE_SIZE == 4
-    d.s3 = R(0.5) * (a.s3 - b.s3);
-#endif
-    return state_square(d);
-}
-INLINE real bend_square(state a, state b, state middle) {
-    state d = {R(0.5) * (a.s0 + b.s0) - middle.s0, R(0.5) * (a.s1 + b.s1) - middle.s1, R(0.5) * (a.s2 + b.s2) - middle.s2};
-#if STATE_SIZE == 4
-    d.s3 = R(0.5) * (a.s3 + b.s3) - middle.s3;
-#endif
-    return state_square(d);
-}
-
-// A node is inside as a whole if, after every application, its image in z is near to a parallelepiped, as its corners and its
-// middle tell, and twice its size around the middle's is within the bailout. Where the dynamics contract, that image shrinks;
-// at the edge of a region of contraction it bends (for analytic maps by r/d, d the distance to the edge: Koebe's theorem).
-INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
-    state c[CORNERS + 1], z[CORNERS + 1];
-    UNROLLED_ALONE
-    for (int i = 0; i < TURNS(CORNERS); ++i) {
-        const vec corner = vec_of(middle.x + ((i & 1) != 0 ? half_side.x : -half_side.x),
-                                  middle.y + ((i & 2) != 0 ? half_side.y : -half_side.y),
-                                  middle.z + ((i & 4) != 0 ? half_side.z : -half_side.z));
-        start(corner, k, &c[i], &z[i]);
-    }
-    start(middle, k, &c[CORNERS], &z[CORNERS]);
-    mask alive = candidates;
-    for (int n = min(FIRST_COUNT, orbit->iterations);; ++n) {
-        real spread = R(0.0), bend = R(0.0);
-        UNROLLED_ALONE
-        for (int i = 0; i < TURNS(CORNERS / 2); ++i) {
-            spread = fmax(spread, halved_difference_square(z[i], z[CORNERS - 1 - i]));
-            bend = fmax(bend, bend_square(z[i], z[CORNERS - 1 - i], z[CORNERS]));
-        }
-        // (|m| + 2 s)^2 <= 2 m^2 + 8 s^2
-        const real reach = R(2.0) * state_square(z[CORNERS]) + R(8.0) * spread;
-        alive &= less_equal(reach, (real)(orbit->bailout_square));
-        alive &= less_equal(bend, (real)(BEND * BEND) * spread + R(1e-10));
-        if (n >= orbit->iterations || !any_lane(alive)) break;
-        UNROLLED_ALONE
-        for (int i = 0; i < TURNS(CORNERS + 1); ++i) z[i] = apply(n, z[i], c[i], k);
-    }
-    return alive;
-}
-#else
-INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
-    return candidates & ~candidates;
-}
-#endif
 
 #define UNDECIDED 0
 #define EMPTY 1

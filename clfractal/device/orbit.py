@@ -79,7 +79,7 @@ def orbit_record(
 
     Args:
         bailout: in the place of the formula's own.
-        joined: values of the fields that say which of several solids this is; see `clfractal/renderers/solids.py`.
+        joined: values of the fields that say which of several solids this is; see `clfractal/solids.py`.
     """
     inner = bailout if bailout is not None else chain.bailout
     outer = max(inner, chain.distance_bailout)

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.maps import MappedMaterials, glass_bodies
-from clfractal.renderers.water import WAVES, frame_of, wave_set
-from clfractal.scene.base import Vector
+from clfractal.renderers.water import WAVES, wave_set
+from clfractal.scene.base import Vector, frame_of
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
@@ -126,6 +126,14 @@ def _has_color(scene: Scene, each: AnyObject) -> bool:
     if not isinstance(each, FormulaObject):
         return True
     return each.material is not None and scene.materials[each.material].base.color is not None
+
+
+def own_color(scene: Scene, each: AnyObject) -> Vector | None:
+    """The colour of an object's body, linear Rec. 709; None: it has the set's colouring."""
+    if not _has_color(scene, each):
+        return None
+    x, y, z = _look(scene, each)["color"]
+    return (float(x), float(y), float(z))
 
 
 def _look(scene: Scene, each: AnyObject) -> dict[str, Any]:

@@ -18,8 +18,8 @@ from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.device.watched import Watched
 from clfractal.formulas.language import Chain
-from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.renderers import records
+from clfractal.solids import Body
 
 Floats = npt.NDArray[np.float64]
 
@@ -72,7 +72,8 @@ def escape(
     """
     array = _checked(points)
     result = np.empty((2, len(array)), np.int32)
-    _run(chain, array, iterations, "escape_counts", result, device, lanes, precision, bailout, token)
+    body = Body(chain, iterations, bailout=bailout)
+    _run(body, array, "escape_counts", result, device, lanes, precision, token)
     return result[0].astype(np.int64), result[1] > 0
 
 
@@ -86,21 +87,40 @@ def distances(
     precision: Precision = "float32",
     token: CancelToken | None = None,
 ) -> Distances:
-    """Distances to the solid at points of shape (n, 3), with normals; see `escape` for the errors."""
+    """Distances to a formula's set at points of shape (n, 3), with normals; see `escape` for the errors."""
+    body = Body(chain, iterations)
+    return nearest(body, points, device=device, lanes=lanes, precision=precision, token=token)[0]
+
+
+def nearest(
+    body: Body,
+    points: npt.ArrayLike,
+    *,
+    device: Device,
+    lanes: int,
+    precision: Precision = "float32",
+    token: CancelToken | None = None,
+) -> tuple[Distances, npt.NDArray[np.int64]]:
+    """As `distances`, of a scene's body too, and whose surface is nearest.
+
+    Returns:
+        What is known of the points, and numbers of objects, from 1; 0 is the scene's own formula.
+    """
     array = _checked(points)
-    result = np.empty((7, len(array)), precision)
-    _run(chain, array, iterations, "distances", result, device, lanes, precision, None, token)
+    result = np.empty((8, len(array)), precision)
+    _run(body, array, "distances", result, device, lanes, precision, token)
     inside = result[6] > 0
     # Inside the kernel's gradient is that of |z| after the last application; the distance is 0 all around.
     normal = np.where(inside[:, None], 0.0, result[2:5].T)
     step, full, smooth = (result[plane].astype(np.float64) for plane in (0, 1, 5))
-    return Distances(step, full, normal.astype(np.float64), smooth, inside)
+    found = Distances(step, full, normal.astype(np.float64), smooth, inside)
+    return found, result[7].astype(np.int64)
 
 
-def program_text(formula: FormulaText, lanes: int, precision: Precision) -> FlatText:
-    """The whole text of the program for a formula's points."""
-    generated = {"formula.h": formula.text, "structs.h": records.struct_text()}
-    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
+def program_text(body: Body, lanes: int, precision: Precision) -> FlatText:
+    """The whole text of the program for a body's points."""
+    generated = {**body.texts(), "structs.h": records.struct_text()}
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines}
     return flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
 
 
@@ -114,24 +134,21 @@ def _checked(points: npt.ArrayLike) -> Floats:
 
 
 def _run(
-    chain: Chain,
+    body: Body,
     array: Floats,
-    iterations: int,
     kernel_name: str,
     result: npt.NDArray[Any],
     device: Device,
     lanes: int,
     precision: Precision,
-    bailout: float | None,
     token: CancelToken | None,
 ) -> None:
     """Runs one of the kernels of `points.cl`; its planes go into `result`, shape (planes, n)."""
-    formula = write_formula(chain)
-    text = program_text(formula, lanes, precision)
+    text = program_text(body, lanes, precision)
     built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
     kernel = built.kernel(kernel_name)
-    orbit = Watched(device, records.orbit_record(chain, iterations, precision, bailout).reshape(1))
-    constants, sent = _upload(device, np.array(formula.constants, precision))
+    orbit = Watched(device, body.records(precision))
+    constants, sent = _upload(device, body.constants(precision))
     planes, place = len(result), 0
 
     def enqueue(size: float) -> Part[_Launch] | None:

@@ -48,7 +48,6 @@ from clfractal.renderers.planes import (
 )
 from clfractal.renderers.scattering import albedo_tables
 from clfractal.renderers.set_lights import set_light_data, set_lights_of, single_lights
-from clfractal.renderers.solids import solid_constants, solid_defines, solid_records, solid_texts
 from clfractal.renderers.waves import (
     air_turns,
     asks_formula,
@@ -64,6 +63,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.solids import solid_constants, solid_defines, solid_records, solid_texts
 
 PALETTE_SIZE = 256
 COLORINGS = {
@@ -308,7 +308,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     structs = {"structs.h": records.struct_text() + CUT_PLANE.c_text(), "pbr.h": pbr_text()}
 
     def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
-        generated = {**solid_texts(scene, traps="COLORING" in defines), **structs}
+        generated = {**solid_texts(scene, files=("trap_near.h",) if "COLORING" in defines else ()), **structs}
         return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
 
     points = ("send_points",) if scene.surface.used_points.count > 1 else ()

@@ -11,10 +11,12 @@ import numpy.typing as npt
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.files.mesh import Mesh
-from clfractal.renderers.points import distances
+from clfractal.renderers.objects import own_color
+from clfractal.renderers.points import nearest
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import SIZE, palette_table
+from clfractal.solids import Body
 
 Doubles = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -43,7 +45,7 @@ def dress(
     flat: Flags | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Mesh:
-    """The mesh with normals from the formula's Jacobian, and colours.
+    """The mesh with normals from the formula's Jacobian, and colours; objects have those of their own.
 
     A normal stays unchanged if the formula has none nearby, or a very different one: there the detail is finer than
     the grid. If `coloring.by` is not in COLORED_BY, colours are the material's.
@@ -62,6 +64,8 @@ def dress(
     normals = np.array(mesh.normals, np.float32)
     limit = np.float32(scene.formula.iterations)
     smooth = np.full(count, limit)
+    things = np.zeros(count, np.int64)
+    body = Body.of(scene)
     for start in range(0, count, AT_ONCE):
         part = np.arange(start, min(start + AT_ONCE, count))
         left = part if flat is None else part[~flat[part]]
@@ -69,10 +73,9 @@ def dress(
             if not len(left):
                 break
             outward = np.asarray(mesh.normals[left], np.float64)
-            found = distances(
-                scene.chain,
+            found, whose = nearest(
+                body,
                 mesh.vertices[left] + push * voxel * outward,
-                scene.formula.iterations,
                 device=device,
                 lanes=lanes,
                 precision=precision,
@@ -82,10 +85,16 @@ def dress(
             normals[left[good]] = found.normal[good]
             first = seen & (smooth[left] == limit)
             smooth[left[first]] = found.smooth[first]
+            things[left[first]] = whose[first]
             left = left[~good]
         if progress is not None:
             progress((part[-1] + 1) / count)
-    return replace(mesh, normals=normals, colors=_colors(scene, coloring, normals, smooth))
+    colors = np.array(_colors(scene, coloring, normals, smooth))
+    for number, each in enumerate(scene.objects.values(), 1):
+        color = own_color(scene, each)
+        if color is not None:
+            colors[things == number] = color
+    return replace(mesh, normals=normals, colors=colors)
 
 
 def on_faces(vertices: Doubles, corner: Doubles, spacing: Doubles, shape: tuple[int, int, int]) -> Flags:

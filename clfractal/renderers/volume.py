@@ -232,7 +232,7 @@ def grid_key(scene: Scene, plan: Plan) -> str:
             "anisotropy",
         },
     )
-    solid = scene.formula.mapping() if given is None else given.digest
+    solid = scene.solid_mapping() if given is None else given.digest
     seen = shows_outside(settings) if given is None else least_visible(settings, given)
     return json.dumps([solid, shown, seen, plan.precision, plan.lanes])
 

@@ -9,7 +9,7 @@ from random import Random
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.scene.base import Vector, cross, dot, unit
+from clfractal.scene.base import dot, frame_of
 from clfractal.scene.objects import WaterObject, Waves
 
 WAVES = 16
@@ -54,13 +54,6 @@ class WaveSet:
     def slope(self) -> float:
         """No place is steeper: rise by way."""
         return float((self.height * np.hypot(self.x, self.y)).sum() * (1 + 2 * self.sharp))
-
-
-def frame_of(normal: Vector) -> tuple[Vector, Vector, Vector]:
-    """Two sides of a plane and its normal, right-handed, of length 1."""
-    axis = unit(normal)
-    side = unit(cross((0.0, 1.0, 0.0) if abs(axis[1]) < 0.9 else (1.0, 0.0, 0.0), axis))
-    return side, cross(axis, side), axis
 
 
 def wave_set(water: WaterObject) -> WaveSet:

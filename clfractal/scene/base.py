@@ -219,3 +219,10 @@ def unit(a: Vector) -> Vector:
     a = (a[0] / largest, a[1] / largest, a[2] / largest)
     size = length(a)
     return (a[0] / size, a[1] / size, a[2] / size)
+
+
+def frame_of(normal: Vector) -> tuple[Vector, Vector, Vector]:
+    """Two sides of a plane and its normal, right-handed, of length 1."""
+    axis = unit(normal)
+    side = unit(cross((0.0, 1.0, 0.0) if abs(axis[1]) < 0.9 else (1.0, 0.0, 0.0), axis))
+    return side, cross(axis, side), axis

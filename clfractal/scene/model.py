@@ -151,20 +151,35 @@ class Scene(Section):
                 found = ball_of_both(
                     found, part.ball(self.joined_chains[name].center, self.joined_chains[name].radius)
                 )
-            elif isinstance(part, Solid) and part.join == "smooth_union":
+            elif isinstance(part, Solid) and part.join in ("union", "smooth_union"):
                 found = ball_of_both(found, part.ball)
         return found
 
     @property
     def joined(self) -> "Mapping[str, Joined]":
-        """The objects that are parts of the set, in their order: formulas, and what is not only beside it."""
-        if not isinstance(self.renderer, SurfaceRenderer):
+        """The objects that are parts of the set, in their order.
+
+        Surfaces have those here that their rays march to: formulas, and what is not only beside the set. In volumes all
+        are parts of it.
+        """
+        if isinstance(self.renderer, CutPlaneRenderer):
             return {}
+        beside = isinstance(self.renderer, SurfaceRenderer)
         return {
             name: each
             for name, each in self.objects.items()
-            if isinstance(each, Joined) and (isinstance(each, FormulaObject) or each.join != "union")
+            if isinstance(each, Joined)
+            and not (beside and each.join == "union" and not isinstance(each, FormulaObject))
         }
+
+    def solid_mapping(self) -> dict[str, Any]:
+        """Plain data of all that makes up the set: the formula, and what is joined to it."""
+        joined = {}
+        for name, each in self.joined.items():
+            joined[name] = each.model_dump(mode="json", exclude={"material"})
+            if isinstance(each, FormulaObject):
+                joined[name]["formula"] = each.formula.mapping()
+        return {"formula": self.formula.mapping(), "joined": joined}
 
     @property
     def extent(self) -> Extent:

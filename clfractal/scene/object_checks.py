@@ -2,27 +2,41 @@
 
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.scene.blends import is_glass
+from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
 from clfractal.scene.maps import maps_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, PlaneObject, Solid
+from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, PlaneObject, Solid, WaterObject
 from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import VolumeRenderer
 
 
 def check_objects(scene: Scene) -> None:
     """Raises SceneError, with a dotted path, for objects that cannot be shown."""
     if not scene.objects:
         return
-    if not isinstance(scene.renderer, SurfaceRenderer):
-        raise SceneError(
-            f"are shown by renderer surface, not by {scene.renderer.type}; remove them", Where(path="objects")
-        )
+    if isinstance(scene.renderer, CutPlaneRenderer):
+        raise SceneError("are not shown by renderer cut_plane; remove them", Where(path="objects"))
+    if isinstance(scene.renderer, VolumeRenderer):
+        _check_filled(scene, scene.renderer)
     _check_joined(scene)
     for name, each in scene.objects.items():
         _check_material(scene, name, each.material)
         if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
             _check_lights(scene, name, each)
+
+
+def _check_filled(scene: Scene, renderer: VolumeRenderer) -> None:
+    """What cannot be filled into voxels."""
+    if renderer.file is not None:
+        raise SceneError("are not joined to a grid from a file; remove them", Where(path="objects"))
+    for name, each in scene.objects.items():
+        if isinstance(each, WaterObject):
+            raise SceneError(
+                "cannot be water in a volume: its waves change with the distance; {type: plane} can",
+                Where(path=f"objects.{name}.type"),
+            )
 
 
 def _check_joined(scene: Scene) -> None:
@@ -42,7 +56,7 @@ def _check_joined(scene: Scene) -> None:
             " {type: plane, join: cut} cuts both",
             Where(path="cut_planes"),
         )
-    used = scene.material.name
+    used = scene.material.name if isinstance(scene.renderer, SurfaceRenderer) else None
     if used in scene.materials and _lets_through(scene, used):
         raise SceneError(
             f"is glass, {used!r}, which cannot be joined with the object {first!r}",
@@ -76,7 +90,9 @@ def _check_material(scene: Scene, name: str, material: str | None) -> None:
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
-    """What is joined is no glass, and what differs from place to place is for paths."""
+    """What is joined is no glass, and what differs from place to place is for paths; voxels have no materials."""
+    if isinstance(scene.renderer, VolumeRenderer):
+        return
     used = material if material is not None else scene.material.name
     if used is None:
         return

@@ -13,14 +13,13 @@ import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import run_in_parts
-from clfractal.device.orbit import orbit_record
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.device.watched import Watched
-from clfractal.formulas.opencl import write_formula
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.solids import Body
 from clfractal.voxels import programs
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import Lattice, Places, all_places, lattice_of, unpack_places
@@ -59,13 +58,13 @@ def fill_grid(
     progress: ProgressCallback | None = None,
     token: CancelToken | None = None,
 ) -> Grid:
-    """The grid of a scene's formula in the renderer's last box, with its values, normals and octree.
+    """The grid of a scene's set in the renderer's last box, with its values, normals and octree.
 
     `octree` skips regions that distances show to be outside; `brute` evaluates every voxel. Values of kind
     `iterations` know no empty bricks: all are evaluated and stored.
 
     Args:
-        scene: has the formula.
+        scene: has the formula, and objects that are joined to it.
         renderer: what is filled and how (its `file` is not looked at).
         device: where.
         lanes: points of a packet.
@@ -130,27 +129,27 @@ class _Filler:
         self.scene, self.renderer, self.device, self.lattice = scene, renderer, device, lattice
         self.lanes, self.precision, self.progress, self.token = lanes, precision, progress, token
         self.sub_points = renderer.sub_points if renderer.value == "coverage" else 1
-        self.formula = write_formula(scene.chain)
+        self.body = Body.of(scene)
         self.decided = 0  # octants
         self.stats = GridStats()
 
     def run(self, on_compile: Callable[[str], None] | None) -> Grid:
-        renderer, chain = self.renderer, self.scene.chain
+        renderer, body = self.renderer, self.body
         whole = renderer.value == "iterations"
         octree = renderer.fill == "octree" and not whole
         sample: Kind = "byte" if renderer.value == "inside" else renderer.store
         source: programs.Source = "bits" if renderer.value == "inside" else "bricks"
         alone = programs.takes_parts(self.device)
         recipes = [
-            programs.fill_recipe(chain, self.formula, renderer, self.lanes, self.precision),
+            programs.fill_recipe(body, renderer, self.lanes, self.precision),
             programs.store_recipe(source, sample, renderer.store, renderer.normal_radius, alone=alone),
         ]
         if octree:
-            recipes.append(programs.nodes_recipe(chain, self.formula, self.lanes, self.precision))
+            recipes.append(programs.nodes_recipe(body, self.lanes, self.precision))
         if not whole:
             recipes.append(programs.classify_recipe(source, sample, alone=alone))
         if renderer.normals != "gradient":
-            recipes.append(programs.normals_recipe(chain, self.formula, renderer, self.lanes, self.precision))
+            recipes.append(programs.normals_recipe(body, renderer, self.lanes, self.precision))
         built = programs.build_all(self.device, recipes, on_compile, self.token)
         kernels = {recipe.kernel: each for recipe, each in zip(recipes, built, strict=True)}
         start = time.perf_counter()
@@ -185,22 +184,21 @@ class _Filler:
         return replace(grid, stats=stats)
 
     def _upload(self) -> None:
-        chain, precision = self.scene.chain, self.precision
-        iterations = self.scene.formula.iterations
+        body, precision = self.body, self.precision
+        # Of several solids each one has its own.
+        safe = 1.0 if self.scene.joined else min(body.chain.step_scale, 1.0)
         records: list[npt.NDArray[Any]] = [
             self.lattice.axes(precision, self.sub_points),
-            self.lattice.record(precision, self.sub_points, NODE_SAFETY * min(chain.step_scale, 1.0)).reshape(
-                1
-            ),
-            np.array(self.formula.constants, precision),
+            self.lattice.record(precision, self.sub_points, NODE_SAFETY * safe).reshape(1),
+            body.constants(precision),
         ]
         # Watched, because one launch of long orbits may take seconds.
-        self.orbit = Watched(self.device, orbit_record(chain, iterations, precision).reshape(1))
+        self.orbit = Watched(self.device, body.records(precision))
         axes, box, constants = (upload(self.device, record) for record in records)
         self.constants = [axes, box, self.orbit.buffer, constants]
         packets = 512 / self.lanes * self.sub_points**3
         units = max(self.device.info.compute_units, 1)
-        bricks = 0.05 * units * SLOW_APPLICATIONS / (packets * max(iterations, 1))
+        bricks = 0.05 * units * SLOW_APPLICATIONS / (packets * max(body.iterations, 1))
         self.first_part = int(np.clip(bricks, units, 2048))
 
     def _descend(self, classify_nodes: programs.Built) -> Descent:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
@@ -17,8 +17,8 @@ from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
-from clfractal.formulas.opencl import FormulaText
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.solids import Body
 from clfractal.voxels.grid import SAMPLE_BYTES, Kind
 from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
 
@@ -37,7 +37,7 @@ ALONE_ITEMS, ALONE_GROUP = 96, (32, 1)
 NODE_POINTS = 64
 # Applications between two looks at a packet.
 CHUNK = 4
-# Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
+# Packets of a work-item side by side, where packets have lanes: as in `kernels/fill_packets.h`.
 PACKETS = 2
 
 _BUFFER = Argument("buffer", 8192)
@@ -47,13 +47,13 @@ _FLOAT = Argument("scalar", dtype="float32")
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """A program to build: its text's entry file, defines and formula, its kernel, and the groups that it runs in."""
+    """A program to build: its entry file, defines and generated texts, its kernel, and the groups that it runs in."""
 
     entry: str
     kernel: str
     defines: dict[str, object]
     precision: Precision
-    formula: str | None
+    texts: Mapping[str, str]
     items: int
     group: tuple[int, int]
     arguments: tuple[Argument, ...]
@@ -125,30 +125,26 @@ def takes_parts(device: Device) -> bool:
 
 def program_text(recipe: Recipe) -> FlatText:
     """The whole text of a program."""
-    structs = EXTENT.c_text() if recipe.formula is None else ORBIT.c_text() + LATTICE.c_text()
-    generated = {"structs.h": structs}
-    if recipe.formula is not None:
-        generated["formula.h"] = recipe.formula
+    structs = ORBIT.c_text() + LATTICE.c_text() if recipe.texts else EXTENT.c_text()
+    generated = {"structs.h": structs, **recipe.texts}
     return flatten(recipe.entry, generated=generated, defines=recipe.defines, user=["formula.h"])
 
 
-def nodes_recipe(chain: Chain, formula: FormulaText, lanes: int, precision: Precision) -> Recipe:
+def nodes_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
     """`classify_nodes`: which nodes of the octree are outside or inside as a whole."""
     return Recipe(
         "voxels_nodes.cl",
         "classify_nodes",
-        _formula_defines(chain, lanes, precision),
+        _body_defines(body, lanes, precision),
         precision,
-        formula.text,
+        _texts(body, "node_proof.h"),
         1,
         (1, max(NODE_POINTS // lanes, 1)),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
     )
 
 
-def fill_recipe(
-    chain: Chain, formula: FormulaText, renderer: VolumeRenderer, lanes: int, precision: Precision
-) -> Recipe:
+def fill_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
     """`fill_bricks`: the values of bricks' voxels."""
     sample: Kind = "byte" if renderer.value == "inside" else renderer.store
     items = BRICK**3 // max(lanes * (1 if lanes == 1 else PACKETS), 8)
@@ -156,13 +152,13 @@ def fill_recipe(
         "voxels_fill.cl",
         "fill_bricks",
         {
-            **_formula_defines(chain, lanes, precision),
+            **_body_defines(body, lanes, precision),
             **{f"FILL_{name.upper()}": number for number, name in enumerate(FILL_KINDS)},
             "FILL_KIND": FILL_KINDS.index(renderer.value),
             **_sample_defines(sample),
         },
         precision,
-        formula.text,
+        _texts(body, *(("solid_count.h",) if renderer.value == "iterations" else ())),
         items,
         (items, 1),
         (_BUFFER, _BUFFER, _INT, _BUFFER, _FLOAT, *[_BUFFER] * 4),
@@ -182,7 +178,7 @@ def classify_recipe(source: Source, sample: Kind, *, alone: bool = False) -> Rec
             "RADIUS": 0,
         },
         "float32",
-        None,
+        {},
         1,
         BRICK_GROUP,
         (_BUFFER, _BUFFER, _INT, _INT, *[_BUFFER] * 3),
@@ -203,51 +199,54 @@ def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int, *, alone
         "RADIUS": radius,
     }
     arguments = (*[_BUFFER] * 3, _INT, _INT, _INT, *[_BUFFER] * 3)
-    return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", None, items, group, arguments)
+    return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", {}, items, group, arguments)
 
 
 def blocks_recipe(kept: Kind) -> Recipe:
     """`seen_blocks`: which parts of stored bricks may be seen."""
     defines: dict[str, object] = {"VALUE": C_TYPES[kept]}
     arguments = (_BUFFER, _BUFFER, _INT, _INT, _INT, _FLOAT)
-    return Recipe("voxels_blocks.cl", "seen_blocks", defines, "float32", None, 1, BRICK_GROUP, arguments)
+    return Recipe("voxels_blocks.cl", "seen_blocks", defines, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
 def ranges_recipe(kept: Kind) -> Recipe:
     """`brick_ranges`: the least and the largest sample of stored bricks."""
     defines: dict[str, object] = {"VALUE": C_TYPES[kept]}
     arguments = (_BUFFER, _BUFFER, _INT, _INT, _INT)
-    return Recipe("voxels_blocks.cl", "brick_ranges", defines, "float32", None, 1, BRICK_GROUP, arguments)
+    return Recipe("voxels_blocks.cl", "brick_ranges", defines, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
-def normals_recipe(
-    chain: Chain, formula: FormulaText, renderer: VolumeRenderer, lanes: int, precision: Precision
-) -> Recipe:
+def normals_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
     """`refine_normals`: normals of samples at the surface by `least_squares` or `exact`."""
     return Recipe(
         "voxels_normals.cl",
         "refine_normals",
         {
-            **_formula_defines(chain, lanes, precision),
+            **_body_defines(body, lanes, precision),
             **{f"NORMALS_{name.upper()}": number for number, name in enumerate(NORMALS)},
             "NORMALS": NORMALS.index(renderer.normals),
         },
         precision,
-        formula.text,
+        _texts(body),
         1,
         (1, 1),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
     )
 
 
-def _formula_defines(chain: Chain, lanes: int, precision: Precision) -> dict[str, object]:
+def _texts(body: Body, *files: str) -> dict[str, str]:
+    return body.texts(files=("solid_inside.h", *files), defines=_turns)
+
+
+def _body_defines(body: Body, lanes: int, precision: Precision) -> dict[str, object]:
+    own = _turns(body.chain) if body.scene is None else {}  # else each text has its own
+    return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines, **own}
+
+
+def _turns(chain: Chain) -> dict[str, object]:
+    """How a formula's turns repeat themselves."""
     cycle = chain.cycle_length
-    return {
-        "LANES": lanes,
-        "REAL_IS_DOUBLE": int(precision == "float64"),
-        "CHUNK": cycle * -(-CHUNK // cycle),
-        "REPEATS_FROM": chain.repeats_from,
-    }
+    return {"CHUNK": cycle * -(-CHUNK // cycle), "REPEATS_FROM": chain.repeats_from}
 
 
 def _sample_defines(sample: Kind) -> dict[str, object]:

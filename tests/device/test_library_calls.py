@@ -125,7 +125,7 @@ def test_the_machine_code_calls_nothing_small(
     if shutil.which("objdump") is None:
         pytest.skip("there is no objdump (Debian: binutils); the texts are looked through")
     text = "__kernel void known(__global float8 *a) { a[0] = fmax(a[0], a[1]); }"
-    build_in_child(text, programs.Recipe("", "known", {}, "float32", None, 1, (1, 1), (programs._BUFFER,)))
+    build_in_child(text, programs.Recipe("", "known", {}, "float32", {}, 1, (1, 1), (programs._BUFFER,)))
     if not calls(tmp_path / "pocl", "known"):
         pytest.skip(
             "the library is inlined on this processor, whatever is called; the texts are looked through"

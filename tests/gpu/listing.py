@@ -12,6 +12,7 @@ from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import points, trial
 from clfractal.scene.load import load_scene
+from clfractal.solids import Body
 from tests.gpu.pairs import covering
 from tests.platforms import programs
 
@@ -188,10 +189,10 @@ def everything() -> Iterator[Listed]:
         for name, text in programs.of_pictures(1, precision, programs.PICTURES):
             yield Listed(f"{name} {precision}", precision, text)
         for name in catalog.names():
-            formula = write_formula(catalog.load_chain(name))
-            probe = trial.program_text(formula, 1, precision)
+            body = Body(catalog.load_chain(name), 1)
+            probe = trial.program_text(write_formula(body.chain), 1, precision)
             yield Listed(f"march_probe {name} {precision}", precision, probe)
-            yield Listed(f"points {name} {precision}", precision, points.program_text(formula, 1, precision))
+            yield Listed(f"points {name} {precision}", precision, points.program_text(body, 1, precision))
             # What knows a formula in a program of its own has figures for each of them.
             plain = load_scene({**_scene("surface"), "formula": {"name": name}})
             for part, text in programs.of_scene(plain, 1, precision):

@@ -16,6 +16,7 @@ from clfractal.renderers import cut_plane, points, records, surface, trial, volu
 from clfractal.renderers.plan import make_plan
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.solids import Body
 from clfractal.voxels import programs
 from clfractal.work import canvas, show
 from tests.portability.pictures import CHANNELS, cases, scene_of
@@ -85,15 +86,14 @@ def of_scene(
 
 def of_grids(count: int, precision: Precision) -> Iterator[Named]:
     """All that fills and stores voxels."""
-    chain = catalog.load_chain("hast")
-    formula = write_formula(chain)
-    recipes = [programs.nodes_recipe(chain, formula, count, precision)]
+    body = Body(catalog.load_chain("hast"), 12)
+    recipes = [programs.nodes_recipe(body, count, precision)]
     for value in programs.FILL_KINDS:
         renderer = VolumeRenderer.model_validate({"type": "volume", "value": value})
-        recipes.append(programs.fill_recipe(chain, formula, renderer, count, precision))
+        recipes.append(programs.fill_recipe(body, renderer, count, precision))
     for normals in programs.NORMALS[1:]:
         renderer = VolumeRenderer.model_validate({"type": "volume", "normals": normals})
-        recipes.append(programs.normals_recipe(chain, formula, renderer, count, precision))
+        recipes.append(programs.normals_recipe(body, renderer, count, precision))
     if count == 1 and precision == "float32":  # these know neither packets nor the formula
         for alone in (False, True):
             recipes += [
@@ -119,4 +119,4 @@ def _choices(defines: Mapping[str, object]) -> str:
 def of_formulas() -> Iterator[Named]:
     """The library's formulas, each in the smallest program with counts, distances and gradients."""
     for name in catalog.names():
-        yield name, points.program_text(write_formula(catalog.load_chain(name)), 1, "float32")
+        yield name, points.program_text(Body(catalog.load_chain(name), 1), 1, "float32")

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.renderers.water import frame_of, wave_set
+from clfractal.renderers.water import wave_set
+from clfractal.scene.base import frame_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import BoxObject, CylinderObject, Solid, SphereObject, WaterObject
 from tests.render.shots import Floats

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -11,17 +13,75 @@ from clfractal.device.orbit import Record, orbit_record
 from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
-from clfractal.renderers.water import frame_of
 from clfractal.resources import folder
-from clfractal.scene.base import length
+from clfractal.scene.base import frame_of, length
+from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import FormulaObject, Joined, PlaneObject, Solid, turned_axes
+from clfractal.scene.objects import Ball, FormulaObject, Joined, PlaneObject, Solid, ball_of_both, turned_axes
+from clfractal.scene.surface import SurfaceRenderer
+from clfractal.scene.volume import VolumeRenderer
 
 SOLID_KINDS = {"formula": 0, "plane": 1, "sphere": 2, "box": 3, "cylinder": 4}
 JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
 
+# Kernel files that ask one formula, and what asks several solids in their place.
+_JOINED = {
+    "orbit.h": "solids.h",
+    "trap_near.h": "solids_near.h",
+    "solid_inside.h": "joined_inside.h",
+    "solid_count.h": "joined_count.h",
+    "node_proof.h": "joined_nodes.h",
+}
+# What they need before them, once for all formulas.
+_HEADERS = {"orbit.h": ("orbit_types.h",), "trap_near.h": ("trap.h",), "solid_inside.h": ("fill_packets.h",)}
+
 # What a text defines: macros, functions and types.
 _DEFINED = re.compile(r"^#define (\w+)|^INLINE [\w ]+?\**(\w+)\(|^} (\w+);|^typedef \w+ (\w+);", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """What programs ask: a formula by itself, or a scene's, with all that is joined to it.
+
+    Attributes:
+        scene: None for a formula by itself.
+        bailout: in the place of the formula's own; for a formula by itself.
+    """
+
+    chain: Chain
+    iterations: int
+    scene: Scene | None = None
+    bailout: float | None = None
+
+    @classmethod
+    def of(cls, scene: Scene) -> Body:
+        """A scene's."""
+        return cls(scene.chain, scene.formula.iterations, scene if scene.joined else None)
+
+    @property
+    def defines(self) -> dict[str, object]:
+        """The defines of its programs."""
+        return {} if self.scene is None else solid_defines(self.scene)
+
+    def texts(
+        self, *, files: Sequence[str] = (), defines: Callable[[Chain], Mapping[str, object]] | None = None
+    ) -> dict[str, str]:
+        """As `solid_texts`."""
+        if self.scene is not None:
+            return solid_texts(self.scene, files=files, defines=defines)
+        return {"formula.h": write_formula(self.chain).text}
+
+    def records(self, precision: Precision) -> Record:
+        """The `Orbit` records, shape (solids,)."""
+        if self.scene is not None:
+            return np.stack(solid_records(self.scene, precision))
+        return orbit_record(self.chain, self.iterations, precision, self.bailout).reshape(1)
+
+    def constants(self, precision: Precision) -> Record:
+        """The constants of all formulas, one after the other."""
+        if self.scene is not None:
+            return solid_constants(self.scene, precision)
+        return np.array(write_formula(self.chain).constants, precision)
 
 
 def solid_defines(scene: Scene) -> dict[str, object]:
@@ -29,33 +89,38 @@ def solid_defines(scene: Scene) -> dict[str, object]:
     return {"SOLIDS": 1 + len(scene.joined)}
 
 
-def solid_texts(scene: Scene, *, traps: bool = False) -> dict[str, str]:
+def solid_texts(
+    scene: Scene, *, files: Sequence[str] = (), defines: Callable[[Chain], Mapping[str, object]] | None = None
+) -> dict[str, str]:
     """The generated texts of a program that asks the scene's formulas.
 
     Args:
-        traps: whether it also asks how near orbits come to a trap.
+        files: what it asks beside `orbit.h`: other kernel files that _JOINED replaces.
+        defines: what they depend on, of each formula, where several are joined.
     """
     if not scene.joined:
         return {"formula.h": write_formula(scene.chain).text}
-    texts = list(_texts(scene))
-    names = ["orbit.h", *(["trap_near.h"] if traps else [])]
+    names = ("orbit.h", *files)
     derivative = all(write_formula(chain).has_derivative for chain in _chains(scene))
     head = [
         *(f"#define SOLID_{kind.upper()} {number}" for kind, number in SOLID_KINDS.items()),
         *(f"#define JOIN_{join.split('_')[0].upper()} {number}" for join, number in JOINS.items()),
         f"#define JOINS_SMOOTHLY {int(any(each.join == 'smooth_union' for each in scene.joined.values()))}",
-        '#include "orbit_types.h"',
-        *(['#include "trap.h"'] if traps else []),
+        *(f'#include "{header}"' for name in names for header in _HEADERS.get(name, ())),
     ]
-    body = [numbered(text, tuple(names), number) for number, text in enumerate(texts)]
-    each = " ".join(f"DO({number})" for number in range(len(texts)))
+    body = []
+    for number, (text, chain) in enumerate(_texts(scene).items()):
+        own = defines(chain) if defines is not None else {}
+        lines = "".join(f"#define {name} {value}\n" for name, value in own.items())
+        body.append(numbered(lines + text, names, number))
+    each = " ".join(f"DO({number})" for number in range(len(body)))
     tail = [
         f"#define HAS_DERIVATIVE {int(derivative)}",
         "#define HAS_CALLS 1",
         f"#define EACH_TEXT(DO) {each}",
     ]
-    found = {"formula.h": "\n".join([*head, *body, *tail]) + "\n", "orbit.h": '#include "solids.h"\n'}
-    return {**found, "trap_near.h": '#include "solids_near.h"\n'} if traps else found
+    texts = {name: f'#include "{_JOINED[name]}"\n' for name in names}
+    return {"formula.h": "\n".join([*head, *body, *tail]) + "\n", **texts}
 
 
 @lru_cache(maxsize=64)
@@ -72,15 +137,14 @@ def solid_records(scene: Scene, precision: Precision) -> list[Record]:
     iterations = scene.formula.iterations
     if not scene.joined:
         return [orbit_record(scene.chain, iterations, precision)]
-    renderer, radius = scene.surface, scene.bounds[1]
-    own = renderer.bounds
-    main = (own.center, own.radius) if own is not None else (scene.chain.center, scene.chain.radius)
+    radius = scene.bounds[1]
     texts = list(_texts(scene))
     constants = _Constants()
 
-    def formula(chain: Chain, scale: float, ball: tuple[object, float]) -> dict[str, object]:
+    def formula(chain: Chain, scale: float, ball: Ball) -> dict[str, object]:
         written = write_formula(chain)
-        safe = renderer.step_scale if renderer.step_scale is not None else chain.step_scale
+        own = scene.renderer.step_scale if isinstance(scene.renderer, SurfaceRenderer) else None
+        safe = own if own is not None else chain.step_scale
         return {
             "kind": SOLID_KINDS["formula"],
             "text": texts.index(written.text),
@@ -92,7 +156,7 @@ def solid_records(scene: Scene, precision: Precision) -> list[Record]:
             "potential_share": ball[1] / radius,
         }
 
-    found = [orbit_record(scene.chain, iterations, precision, joined=formula(scene.chain, 1.0, main))]
+    found = [orbit_record(scene.chain, iterations, precision, joined=formula(scene.chain, 1.0, _ball(scene)))]
     objects = list(scene.objects)
     for name, each in scene.joined.items():
         part: dict[str, object] = {
@@ -111,6 +175,17 @@ def solid_records(scene: Scene, precision: Precision) -> list[Record]:
     return found
 
 
+def _ball(scene: Scene) -> Ball:
+    """Where the scene's own formula is asked: the renderer says what belongs to its set."""
+    own = scene.chain.center, scene.chain.radius
+    if isinstance(scene.renderer, VolumeRenderer):
+        filled = used_boxes(scene, scene.renderer)[1]
+        return ball_of_both(own, (filled.center, length(filled.sides) / 2))
+    if isinstance(scene.renderer, SurfaceRenderer) and scene.renderer.bounds is not None:
+        return scene.renderer.bounds.center, scene.renderer.bounds.radius
+    return own
+
+
 def solid_constants(scene: Scene, precision: Precision) -> Record:
     """The constants of all formulas, one after the other."""
     constants = _Constants()
@@ -124,9 +199,12 @@ def _chains(scene: Scene) -> list[Chain]:
     return [scene.chain, *(chains[name] for name in scene.joined if name in chains)]
 
 
-def _texts(scene: Scene) -> dict[str, None]:
-    """The texts of all formulas, each once."""
-    return dict.fromkeys(write_formula(chain).text for chain in _chains(scene))
+def _texts(scene: Scene) -> dict[str, Chain]:
+    """The texts of all formulas, each once, and a formula that has it."""
+    found: dict[str, Chain] = {}
+    for chain in _chains(scene):
+        found.setdefault(write_formula(chain).text, chain)
+    return found
 
 
 class _Constants:

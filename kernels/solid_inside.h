@@ -1,0 +1,115 @@
+// Which points belong to a formula's solid, for many points at once.
+//
+// From the build: CHUNK, applications between two looks at a packet, a multiple of the chain's cycle; REPEATS_FROM, the
+// application from which on a chain's turns repeat themselves.
+
+// The square of how far apart two states are, where orbits may come back.
+INLINE real apart_square(state z, state past) {
+    state apart = {z.s0 - past.s0, z.s1 - past.s1, z.s2 - past.s2};
+#if STATE_SIZE == 4
+    apart.s3 = z.s3 - past.s3;
+#endif
+    return state_square(apart);
+}
+
+// Which points belong to the solid: as `orbit_inside` at the iteration limit, in fewer operations. An orbit that comes back to
+// the very same z never escapes (Brent 1980, "An improved Monte Carlo factorization algorithm", sec. 2: compare with a z that is
+// renewed at powers of two). Packets are tested every few applications, and lanes that escaped continue without effect. One
+// lane ends at once, and has neither arrays nor loops of a constant count (see TURNS in lanes.h).
+#if HAS_SHAPE
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const mask all_lanes = equal(R(0.0), R(0.0));
+    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = orbit_inside(points[p], all_lanes, orbit->iterations, orbit, k);
+}
+#elif LANES == 1
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const real farthest = orbit->distance_square;
+    const int limit = orbit->iterations;
+    state c, z;
+    start(points[0], k, &c, &z);
+    state past = z;
+    real square = state_square(z);
+    mask alive = less_equal(square, farthest);
+    int look = FIRST_COUNT + CHUNK, looks = 0, renewed = 1;
+    int comparable = FIRST_COUNT >= REPEATS_FROM;  // equal states have equal futures only where the turns repeat
+    for (int n = FIRST_COUNT; n < limit && alive; ++n) {
+        z = apply(n, z, c, k);
+        square = state_square(z);
+        alive = less_equal(square, farthest);
+        if (n + 1 < look) continue;
+        look += CHUNK;
+        if ((++looks & 1023) == 0 && orbit_cancelled(orbit)) break;
+#if LOGARITHMIC
+        if (comparable && equal(apart_square(z, past), R(0.0)) && settled(square, orbit)) break;
+        if (looks == renewed) {
+            past = z;
+            renewed *= 2;
+            comparable = n + 1 >= REPEATS_FROM;
+        }
+#endif
+    }
+    inside[0] = alive & settled(square, orbit);
+}
+#else
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const mask all_lanes = equal(R(0.0), R(0.0));
+    const real farthest = (real)(orbit->distance_square);
+    const int limit = orbit->iterations;
+    state c[PACKETS], z[PACKETS], past[PACKETS];
+    real square[PACKETS];
+    mask alive[PACKETS], periodic[PACKETS];
+    mask open = ~all_lanes;
+    #pragma unroll
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
+        start(points[p], k, &c[p], &z[p]);
+        past[p] = z[p];
+        square[p] = state_square(z[p]);
+        alive[p] = less_equal(square[p], farthest);
+        periodic[p] = ~all_lanes;
+        open |= alive[p];
+    }
+    int n = FIRST_COUNT, renewed = 1, chunks = 0;
+    int comparable = FIRST_COUNT >= REPEATS_FROM;  // as above
+    while (n + CHUNK <= limit && any_lane(open)) {
+        if ((chunks & 1023) == 1023 && orbit_cancelled(orbit)) return;
+        #pragma unroll
+        for (int step = 0; step < TURNS(CHUNK); ++step) {
+            #pragma unroll
+            for (int p = 0; p < TURNS(PACKETS); ++p) {
+                z[p] = apply(n + step, z[p], c[p], k);
+                square[p] = state_square(z[p]);
+                alive[p] &= less_equal(square[p], farthest);
+            }
+        }
+        n += CHUNK;
+        open = ~all_lanes;
+        ++chunks;
+        #pragma unroll
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
+#if LOGARITHMIC
+            if (comparable) {
+                periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & settled(square[p], orbit);
+            }
+            if (chunks == renewed) past[p] = z[p];
+#endif
+            open |= alive[p] & ~periodic[p];
+        }
+        if (chunks == renewed) {
+            comparable = n >= REPEATS_FROM;
+            renewed *= 2;
+        }
+    }
+    if (any_lane(open)) {
+        for (; n < limit; ++n) {
+            #pragma unroll
+            for (int p = 0; p < TURNS(PACKETS); ++p) {
+                z[p] = apply(n, z[p], c[p], k);
+                square[p] = state_square(z[p]);
+                alive[p] &= less_equal(square[p], farthest);
+            }
+        }
+    }
+    #pragma unroll
+    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = periodic[p] | (alive[p] & settled(square[p], orbit));
+}
+#endif
