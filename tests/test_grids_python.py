@@ -301,13 +301,3 @@ def test_everything_goes_to_other_processes(ball: clfractal.Volume) -> None:
         caught.value.message,
     )
     assert isinstance(pickle.loads(pickle.dumps(clfractal.Stopped())), clfractal.Stopped)
-
-
-@pytest.mark.parametrize("make", [clfractal.mesh, clfractal.voxelize])
-def test_objects_are_not_left_out_without_a_word(make: Any) -> None:
-    """A surface scene becomes one of a volume, which has no objects."""
-    ball = {"type": "sphere", "position": [1.2, 0, 0], "radius": 0.5}
-    scene = clfractal.Scene(version=1, formula={"name": "hast"}, camera={}, objects={"ball": ball})
-    with pytest.raises(clfractal.SceneError, match="are shown by renderer surface, not by volume") as caught:
-        make(scene)
-    assert caught.value.where.path == "objects"

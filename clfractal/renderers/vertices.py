@@ -26,6 +26,7 @@ AT_ONCE = 1 << 20
 # A vertex itself lies within detail that the grid does not show, or inside, where the distance has no slope; and along
 # its normal a distance keeps its slope, so that on smooth surfaces nothing is lost.
 PUSHES = (1.0, 0.5)
+WALL_PUSH = 0.5
 # Least cosine between the formula's normal and the grid's: what is further apart belongs to detail finer than the grid,
 # and would be seen as dark speckles on a surface that does not have it.
 LEAST_COSINE = 0.5
@@ -73,7 +74,7 @@ def dress(
             if not len(left):
                 break
             outward = np.asarray(mesh.normals[left], np.float64)
-            found, whose = nearest(
+            found, _ = nearest(
                 body,
                 mesh.vertices[left] + push * voxel * outward,
                 device=device,
@@ -85,8 +86,11 @@ def dress(
             normals[left[good]] = found.normal[good]
             first = seen & (smooth[left] == limit)
             smooth[left[first]] = found.smooth[first]
-            things[left[first]] = whose[first]
             left = left[~good]
+        if scene.joined:
+            # A little out of the solid, where walls of cuts are known from what they cut; not as far as the next solid.
+            near = mesh.vertices[part] + WALL_PUSH * voxel * np.asarray(mesh.normals[part], np.float64)
+            things[part] = nearest(body, near, device=device, lanes=lanes, precision=precision)[1]
         if progress is not None:
             progress((part[-1] + 1) / count)
     colors = np.array(_colors(scene, coloring, normals, smooth))

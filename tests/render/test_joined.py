@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,17 +11,27 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.renderers.surface import program_texts
-from clfractal.scene.objects import turned_axes
+from tests.render.joined_oracle import (
+    PLACED,
+    SCALE,
+    SIMPLE,
+    Distance,
+    Floats,
+    a_sphere,
+    ball,
+    marched,
+    normal_at,
+    placed,
+    smooth,
+    solids,
+)
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import (
     BALL,
-    BALL_RADIUS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
     QUICK_BALL,
     SOLIDS,
-    SPHERE_CENTER,
-    SPHERE_RADIUS,
     normals_of,
     plan_of,
     points_of,
@@ -32,90 +41,7 @@ from tests.render.shots import (
     shoot_whole,
 )
 
-Floats = npt.NDArray[np.float64]
-Distance = Callable[[Floats], Floats]
-
-TURN, MOVED, SCALE = [20, -35, 50], [0.2, 0.1, -0.1], 0.7
 WAYS: dict[str, dict[str, Any]] = {"distance": {}, "steps": {"search": "steps", "step": 0.01}}
-
-
-def ball(points: Floats) -> Floats:
-    found: Floats = np.linalg.norm(points, axis=-1) - BALL_RADIUS
-    return found
-
-
-def solids(points: Floats) -> Floats:
-    """`SOLIDS`, which is 0 inside where it is a formula's."""
-    q = np.abs(points - [0, 0, -0.25]) - [1.2, 1.2, 0.25]
-    box = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    found: Floats = np.minimum(np.linalg.norm(points - SPHERE_CENTER, axis=-1) - SPHERE_RADIUS, box)
-    return found
-
-
-def placed(distance: Distance, scale: float = SCALE, place: list[float] | None = None) -> Distance:
-    axes, middle = np.array(turned_axes((20.0, -35.0, 50.0))), np.array(place or MOVED)
-    return lambda points: scale * distance((points - middle) @ axes.T / scale)
-
-
-def a_sphere(center: list[float], radius: float) -> Distance:
-    return lambda points: np.linalg.norm(points - center, axis=-1) - radius
-
-
-def a_box(points: Floats) -> Floats:
-    """Of sides 1.2, 0.5, 0.9 in its own space."""
-    q = np.abs(points) - [0.6, 0.25, 0.45]
-    found: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    return found
-
-
-def a_cylinder(points: Floats) -> Floats:
-    """Of radius 0.4 and height 1.3 in its own space."""
-    q = np.stack([np.linalg.norm(points[..., :2], axis=-1) - 0.4, np.abs(points[..., 2]) - 0.65], -1)
-    found: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    return found
-
-
-def a_plane(points: Floats) -> Floats:
-    found: Floats = (points - [0, 0, 0.2]) @ (np.array([0.3, -0.2, 2.0]) / np.linalg.norm([0.3, -0.2, 2.0]))
-    return found
-
-
-def smooth(a: Floats, b: Floats, width: float) -> Floats:
-    share = np.maximum(width - np.abs(a - b), 0) / width
-    found: Floats = np.minimum(a, b) - 0.25 * width * share**2
-    return found
-
-
-def marched(distance: Distance, origin: Floats, direction: Floats, far: float = 8.0) -> Floats:
-    """Where rays first meet the solid, by small safe steps; infinite where they do not."""
-    t = np.zeros(direction.shape[:-1])
-    for _ in range(400):
-        t = np.minimum(t + 0.7 * np.maximum(distance(origin + t[..., None] * direction), 0), far)
-    t[distance(origin + t[..., None] * direction) > 1e-7] = np.inf
-    return t
-
-
-def normal_at(distance: Distance, points: Floats) -> Floats:
-    step = 1e-5 * np.eye(3)
-    slope = np.stack([distance(points + e) - distance(points - e) for e in step], -1)
-    found: Floats = slope / np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-30)
-    return found
-
-
-PLACED = {"rotation": TURN, "position": MOVED}
-APART = [0.5, -0.7, 0.3]
-SIMPLE: dict[str, tuple[dict[str, Any], Distance]] = {
-    "sphere": ({"type": "sphere", "position": APART, "radius": 0.5}, a_sphere(APART, 0.5)),
-    "box": (
-        {"type": "box", "size": [1.2, 0.5, 0.9], "rotation": TURN, "position": APART},
-        placed(a_box, 1, APART),
-    ),
-    "cylinder": (
-        {"type": "cylinder", "radius": 0.4, "height": 1.3, "rotation": TURN, "position": APART},
-        placed(a_cylinder, 1, APART),
-    ),
-    "plane": ({"type": "plane", "position": [0, 0, 0.2], "normal": [0.3, -0.2, 2]}, a_plane),
-}
 
 
 def beside_a_rim(met: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
