@@ -30,6 +30,7 @@
 #endif
 #include "look.h"
 #include "lit.h"
+#include "shots.h"
 #if HAS_PATHS
 #include "bsdf.h"
 #include "bsdf_bumped.h"

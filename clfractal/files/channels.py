@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from clfractal.errors import SceneError, Where, unknown_name
+from clfractal.errors import SceneError, Where, nearest, unknown_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,6 +135,13 @@ DEFAULT_CHANNELS: tuple[str, ...] = ("R", "G", "B", "A", "Z")
 """The channels of a picture unless the scene's `output.channels` names others."""
 
 
+def unknown_channel(name: str) -> str:
+    """Message text for an unknown channel: the nearest one, or else a list, in which layers stand for their channels."""
+    every = (*CHANNELS, *LAYERS)
+    brief = [each for each in CHANNELS if not any(each in parts for parts in LAYERS.values())]
+    return unknown_name("channel", name, every if nearest(name, sorted(every)) else (*brief, *LAYERS))
+
+
 def check_channels(names: Iterable[str], where: Where | None = None) -> tuple[str, ...]:
     """The names as a tuple, in the given order; layers (`LAYERS`) are replaced by their channels.
 
@@ -144,7 +151,7 @@ def check_channels(names: Iterable[str], where: Where | None = None) -> tuple[st
     chosen: list[str] = []
     for name in names:
         if name not in CHANNELS and name not in LAYERS:
-            raise SceneError(unknown_name("channel", str(name), (*CHANNELS, *LAYERS)), where)
+            raise SceneError(unknown_channel(str(name)), where)
         for each in LAYERS.get(name, (name,)):
             if each in chosen:
                 raise SceneError(f"channel {each!r} is given twice", where)

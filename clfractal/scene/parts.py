@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, model_validator
 
-from clfractal.errors import unknown_name
-from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, LAYERS, MATTES
+from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, LAYERS, MATTES, unknown_channel
 from clfractal.files.curves import Tone
 from clfractal.scene.base import (
     Amount,
@@ -152,7 +151,7 @@ class Gradient(Section):
 
 def _known_channel(name: str) -> str:
     if name not in CHANNELS:
-        raise problem(unknown_name("channel", name, CHANNELS))
+        raise problem(unknown_channel(name))
     return name
 
 
