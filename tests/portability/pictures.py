@@ -49,6 +49,8 @@ _SCENES: dict[str, str] = {
     "steps": "{name: mandelbulb, iterations: 5}",
     "joined": "{name: mandelbulb, iterations: 5}",
     "cloud": "{name: mandelbulb, iterations: 5}",
+    "filled": "{name: mandelbulb, iterations: 5}",
+    "counted": "{name: hast, iterations: 9}",
     "plane": "{name: hast, iterations: 60}",
     "glass": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "inside": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
@@ -66,6 +68,9 @@ _RENDERERS = {
     "inside": "{type: volume, resolution: 24, value: inside, normals: least_squares}",
     "coverage": "{type: volume, resolution: 24, value: coverage, shadows: true,"
     " transfer: {opacity: [{at: 0.05, opacity: 0}, {at: 1, opacity: 0.6}]}}",
+    "filled": "{type: volume, resolution: 24, value: coverage, normals: least_squares}",
+    "counted": "{type: volume, resolution: 16, value: iterations, normals: exact,"
+    " transfer: {opacity: [{at: 2, opacity: 0}, {at: 9, opacity: 0.3}]}}",
     "plane": "{type: cut_plane, plane: {normal: [0.2, 0.3, 1], width: 3, height: 3}, samples: 2}",
 }
 _MORE = {
@@ -92,6 +97,12 @@ _MORE = {
     " drop: {type: box, join: smooth_union, position: [-0.7, -0.6, 0.6], size: [0.4, 0.3, 0.5]},"
     " other: {type: formula, position: [0.9, -0.3, -0.4], scale: 0.05, formula: {name: mandelbox, iterations: 8}},"
     " slab: {type: plane, position: [0, 0, 0.9], join: intersection}}\n",
+    "filled": "objects: {hole: {type: sphere, position: [0.3, -0.8, 0.3], radius: 0.4, join: cut},"
+    " egg: {type: sphere, position: [-0.8, -0.7, 0.3], radius: 0.3, scale: [1, 0.7, 1.2], rotation: [0, 30, 0]},"
+    " other: {type: formula, position: [0.9, -0.3, -0.4], scale: 0.05, formula: {name: mandelbox, iterations: 8}},"
+    " slab: {type: plane, position: [0, 0, 0.9], join: intersection}}\n",
+    "counted": "objects: {drop: {type: box, join: smooth_union, position: [-0.7, -0.6, 0.6], size: [0.4, 0.3, 0.5]},"
+    " post: {type: cylinder, position: [0.6, -0.5, 0], rotation: [30, 10, 0]}}\n",
     "quaternion": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]\n",
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
@@ -108,6 +119,8 @@ _BRIEF = (
     "cloud",
     "inside",
     "coverage",
+    "filled",
+    "counted",
     "plane",
 )
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
