@@ -27,6 +27,13 @@ def check_objects(scene: Scene) -> None:
             _check_lights(scene, name, each)
 
 
+def can_show(renderer: str, kind: str, *, planes: bool) -> bool:
+    """Whether a type of renderer shows objects of a type; `planes`: in a scene with cut planes."""
+    if renderer == "volume":
+        return kind != "water" and not planes
+    return renderer == "surface"
+
+
 def _check_filled(scene: Scene, renderer: VolumeRenderer) -> None:
     """What cannot be filled into voxels."""
     if renderer.file is not None:

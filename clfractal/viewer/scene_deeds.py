@@ -8,6 +8,7 @@ from typing import Any
 
 from clfractal.errors import ClfractalError
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane
 from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box
@@ -300,8 +301,10 @@ class SceneDeeds:
                 changes["coloring.by"] = "solid"
         if kind == "cut_plane":
             changes["cut_planes"] = []
-        if kind != "surface" and scene.objects:
-            changes["objects"] = {}
+        planes = bool(scene.cut_planes)
+        shown = {n: each for n, each in scene.objects.items() if can_show(kind, each.type, planes=planes)}
+        if len(shown) < len(scene.objects):
+            changes["objects"] = {name: each.model_dump(mode="json") for name, each in shown.items()}
         if not self._edit(changes):
             self.studio.tell(self.studio.problems.get("renderer", "not possible"), wrong=True)
 

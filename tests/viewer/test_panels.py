@@ -453,11 +453,20 @@ def test_objects_are_added_given_a_material_and_removed() -> None:
     before = ui.studio.scene
     Stage(ui, scene_dock.draw, window=False)
     assert ui.studio.scene is before
-    # What another renderer cannot show comes back with the surface.
+    # What another renderer cannot show comes back with the surface, at its place.
     assert renderer.switch(ui, "volume")
+    assert list(ui.studio.scene.objects) == ["plane", "sphere", "box", "cylinder", "sphere 2"]
+    Stage(ui, scene_dock.draw, window=False)
+    assert renderer.switch(ui, "cut_plane")
     assert not ui.studio.scene.objects
     assert renderer.switch(ui, "surface")
     assert ui.studio.scene.objects == before.objects
+    assert list(ui.studio.scene.objects) == list(before.objects)
+    assert renderer.switch(ui, "volume")
+    assert ui.studio.edit({"objects.box.position": [0.0, 0.0, 3.0], "objects.cylinder.radius": 0.1})
+    assert renderer.switch(ui, "surface")
+    assert ui.studio.scene.objects["box"].position == (0, 0, 3)
+    assert ui.studio.scene.objects["water"] == before.objects["water"]
 
 
 def test_a_formula_beside_the_set_is_edited() -> None:
@@ -475,7 +484,7 @@ def test_a_formula_beside_the_set_is_edited() -> None:
     assert not ui.studio.edit({f"{path}.join": "cut"})
     assert ui.studio.edit({f"{path}.formula": {"name": "hast", "iterations": 9}})
     assert renderer.switch(ui, "volume")
-    assert not ui.studio.scene.joined
+    assert list(ui.studio.scene.joined) == ["formula"]
 
 
 def test_the_cut_alone_and_back() -> None:

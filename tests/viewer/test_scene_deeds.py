@@ -319,6 +319,13 @@ def test_renderers_in_turn(desk: Desk) -> None:
         kinds.append(desk.studio.scene.renderer.type)
     assert kinds == ["volume", "cut_plane", "surface"]
     assert desk.studio.scene.renderer.samples == 4
+    # Each one keeps the objects that it shows.
+    assert desk.studio.edit({"objects": {"ball": {"type": "sphere"}, "sea": {"type": "water"}}})
+    left = []
+    for _ in range(2):
+        desk.do("next_renderer")
+        left.append(list(desk.studio.scene.objects))
+    assert left == [["ball"], []]
 
 
 def test_ways_of_stereo_in_turn(desk: Desk) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer.panels import formula, maps, theme
@@ -48,8 +49,8 @@ def draw(ui: Ui) -> None:
         if _line(name, each, name == chosen):
             chosen = name
     ui.memory["object"] = chosen
-    if not isinstance(ui.studio.scene.renderer, SurfaceRenderer):
-        w.hint(ui, "The surface renderer shows objects.")
+    if isinstance(ui.studio.scene.renderer, CutPlaneRenderer):
+        w.hint(ui, "Surfaces and volumes show objects.")
         return
     _buttons(ui, chosen)
     w.problem(ui, "objects")
@@ -101,7 +102,8 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
         else:
             imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
         about = _ABOUT.get(kind, f"Add a {kind}")
-        if w.button(_KINDS[kind], icon=theme.PLUS, enabled=room, about=about):
+        possible = room and (kind != "water" or isinstance(ui.studio.scene.renderer, SurfaceRenderer))
+        if w.button(_KINDS[kind], icon=theme.PLUS, enabled=possible, about=about):
             _add(ui, kind, {"type": kind, **values})
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove", enabled=chosen is not None):

@@ -7,6 +7,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.object_checks import can_show
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer.panels import theme
@@ -49,11 +50,7 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
     scene = ui.studio.scene
     now = plain(scene.renderer)
     kept = ui.memory.setdefault("renderer.kept", {})
-    kept[now["type"]] = {
-        "renderer": now,
-        "cut_planes": plain(scene.cut_planes),
-        "objects": {name: plain(each) for name, each in scene.objects.items()},
-    }
+    kept[now["type"]] = {"renderer": now, "cut_planes": plain(scene.cut_planes)}
     known = kept.get(kind, {})
     first: dict[str, Any] = {"type": kind, **({"resolution": _FIRST_RESOLUTION} if kind == "volume" else {})}
     common = {name: now[name] for name in Sampled.model_fields}
@@ -62,16 +59,26 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
         edits["cut_planes"] = []
     elif now["type"] == "cut_plane" and not scene.cut_planes and known.get("cut_planes"):
         edits["cut_planes"] = known["cut_planes"]
-    if kind != "surface" and scene.objects:
-        edits["objects"] = {}
-    elif kind == "surface" and not scene.objects and known.get("objects"):
-        edits["objects"] = known["objects"]
+    objects = _objects_of(ui, kind, planes=bool(edits.get("cut_planes", scene.cut_planes)))
+    if list(objects) != list(scene.objects):
+        edits["objects"] = objects
     if kind == "volume" and scene.coloring.by not in ("solid", "normal"):
         edits["coloring.by"] = "solid"
     done = ui.studio.edit({**edits, **(changes or {})})
     if not done:
         ui.studio.tell(ui.studio.problems.get("renderer", "not possible"), wrong=True)
     return done
+
+
+def _objects_of(ui: Ui, kind: str, *, planes: bool) -> dict[str, Any]:
+    """The objects that another renderer shows; those that it does not show come back with one that does."""
+    now = {name: plain(each) for name, each in ui.studio.scene.objects.items()}
+    before, hidden = ui.memory.get("renderer.objects", ({}, set()))
+    every = {name: now.get(name, each) for name, each in before.items() if name in now or name in hidden}
+    every |= {name: each for name, each in now.items() if name not in every}
+    shown = {name: each for name, each in every.items() if can_show(kind, each["type"], planes=planes)}
+    ui.memory["renderer.objects"] = every, every.keys() - shown.keys()
+    return shown
 
 
 def _samples(ui: Ui) -> None:
