@@ -31,9 +31,15 @@ _JOINED = {
     "solid_inside.h": "joined_inside.h",
     "solid_count.h": "joined_count.h",
     "node_proof.h": "joined_nodes.h",
+    "escape.h": "joined_escape.h",
 }
 # What they need before them, once for all formulas.
-_HEADERS = {"orbit.h": ("orbit_types.h",), "trap_near.h": ("trap.h",), "solid_inside.h": ("fill_packets.h",)}
+_HEADERS = {
+    "orbit.h": ("orbit_types.h",),
+    "trap_near.h": ("trap.h",),
+    "solid_inside.h": ("fill_packets.h",),
+    "escape.h": ("escape_types.h",),
+}
 
 # What a text defines: macros, functions and types.
 _DEFINED = re.compile(r"^#define (\w+)|^INLINE [\w ]+?\**(\w+)\(|^} (\w+);|^typedef \w+ (\w+);", re.MULTILINE)

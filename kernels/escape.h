@@ -3,40 +3,23 @@
 // From the build: PERIOD_CHECK, applications between two tests for a periodic orbit, a multiple of the chain's cycle;
 // REPEATS_FROM, the application from which on a chain's turns repeat themselves.
 
-// Whether two numbers have the same bits: unlike `equal`, this distinguishes +0 and -0.
-#if REAL_IS_DOUBLE
-#if LANES == 1
-#define same_bits(a, b) (-(as_long(a) == as_long(b)))
-#else
-#define same_bits(a, b) (JOIN(as_long, LANES)(a) == JOIN(as_long, LANES)(b))
-#endif
-#elif LANES == 1
-#define same_bits(a, b) (-(as_int(a) == as_int(b)))
-#else
-#define same_bits(a, b) (as_mask(a) == as_mask(b))
-#endif
+#include "escape_types.h"
 
-typedef struct {
-    real count;         // applications until |z| > bailout, whole or smooth; the limit for points that never get there
-    mask inside;
-    real applications;  // that it took to know
-} escaped;
-
-// The escape of points. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
+// The escape of points within `most` applications. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
 // of the distances of orbit.h; else they are whole, those of `orbit_count`.
 //
 // A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
 // will do: an orbit that comes near itself may still escape. `periodicity` 0 skips this test, for comparison.
-INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, __constant const struct Orbit *orbit,
+INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
                             __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     const real radius_square = (real)(smooth ? orbit->distance_square : orbit->bailout_square);
     real square = state_square(z);
     real square_before = square;
-    real count = (real)((scalar)min(FIRST_COUNT, orbit->iterations));
+    real count = (real)((scalar)min(FIRST_COUNT, most));
     mask alive = active & less_equal(square, radius_square);
     mask inside = active & ~active;
 #if !HAS_SHAPE
@@ -46,7 +29,7 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
     // Equal states have equal futures only where the turns repeat.
     int comparable = FIRST_COUNT >= REPEATS_FROM;
 #endif
-    int n = FIRST_COUNT, limit = orbit->iterations;
+    int n = FIRST_COUNT, limit = most;
     for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
         while (n < limit) {
             if (!any_lane(alive) || orbit_cancelled(orbit)) break;
@@ -93,7 +76,7 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
         inside |= smooth ? alive & settled(square, orbit) : alive;
 #endif
         alive &= ~inside;
-        limit = orbit->longest;
+        limit = most + (orbit->longest - orbit->iterations);
     }
     escaped result;
     result.applications = count;
@@ -106,6 +89,6 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
         surface.square_before = square_before;
         count = smooth_count(last, surface, orbit);
     }
-    result.count = pick(inside, (real)((scalar)orbit->iterations), count);
+    result.count = pick(inside, (real)((scalar)most), count);
     return result;
 }

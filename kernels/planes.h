@@ -1,7 +1,7 @@
 // Cut planes in the picture of an object: quads coloured by escape counts, composited by depth; and those that cut,
 // which take away what lies in front of them and show the formula's counts on the face.
 //
-// PLANES of them; `orbits` has the scene's own limits, then those of each plane.
+// PLANES of them.
 typedef struct {
     __global const struct CutPlane *planes;
     __constant const struct Orbit *orbits;

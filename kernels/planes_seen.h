@@ -5,7 +5,8 @@ INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
 }
 
 INLINE escaped plane_look(vec point, mask active, int i, plane_set set) {
-    return plane_escape(plane_place(point, set.planes + i), active, set.planes[i].smooth, 1, set.orbits + 1 + i, set.k);
+    return plane_escape(plane_place(point, set.planes + i), active, set.planes[i].smooth, 1, set.planes[i].iterations,
+                        set.orbits, set.k);
 }
 
 // Whether the rays that begin at a cutting plane begin inside the set: faces, with their colours.

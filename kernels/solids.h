@@ -16,9 +16,9 @@
 #define ASK_STEP 0
 #define ASK_GRADIENT 1
 #define ASK_ESTIMATE 2
+#define ASKS_FAR(asks) (asks == ASK_ESTIMATE || JOINS_SMOOTHLY)  // what flows together must not flow to the ball
 
 #include "memory.h"
-
 INLINE vec solid_own(__constant const struct Orbit *o, vec point) {
     const vec a = vec_sub(point, vec_splat(o->middle));
     return vec_of(vec_dot(a, vec_splat(o->own_x)), vec_dot(a, vec_splat(o->own_y)), vec_dot(a, vec_splat(o->own_z)));
@@ -93,7 +93,7 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     found.inside = active & ~active;
     found.surface.gradient = vec_normalize(arm);
     const mask beside = active & less(found.far, SOLID_BESIDE * (real)(o->ball_radius));
-    const mask within = active & less(found.far, (asks == ASK_ESTIMATE ? SOLID_BESIDE : SOLID_NEAR) * (real)(o->ball_radius));
+    const mask within = active & less(found.far, (ASKS_FAR(asks) ? SOLID_BESIDE : SOLID_NEAR) * (real)(o->ball_radius));
     const mask near = asks == ASK_STEP ? within : beside;
     if (!any_lane(near)) return found;
     clearance here = {R(0.0), {R(0.0), near}};

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.orbit import Record, orbit_record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
@@ -37,6 +36,7 @@ CUT_PLANE = Struct(
         Field("zoom_origin", "real", 3, "scene units"),
         Field("cut", "int", 0, "1: the object in front is removed"),
         Field("smooth", "int", 0, "1: smooth counts"),
+        Field("iterations", "int", 0, "most applications of the formula"),
         *ESCAPE_COLORS.fields,
     ],
 )
@@ -59,7 +59,8 @@ def plane_defines(scene: Scene) -> dict[str, object]:
     return {
         "PLANES": plane_count(scene),
         "ESCAPE_COLORS": "__global const struct CutPlane",
-        **escape_defines(scene.chain),
+        # Of several formulas each text has its own.
+        **({} if scene.joined else escape_defines(scene.chain)),
     }
 
 
@@ -80,16 +81,12 @@ def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
             "zoom_origin": origin,
             "cut": int(plane.cut),
             "smooth": int(plane.colors.mode == "smooth"),
+            "iterations": _iterations(scene, plane),
             **escape_colors_values(plane.colors, _iterations(scene, plane)),
         }
         for plane, placed in all_planes(scene)
     ]
     return CUT_PLANE.array(precision, rows)
-
-
-def plane_orbits(scene: Scene, precision: Precision) -> list[Record]:
-    """The limits of each plane's orbits."""
-    return [orbit_record(scene.chain, _iterations(scene, plane), precision) for plane, _ in all_planes(scene)]
 
 
 def plane_palettes(scene: Scene) -> npt.NDArray[np.float32]:

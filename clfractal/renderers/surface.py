@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from clfractal.renderers import records
 from clfractal.renderers.environment import packed_map
+from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
     MET_NUMBERS,
@@ -42,7 +43,6 @@ from clfractal.renderers.planes import (
     CUT_PLANE,
     plane_count,
     plane_defines,
-    plane_orbits,
     plane_palettes,
     plane_records,
 )
@@ -249,7 +249,7 @@ class SurfaceKernel(TileKernel):
         on_set = set_lights_of(scene)
         return [
             records.march_record(scene, precision, self.plan.averaged, packed, on_set),
-            np.stack([*solid_records(scene, precision), *plane_orbits(scene, precision)]),
+            np.stack(solid_records(scene, precision)),
             solid_constants(scene, precision),
             records.material_record(scene, precision, packed),
             records.light_records(scene, precision),
@@ -308,7 +308,12 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     structs = {"structs.h": records.struct_text() + CUT_PLANE.c_text(), "pbr.h": pbr_text()}
 
     def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
-        generated = {**solid_texts(scene, files=("trap_near.h",) if "COLORING" in defines else ()), **structs}
+        files = [
+            *(("trap_near.h",) if "COLORING" in defines else ()),
+            *(("escape.h",) if "ESCAPE_COLORS" in defines else ()),
+        ]
+        turns = escape_defines if "escape.h" in files else None
+        generated = {**solid_texts(scene, files=files, defines=turns), **structs}
         return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
 
     points = ("send_points",) if scene.surface.used_points.count > 1 else ()

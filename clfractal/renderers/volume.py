@@ -15,13 +15,13 @@ import pyopencl as cl
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
 from clfractal.renderers.environment import PackedEnvironment, packed_map
+from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
-from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_orbits, plane_palettes, plane_records
+from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_palettes, plane_records
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.light_paths import PathLighting
@@ -29,6 +29,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import Transfer, VolumeRenderer
+from clfractal.solids import Body
 from clfractal.voxels.blocks import brick_ranges, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid, shows_outside
@@ -116,8 +117,12 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "COLORING_NORMAL": 1,
     }
     structs = "".join(struct.c_text() for struct in STRUCTS)
-    formula = write_formula(scene.chain).text if scene.cut_planes else ""
-    return flat_text("volume.cl", generated={"structs.h": structs, "formula.h": formula}, defines=defines)
+    body = Body.of(scene)
+    formulas = {"formula.h": ""}
+    if scene.cut_planes:
+        formulas = body.texts(files=("escape.h",), defines=escape_defines)
+        defines |= body.defines
+    return flat_text("volume.cl", generated={"structs.h": structs, **formulas}, defines=defines)
 
 
 def ray_precision(scene: Scene, plan: Plan) -> Precision:
@@ -447,11 +452,11 @@ def _mixed(
 
 def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
     """The cut planes, and the formula that they show, in the kernel's order."""
-    own = records.orbit_record(scene.chain, scene.formula.iterations, precision)
+    body = Body.of(scene)
     return [
         plane_records(scene, precision),
-        np.stack([own, *plane_orbits(scene, precision)]),
-        np.array(write_formula(scene.chain).constants, precision),
+        body.records(precision),
+        body.constants(precision),
         plane_palettes(scene),
     ]
 

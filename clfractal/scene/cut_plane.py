@@ -6,6 +6,7 @@ from pydantic import Field, model_validator
 
 from clfractal.scene.base import Color, Coordinate, Fraction, Section
 from clfractal.scene.coloring import Palette, check_order
+from clfractal.scene.objects import MAX_OBJECTS, ObjectName
 from clfractal.scene.plane import Plane
 from clfractal.scene.sampled import Sampled
 
@@ -62,6 +63,9 @@ class CutPlane(Section):
         None, description="opacity where the rectangle is in the set; null: as `opacity`"
     )
     cut: bool = Field(False, description="whether the object in front of the plane is removed")
+    objects: Annotated[tuple[ObjectName, ...], Field(strict=False, max_length=MAX_OBJECTS)] = Field(
+        (), description="with `cut`, what stands beside the set and is cut too: names of `objects`"
+    )
     iterations: Iterations | None = Field(
         None, description="maximum number of iterations on the plane; null: formula.iterations"
     )

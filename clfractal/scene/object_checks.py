@@ -7,13 +7,14 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
 from clfractal.scene.maps import maps_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, PlaneObject, Solid, WaterObject
+from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, Level, PlaneObject, Solid, WaterObject
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 
 
 def check_objects(scene: Scene) -> None:
     """Raises SceneError, with a dotted path, for objects that cannot be shown."""
+    _check_named(scene)
     if not scene.objects:
         return
     if isinstance(scene.renderer, CutPlaneRenderer):
@@ -27,11 +28,21 @@ def check_objects(scene: Scene) -> None:
             _check_lights(scene, name, each)
 
 
-def can_show(renderer: str, kind: str, *, planes: bool) -> bool:
-    """Whether a type of renderer shows objects of a type; `planes`: in a scene with cut planes."""
-    if renderer == "volume":
-        return kind != "water" and not planes
-    return renderer == "surface"
+def can_show(renderer: str, kind: str) -> bool:
+    """Whether a type of renderer shows objects of a type."""
+    return renderer == "surface" or (renderer == "volume" and kind != "water")
+
+
+def _check_named(scene: Scene) -> None:
+    """What planes name can be cut as parts of the set."""
+    for number, plane in enumerate(scene.cut_planes):
+        for place, name in enumerate(plane.objects):
+            where = Where(path=f"cut_planes.{number}.objects.{place}")
+            if name not in scene.objects:
+                raise SceneError(unknown_name("object", name, tuple(scene.objects)), where)
+            each = scene.objects[name]
+            if isinstance(each, Level):
+                raise SceneError(f"{name!r} is a {each.type}, which has no end; a flat box can be cut", where)
 
 
 def _check_filled(scene: Scene, renderer: VolumeRenderer) -> None:
@@ -57,12 +68,6 @@ def _check_joined(scene: Scene) -> None:
             Where(path=f"objects.{names[MAX_FORMULAS]}.type"),
         )
     first = next(iter(scene.joined))
-    if scene.cut_planes:
-        raise SceneError(
-            f"cannot be combined with the object {first!r}, which is a part of the set; an object"
-            " {type: plane, join: cut} cuts both",
-            Where(path="cut_planes"),
-        )
     used = scene.material.name if isinstance(scene.renderer, SurfaceRenderer) else None
     if used in scene.materials and _lets_through(scene, used):
         raise SceneError(

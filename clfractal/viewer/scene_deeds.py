@@ -301,8 +301,7 @@ class SceneDeeds:
                 changes["coloring.by"] = "solid"
         if kind == "cut_plane":
             changes["cut_planes"] = []
-        planes = bool(scene.cut_planes)
-        shown = {n: each for n, each in scene.objects.items() if can_show(kind, each.type, planes=planes)}
+        shown = {name: each for name, each in scene.objects.items() if can_show(kind, each.type)}
         if len(shown) < len(scene.objects):
             changes["objects"] = {name: each.model_dump(mode="json") for name, each in shown.items()}
         if not self._edit(changes):

@@ -145,6 +145,18 @@ def test_a_smooth_union_is_where_its_smooth_minimum_is_0(device: Device) -> None
     assert (sooner[front] > 0.02).sum() > 100, "something flows between both"
 
 
+@pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "rule"])
+def test_nothing_flows_to_the_ball_that_is_searched(device: Device, formula: dict[str, Any]) -> None:
+    """A drop that is near to the formula's bounds, but not to its set, stays a drop."""
+    middle = [2.2, 0, 0.1]
+    drop = {"type": "sphere", "position": middle, "radius": 0.5, "join": "smooth_union", "smoothness": 0.25}
+    camera = {**PERSPECTIVE, "target": [2.0, 0, 0.1], "fov": 32}
+    wide = {**formula, "bounds": {"center": [0, 0, 0], "radius": 1.65}}
+    scene = scene_of(wide, camera, (96, 96), objects={"drop": drop})
+    exact = a_sphere(middle, 0.5)
+    agree(device, scene, lambda points: np.minimum(ball(points), exact(points)))
+
+
 def test_the_formula_at_home_looks_as_ever(device: Device) -> None:
     """A scene whose second formula is far away has the same picture."""
     formula = {"name": "mandelbulb", "iterations": 8}

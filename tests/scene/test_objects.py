@@ -69,12 +69,8 @@ CASES = [
     (f"objects: §{{{MANY}}}", f"objects: must have at most {MAX_OBJECTS} entries, got {MAX_OBJECTS + 1}"),
     ("objects: §[1]", "objects: must be a mapping, got a list of 1"),
     (
-        "renderer: {type: volume, resolution: 16}\nobjects: §{ball: {}}",
-        "objects: are shown by renderer surface, not by volume; remove them",
-    ),
-    (
         "renderer: {type: cut_plane}\nobjects: §{ball: {}}",
-        "objects: are shown by renderer surface, not by cut_plane; remove them",
+        "objects: are not shown by renderer cut_plane; remove them",
     ),
     (
         "lights: [{}, {type: point, position: §[0, 0, -2.1]}]\nobjects: {ball: {position: [0, 0, -2]}}",
@@ -106,6 +102,22 @@ CASES = [
         "objects.b.join: cannot be smooth_union for a plane, which has no end; a flat box can",
     ),
     (
+        "objects: {ball: {}}\ncut_planes: [{cut: true, objects: [§bal]}]",
+        "cut_planes.0.objects.0: unknown object 'bal'; did you mean 'ball'?",
+    ),
+    (
+        "cut_planes: [{cut: true, objects: [§ball]}]",
+        "cut_planes.0.objects.0: unknown object 'ball'; known: none",
+    ),
+    (
+        "objects: {sea: {type: water}}\ncut_planes: [{cut: true, objects: [§sea]}]",
+        "cut_planes.0.objects.0: 'sea' is a water, which has no end; a flat box can be cut",
+    ),
+    (
+        "renderer: {type: volume}\nobjects: {sea: {type: §water}}",
+        "objects.sea.type: cannot be water in a volume: its waves change with the distance; {type: plane} can",
+    ),
+    (
         "objects: {b: {join: §cutt}}",
         "objects.b.join: must be union, smooth_union, cut or intersection, got 'cutt'; did you mean 'cut'?",
     ),
@@ -113,11 +125,6 @@ CASES = [
     (
         f"objects: {{{FULL}, last: {{type: §formula, formula: {{name: mandelbulb}}}}}}",
         f"objects.last.type: at most {MAX_FORMULAS} objects can be formulas, and this is one more",
-    ),
-    (
-        "objects: {b: {join: cut}}\ncut_planes: §[{plane: {normal: [1, 0, 0]}}]",
-        "cut_planes: cannot be combined with the object 'b', which is a part of the set; an object"
-        " {type: plane, join: cut} cuts both",
     ),
     (
         "materials: {ice: {transmission: {weight: 1}}, clay: {}}\nlighting: {mode: path}\n"

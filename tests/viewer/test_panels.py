@@ -469,6 +469,21 @@ def test_objects_are_added_given_a_material_and_removed() -> None:
     assert ui.studio.scene.objects["water"] == before.objects["water"]
 
 
+def test_a_plane_names_the_objects_that_it_cuts() -> None:
+    ui = opened("scenes/mandelbulb.yaml")
+    ui.size = (1280, 4000)
+    for kind in ("box", "water"):
+        objects._add(ui, kind, {"type": kind})
+    assert ui.studio.edit({"cut_planes": [{"cut": True}]})
+    ui.memory["open.cut_planes"] = True
+    Stage(ui, scene_dock.draw, window=False)
+    assert not ui.studio.scene.joined
+    assert ui.studio.edit({"cut_planes.0.objects": ["box"]})
+    assert list(ui.studio.scene.joined) == ["box"]
+    Stage(ui, scene_dock.draw, window=False)
+    assert not ui.studio.edit({"cut_planes.0.objects": ["water"]})
+
+
 def test_a_formula_beside_the_set_is_edited() -> None:
     ui = opened("scenes/mandelbulb.yaml")
     ui.size = (1280, 4000)

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.objects import Solid
 from clfractal.scene.plane import Plane, scaled
 from clfractal.viewer import plane_moves
 from clfractal.viewer.panels import palette_editor, renderer, theme
@@ -105,6 +106,17 @@ def _first_plane(ui: Ui) -> dict[str, Any]:
     return {"plane": plane, "opacity": 1.0, "cut": True}
 
 
+def _named(ui: Ui, path: str, chosen: tuple[str, ...]) -> None:
+    """Which of the solids beside the set are cut, too."""
+    for name, each in ui.studio.scene.objects.items():
+        if not isinstance(each, Solid) or each.join != "union":
+            continue
+        width = w.row(ui, name, tip="Whether the plane cuts this object, too", path=path)
+        if width is not None and w.toggle(f"{path} {name}", name in chosen):
+            others = [other for other in chosen if other != name]
+            ui.studio.edit({path: others if name in chosen else [*others, name]})
+
+
 def _set(ui: Ui, planes: list[Any], chosen: int) -> None:
     if ui.studio.edit({"cut_planes": planes}):
         ui.memory["cut_plane"] = chosen
@@ -114,6 +126,8 @@ def _cut_plane(ui: Ui, index: int) -> None:
     path = f"cut_planes.{index}"
     plane = ui.studio.scene.cut_planes[index]
     w.field(ui, f"{path}.cut", "Cut open")
+    if plane.cut:
+        _named(ui, f"{path}.objects", plane.objects)
     w.field(ui, f"{path}.opacity")
     w.field(ui, f"{path}.inside_opacity", start=plane.opacity, auto="as opacity")
     w.field(ui, f"{path}.count", "Parallel planes")

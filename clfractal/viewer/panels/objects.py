@@ -108,7 +108,10 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove", enabled=chosen is not None):
         left = {name: plain(each) for name, each in objects.items() if name != chosen}
-        ui.studio.edit({"objects": left})
+        planes = [plain(plane) for plane in ui.studio.scene.cut_planes]
+        for plane in planes:
+            plane["objects"] = [name for name in plane["objects"] if name != chosen]
+        ui.studio.edit({"objects": left, "cut_planes": planes})
 
 
 def _add(ui: Ui, kind: str, values: dict[str, Any]) -> None:

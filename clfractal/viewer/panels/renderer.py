@@ -59,7 +59,7 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
         edits["cut_planes"] = []
     elif now["type"] == "cut_plane" and not scene.cut_planes and known.get("cut_planes"):
         edits["cut_planes"] = known["cut_planes"]
-    objects = _objects_of(ui, kind, planes=bool(edits.get("cut_planes", scene.cut_planes)))
+    objects = _objects_of(ui, kind)
     if list(objects) != list(scene.objects):
         edits["objects"] = objects
     if kind == "volume" and scene.coloring.by not in ("solid", "normal"):
@@ -70,13 +70,13 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
     return done
 
 
-def _objects_of(ui: Ui, kind: str, *, planes: bool) -> dict[str, Any]:
+def _objects_of(ui: Ui, kind: str) -> dict[str, Any]:
     """The objects that another renderer shows; those that it does not show come back with one that does."""
     now = {name: plain(each) for name, each in ui.studio.scene.objects.items()}
     before, hidden = ui.memory.get("renderer.objects", ({}, set()))
     every = {name: now.get(name, each) for name, each in before.items() if name in now or name in hidden}
     every |= {name: each for name, each in now.items() if name not in every}
-    shown = {name: each for name, each in every.items() if can_show(kind, each["type"], planes=planes)}
+    shown = {name: each for name, each in every.items() if can_show(kind, each["type"])}
     ui.memory["renderer.objects"] = every, every.keys() - shown.keys()
     return shown
 
