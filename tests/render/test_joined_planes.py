@@ -112,9 +112,8 @@ def test_a_named_object_keeps_its_colour_behind_the_plane() -> None:
         "formula": {"name": "mandelbulb", "iterations": 4},
         "camera": {"projection": "orthographic", "position": [0, -3, 4], "target": [0, 0, 0], "height": 4},
         "image": {"width": 128, "height": 128},
-        "lights": [],
-        "material": {"ambient": 1},
-        "materials": {"red": {"base": {"color": [0.8, 0.1, 0.05]}}},
+        "lights": [{"direction": [0, 1, -1], "shadow": False}],
+        "materials": {"red": {"base": {"color": [0.8, 0.1, 0.05]}, "specular": {"weight": 0}}},
         "objects": {"ball": {"type": "sphere", "position": [1.5, 0, 0], "radius": 0.4, "material": "red"}},
         "cut_planes": [{"plane": {"normal": [0, -1, 0]}, "cut": True, "objects": ["ball"], "opacity": 0}],
     }
