@@ -31,7 +31,7 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     const vec right = VIEW_VEC(w.view, right, time), down = VIEW_VEC(w.view, down, time);
     shot s;
     s.point = vec_along(vec_along(VIEW_VEC(w.view, center, time), from_center_x + across, right), from_center_y + below, down);
-    const escaped e = plane_escape(s.point, active, SMOOTH, w.settings->periodicity, w.orbit->iterations,
+    const escaped e = plane_escape(s.point, active, SMOOTH, w.settings->periodicity, w.settings->iterations,
                                    w.orbit, w.k);
     s.radiance = escape_color(e, w.colors, w.palette);
     s.hit = active;

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from clfractal.device.orbit import ORBIT, orbit_record
+from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Struct
-from clfractal.formulas.opencl import write_formula
 from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
     escape_colors_record,
@@ -21,9 +18,14 @@ from clfractal.renderers.records import VIEW
 from clfractal.renderers.surface import PALETTE_SIZE
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
+from clfractal.solids import Body
 
 PLANE_SETTINGS = Struct(
-    "PlaneSettings", [Field("periodicity", "int", 0, "1: orbits that come back are found early")]
+    "PlaneSettings",
+    [
+        Field("periodicity", "int", 0, "1: orbits that come back are found early"),
+        Field("iterations", "int", 0, "most applications of the formula"),
+    ],
 )
 
 
@@ -36,16 +38,18 @@ def renderer_of(scene: Scene) -> CutPlaneRenderer:
 def program_text(scene: Scene, plan: Plan) -> FlatText:
     """The whole text of the scene's program."""
     renderer = renderer_of(scene)
-    formula = write_formula(scene.chain)
+    body = Body.of(scene)
     structs = "".join(struct.c_text() for struct in (VIEW, SAMPLING, ORBIT, PLANE_SETTINGS, ESCAPE_COLORS))
     defines = {
         **pass_defines(plan),
-        **escape_defines(scene.chain),
+        # Of several formulas each text has its own.
+        **({} if scene.joined else escape_defines(scene.chain)),
+        **body.defines,
         "PALETTE_SIZE": PALETTE_SIZE,
         "SMOOTH": int(renderer.colors.mode == "smooth"),
         "ADAPTIVE": int(renderer.noise is not None),
     }
-    generated = {"formula.h": formula.text, "structs.h": structs}
+    generated = {**body.texts(files=("escape.h",), defines=escape_defines), "structs.h": structs}
     return flat_text("cut_plane.cl", generated=generated, defines=defines)
 
 
@@ -65,11 +69,12 @@ class CutPlaneKernel(TileKernel):
         scene, precision = self.scene, self.precision
         renderer = renderer_of(scene)
         iterations = renderer.iterations if renderer.iterations is not None else scene.formula.iterations
-        formula = write_formula(scene.chain)
+        settings = {"periodicity": int(renderer.periodicity), "iterations": iterations}
+        body = Body.of(scene)
         return [
-            PLANE_SETTINGS.value(precision, {"periodicity": int(renderer.periodicity)}),
-            orbit_record(scene.chain, iterations, precision),
-            np.array(formula.constants, precision),
+            PLANE_SETTINGS.value(precision, settings),
+            body.records(precision),
+            body.constants(precision),
             escape_colors_record(renderer.colors, iterations, precision),
             escape_palette(renderer.colors),
         ]

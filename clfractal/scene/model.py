@@ -160,11 +160,9 @@ class Scene(Section):
         """The objects that are parts of the set, in their order.
 
         Surfaces have those here that their rays march to: formulas, what is not only beside the set, and what cutting
-        planes name. In volumes all are parts of it.
+        planes name. In volumes and on planes all are parts of it.
         """
-        if isinstance(self.renderer, CutPlaneRenderer):
-            return {}
-        filled = isinstance(self.renderer, VolumeRenderer)
+        filled = not isinstance(self.renderer, SurfaceRenderer)
         named = {name for plane in self.cut_planes if plane.cut for name in plane.objects}
         return {
             name: each
@@ -366,8 +364,9 @@ class Scene(Section):
                 )
             own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}
             if isinstance(view.renderer, CutPlaneRenderer):
-                # The scene's planes and objects belong to pictures of its set; a cut_plane renderer shows none.
-                own |= {"cut_planes": (), "objects": {}}
+                # The scene's planes belong to pictures of its set; a cut_plane renderer shows none. Nor has it water.
+                objects = {name: each for name, each in self.objects.items() if isinstance(each, Joined)}
+                own |= {"cut_planes": (), "objects": objects}
             found.append((self.model_copy(update={**own, **view.changes()}), place))
         return found
 

@@ -17,9 +17,7 @@ def check_objects(scene: Scene) -> None:
     _check_named(scene)
     if not scene.objects:
         return
-    if isinstance(scene.renderer, CutPlaneRenderer):
-        raise SceneError("are not shown by renderer cut_plane; remove them", Where(path="objects"))
-    if isinstance(scene.renderer, VolumeRenderer):
+    if not isinstance(scene.renderer, SurfaceRenderer):
         _check_filled(scene, scene.renderer)
     _check_joined(scene)
     for name, each in scene.objects.items():
@@ -30,7 +28,7 @@ def check_objects(scene: Scene) -> None:
 
 def can_show(renderer: str, kind: str) -> bool:
     """Whether a type of renderer shows objects of a type."""
-    return renderer == "surface" or (renderer == "volume" and kind != "water")
+    return renderer == "surface" or kind != "water"
 
 
 def _check_named(scene: Scene) -> None:
@@ -45,14 +43,14 @@ def _check_named(scene: Scene) -> None:
                 raise SceneError(f"{name!r} is a {each.type}, which has no end; a flat box can be cut", where)
 
 
-def _check_filled(scene: Scene, renderer: VolumeRenderer) -> None:
-    """What cannot be filled into voxels."""
-    if renderer.file is not None:
+def _check_filled(scene: Scene, renderer: VolumeRenderer | CutPlaneRenderer) -> None:
+    """What cannot be filled into voxels, or has no counts on a plane."""
+    if isinstance(renderer, VolumeRenderer) and renderer.file is not None:
         raise SceneError("are not joined to a grid from a file; remove them", Where(path="objects"))
     for name, each in scene.objects.items():
         if isinstance(each, WaterObject):
             raise SceneError(
-                "cannot be water in a volume: its waves change with the distance; {type: plane} can",
+                f"cannot be water with renderer {renderer.type}: its waves have no end; {{type: plane}} can",
                 Where(path=f"objects.{name}.type"),
             )
 
@@ -102,8 +100,8 @@ def _check_material(scene: Scene, name: str, material: str | None) -> None:
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
-    """What is joined is no glass, and what differs from place to place is for paths; voxels have no materials."""
-    if isinstance(scene.renderer, VolumeRenderer):
+    """What is joined is no glass, and what differs from place to place is for paths; only surfaces have materials."""
+    if not isinstance(scene.renderer, SurfaceRenderer):
         return
     used = material if material is not None else scene.material.name
     if used is None:

@@ -123,3 +123,15 @@ def test_a_named_object_keeps_its_colour_behind_the_plane() -> None:
     assert own.sum() > 60
     np.testing.assert_allclose(film["R"][own] / film["G"][own], 8, rtol=1e-3)
     assert not ((film["P.Y"] < -0.01) & (film["P.X"] > 1.1) & (film["A"] == 1)).any(), "half of it is gone"
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_a_picture_of_the_plane_alone(precision: str) -> None:
+    place = {"center": [0, 0.1, 0], "normal": [0, -1, 0], "width": 4, "height": 4}
+    renderer = {"type": "cut_plane", "plane": place, "colors": {"mode": "stepped"}, "iterations": 9}
+    scene = scene_of({"type": "surface"}).resolved() | {"renderer": renderer, "cut_planes": []}
+    film = clfractal.render(scene, channels=["iterations"], precision=precision)
+    expected = counts_of(load_scene(scene), points_of_pixels(), 9)
+    assert (film["iterations"] != expected).mean() < 3e-3
+    alone = clfractal.render(scene | {"objects": {}}, channels=["iterations"], precision=precision)
+    assert (film["iterations"] != alone["iterations"]).mean() > 0.05

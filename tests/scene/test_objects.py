@@ -69,8 +69,8 @@ CASES = [
     (f"objects: §{{{MANY}}}", f"objects: must have at most {MAX_OBJECTS} entries, got {MAX_OBJECTS + 1}"),
     ("objects: §[1]", "objects: must be a mapping, got a list of 1"),
     (
-        "renderer: {type: cut_plane}\nobjects: §{ball: {}}",
-        "objects: are not shown by renderer cut_plane; remove them",
+        "renderer: {type: cut_plane}\nobjects: {sea: {type: §water}}",
+        "objects.sea.type: cannot be water with renderer cut_plane: its waves have no end; {type: plane} can",
     ),
     (
         "lights: [{}, {type: point, position: §[0, 0, -2.1]}]\nobjects: {ball: {position: [0, 0, -2]}}",
@@ -115,7 +115,7 @@ CASES = [
     ),
     (
         "renderer: {type: volume}\nobjects: {sea: {type: §water}}",
-        "objects.sea.type: cannot be water in a volume: its waves change with the distance; {type: plane} can",
+        "objects.sea.type: cannot be water with renderer volume: its waves have no end; {type: plane} can",
     ),
     (
         "objects: {b: {join: §cutt}}",

@@ -325,7 +325,7 @@ def test_renderers_in_turn(desk: Desk) -> None:
     for _ in range(2):
         desk.do("next_renderer")
         left.append(list(desk.studio.scene.objects))
-    assert left == [["ball"], []]
+    assert left == [["ball"], ["ball"]]
 
 
 def test_ways_of_stereo_in_turn(desk: Desk) -> None:

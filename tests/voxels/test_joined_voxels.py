@@ -244,7 +244,7 @@ def test_another_place_of_an_object_is_another_grid() -> None:
 
 
 WRONG: dict[str, tuple[dict[str, Any], dict[str, Any], str, str]] = {
-    "sea": ({"type": "water"}, {}, "objects.sea.type", "cannot be water in a volume"),
+    "sea": ({"type": "water"}, {}, "objects.sea.type", "cannot be water with renderer volume"),
     "cut": (
         {"type": "plane", "join": "smooth_union"},
         {},
@@ -276,5 +276,5 @@ def test_grids_do_not_leave_water_out_without_a_word() -> None:
         version=1, formula={"name": "hast"}, camera={}, objects={"sea": {"type": "water"}}
     )
     for make in (clfractal.mesh, clfractal.voxelize):
-        with pytest.raises(clfractal.SceneError, match="cannot be water in a volume"):
+        with pytest.raises(clfractal.SceneError, match="cannot be water with renderer volume"):
             make(scene)

@@ -6,7 +6,6 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer.panels import formula, maps, theme
@@ -49,9 +48,6 @@ def draw(ui: Ui) -> None:
         if _line(name, each, name == chosen):
             chosen = name
     ui.memory["object"] = chosen
-    if isinstance(ui.studio.scene.renderer, CutPlaneRenderer):
-        w.hint(ui, "Surfaces and volumes show objects.")
-        return
     _buttons(ui, chosen)
     w.problem(ui, "objects")
     chosen = ui.memory["object"]
