@@ -33,7 +33,8 @@ _TEXT = f"""\
 #include "objects.h"
 #include "emitter_places.h"
 {LOADS}
-// Planes of `count` numbers. In: u, v, choice. Out: the way to a place, the density of its choice, and that of meeting it by chance.
+// Planes of `count` numbers. In: u, v, choice. Out: the way to a place, the density of its choice, that of meeting it by
+// chance, and the object's weight.
 __kernel void look(__global const scalar *in, __global scalar *out, __global const struct Object *o, scalar x, scalar y,
                    scalar z, int count) {{
     const int lane = (int)get_global_id(0) * LANES;
