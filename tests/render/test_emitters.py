@@ -1,4 +1,4 @@
-"""Objects that shine, along paths: against lights of the same shape, quadrature, what chance alone finds, and white rooms."""
+"""Objects that shine, along paths: against lights of the same shape, quadrature, what chance finds, and white rooms."""
 
 from __future__ import annotations
 
