@@ -34,12 +34,13 @@ LAMPS: dict[str, dict[str, Any]] = {
     "drum": {"type": "cylinder", "position": [0.1, -0.1, 0.85], "radius": 0.25, "height": 0.3},
     "tube": {"type": "cylinder", "position": [0, 0, 0.75], "radius": 0.03, "height": 2, "scale": [1, 1.5, 1]},
 }
-TURNS = {
-    "egg": [10, 20, 30],
-    "box": [20, 35, 50],
-    "panel": [5, 8, 20],
-    "drum": [30, 10, 0],
-    "tube": [90, 3, 15],
+TURNS: dict[str, tuple[float, float, float]] = {
+    "ball": (0, 0, 0),
+    "egg": (10, 20, 30),
+    "box": (20, 35, 50),
+    "panel": (5, 8, 20),
+    "drum": (30, 10, 0),
+    "tube": (90, 3, 15),
 }
 
 
@@ -60,7 +61,7 @@ def lit(
 
 
 def lamp(name: str) -> dict[str, Any]:
-    return {**LAMPS[name], "rotation": TURNS.get(name, [0, 0, 0]), "material": "glow"}
+    return {**LAMPS[name], "rotation": list(TURNS[name]), "material": "glow"}
 
 
 def colors(scene: Scene, device: Device, **settings: Any) -> Floats:
