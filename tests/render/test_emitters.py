@@ -299,3 +299,46 @@ def test_a_limit_holds_for_what_shines(device: Device) -> None:
         if glow is BY_CHANCE:
             assert limited.max() <= 0.05 * (1 + 1e-5)
         assert limited.mean() < free.mean()
+
+
+def test_all_kinds_of_light_add_up(device: Device) -> None:
+    """Of lamps, lights and an environment one is asked for at each spot: the mean is their sum."""
+    lamps = {"ball": lamp("ball"), "tube": lamp("tube")}
+    dark = {**GLOW, "emission": {"luminance": 0}}
+    lights = [
+        {"type": "point", "position": [0, -1, 1.2], "falloff": "inverse_square", "intensity": 2},
+        {"direction": [1, 0.3, -1], "angular_size": 4, "intensity": 0.5},
+    ]
+    sky = {"name": "overcast", "intensity": 0.5}
+
+    def mean(glow: dict[str, Any], **sections: Any) -> Floats:
+        found = colors(lit(lamps, 256, 1, materials={**MATERIALS, "glow": glow}, **sections), device)
+        return np.asarray(found.mean(axis=(0, 1)))
+
+    parts = [mean(GLOW), mean(dark, lights=lights), mean(dark, environment=sky)]
+    assert min(part.min() for part in parts) > 0.03
+    assert mean(GLOW, lights=lights, environment=sky) == pytest.approx(sum(parts), rel=0.005)
+
+
+def test_lamps_in_glass_and_under_water(device: Device) -> None:
+    """Where glass is in the way only chance finds them; spots in the same glass ask for them, through what it absorbs."""
+    clear = {
+        "specular": {"roughness": 0},
+        "transmission": {"weight": 1, "color": [0.5, 0.8, 0.9], "depth": 0.5},
+    }
+    objects = {
+        "lamp": {**LAMPS["ball"], "position": [0.1, 0, 0.3], "radius": 0.2, "material": "glow"},
+        "lantern": {**LAMPS["drum"], "position": [-0.9, 0.3, 0.75], "radius": 0.15, "material": "glow"},
+        "pane": {"type": "sphere", "position": [-0.9, 0.3, 0.75], "radius": 0.35, "material": "clear"},
+        "water": {"type": "plane", "position": [0, 0, 0.62], "material": "clear"},
+    }
+    camera = {"position": [0.3, -2.2, 1.6], "target": [-0.3, 0.1, 0.3], "fov": 45}
+
+    def picture(glow: dict[str, Any], samples: int, bounces: int) -> Floats:
+        materials = {**MATERIALS, "clear": clear, "glow": glow}
+        return colors(lit(objects, samples, bounces, camera, materials=materials), device)
+
+    asked, chance = picture(GLOW, 256, 7), picture(BY_CHANCE, 1024, 8)
+    assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.01)
+    one, other = (each.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3)) for each in (asked, chance))
+    np.testing.assert_allclose(one, other, rtol=0.08, atol=0.01)
