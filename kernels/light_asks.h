@@ -6,12 +6,20 @@ INLINE real power_share(real own, real other) {
     return square / fmax(square + other * other, (real)(REAL_SMALLEST));
 }
 
-// What could light a point from everywhere: the sum over the lights, and the environment.
-INLINE real weight_of_all(vec point, world w) {
+#if HAS_EMITTERS
+#include "emitters.h"
+#endif
+
+// What could light a point from everywhere: the sum over the lights, and the environment. `own`: the object whose surface it is, or 0; no
+// object lights itself.
+INLINE real weight_of_all(vec point, real own, world w) {
     real sum = (real)(w.settings->environment_weight);
     for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, point);
 #if HAS_SET_LIGHTS
     sum += set_weight(point, w);
+#endif
+#if HAS_EMITTERS
+    sum += emitters_weight(point, own, w);
 #endif
     return fmax(sum, (real)(REAL_SMALLEST));
 }
@@ -58,8 +66,9 @@ typedef struct {
 // Numbers in (0, 1): two for the place on a light, one for the light, two for the one of those on the set.
 #define ASKING_NUMBERS 5
 
-// One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium.
-INLINE asked light_asked(vec point, vec from, vec normal, const real *numbers, real total, world w) {
+// One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium, and
+// `own` as above.
+INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
     const real u = numbers[0], v = numbers[1], choice = numbers[2];
     light_ray chosen = {vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
     real share = R(1.0);
@@ -94,6 +103,9 @@ INLINE asked light_asked(vec point, vec from, vec normal, const real *numbers, r
         if (!is_light || light_is_met(light) || light_is_seen(light)) both |= here;
         if (is_light && !light->shadow) blocked &= ~here;
     }
+#if HAS_EMITTERS
+    both |= emitter_asked(from, own, numbers, total, place, &before, &open, &chosen, &share, w);
+#endif
     real reckoned = R(1.0);
     vec begin = from;
 #if HAS_SET_LIGHTS

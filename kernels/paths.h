@@ -8,7 +8,7 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
 
 // One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
 // `behind`: in glass, whether the spot is seen from inside its body.
-INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, const bsdf *b, real total, mask behind, world w, color *brings) {
+INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, real own, const bsdf *b, real total, mask behind, world w, color *brings) {
     real u, v, choice, unused;
     path_square(s, at, PURPOSE_ASK, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICE, w, &choice, &unused);
@@ -16,7 +16,7 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
 #if HAS_SET_LIGHTS
     path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
 #endif
-    const asked a = light_asked(point, from, b->normal, numbers, total, w);
+    const asked a = light_asked(point, from, b->normal, own, numbers, total, w);
     light_ray chosen = a.ray;
     real density;
     color scattered;
@@ -69,6 +69,32 @@ INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mas
     const color more = limited(color_mul(past, so_far->through), w.settings);
     so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
 }
+
+// Adds what a spot shines with by itself.
+INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *here, color light, mask shows, world w) {
+    color more = color_mul(light, so_far->through);
+#if HAS_EMITTERS
+    const real distance = vec_dot(vec_sub(here->seen, so_far->origin), so_far->direction);
+    if (s.bounce > 0) {
+        more = color_scale(more, emitter_share(so_far->origin, so_far->direction, distance, here->object, with->density, with->total, w));
+    }
+#endif
+    if (s.bounce > 0) more = limited(more, w.settings);
+    so_far->seen = color_pick(shows, color_add(so_far->seen, more), so_far->seen);
+}
+
+#if HAS_EMITTERS
+// Adds the light of an object that the last ray of a path has met, as far as the path could also have asked for it.
+INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, encounter last, mask here, world w) {
+    const real number = queue_object(s.q, 0, s.slot, last);
+    const color light = emitter_light(number, w);
+    here &= less(R(0.0), brightest(light));
+    if (!any_lane(here)) return;
+    const real share = emitter_share(so_far->origin, so_far->direction, last.t, number, with->density, with->total, w);
+    const color more = limited(color_mul(color_scale(light, share), so_far->through), w.settings);
+    so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
+}
+#endif
 
 // A spot's material, ready to scatter by the normal `shading`, which is the surface's own, or that of its relief. `behind`: in glass,
 // whether the spot is seen from inside its body.
@@ -140,14 +166,14 @@ STAGE(scatter_paths) {
         shows &= ~edge.hidden;
         outward = vec_pick(behind, vec_scale(outward, R(-1.0)), outward);
 #endif
-        so_far.seen = color_pick(shows, color_add(so_far.seen, color_mul(color_scale(p.emission_color, p.emission_luminance), so_far.through)), so_far.seen);
+        spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows, w);
 #if HAS_PARTS
         reflects = pbr_albedo(&p, w.albedos);
 #endif
         const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_scale(arrived.direction, R(-1.0)), &shading, w);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
-        with.total = weight_of_all(so_far.origin, w);
-        const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, &b, with.total, behind, w, &with.awaited);
+        with.total = weight_of_all(so_far.origin, OBJECT_OF(found), w);
+        const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, OBJECT_OF(found), &b, with.total, behind, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
         if (bounce > 0) with.awaited = limited(with.awaited, w.settings);
         asks.origin = so_far.origin;
@@ -236,6 +262,9 @@ STAGE(end_paths) {
     path_absorbs(&so_far, &with, far, w);
 #endif
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
+#if HAS_EMITTERS
+    path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
+#endif
 #if HAS_PARTS
     if (bounce == 1) glance_once(s, so_far.seen);
 #endif

@@ -6,24 +6,18 @@
 
 // The point is the origin; x goes along the rectangle's side, y along its other, z through its plane.
 typedef struct {
-    vec side, upward, toward;
     real left, right, lower, upper, height;   // the last one above 0
     real angle;                               // steradians
     real below, above, turned;                // b0, b1 and k of the paper
 } seen_rectangle;
 
-INLINE seen_rectangle rectangle_seen(__constant const struct Light *light, vec point) {
+INLINE seen_rectangle rectangle_between(real left, real right, real lower, real upper, real height) {
     seen_rectangle r;
-    const vec side = vec_splat(light->side), upward = vec_splat(light->upward), offset = vec_sub(vec_splat(light->vector), point);
-    const real wide = sqrt(vec_dot(side, side)), high = sqrt(vec_dot(upward, upward));
-    r.side = vec_scale(side, R(1.0) / wide);
-    r.upward = vec_scale(upward, R(1.0) / high);
-    r.toward = vec_scale(vec_splat(light->axis), R(-1.0));
-    r.left = vec_dot(offset, r.side) - wide;
-    r.right = r.left + R(2.0) * wide;
-    r.lower = vec_dot(offset, r.upward) - high;
-    r.upper = r.lower + R(2.0) * high;
-    r.height = most(vec_dot(offset, r.toward), (real)(REAL_SMALLEST));
+    r.left = left;
+    r.right = right;
+    r.lower = lower;
+    r.upper = upper;
+    r.height = height;
     // Of the planes through the point and a side: the part of their normals that is across the rectangle.
     const real square = r.height * r.height;
     r.below = -r.lower / sqrt(r.lower * r.lower + square);
@@ -34,29 +28,60 @@ INLINE seen_rectangle rectangle_seen(__constant const struct Light *light, vec p
     return r;
 }
 
-INLINE vec rectangle_direction(__constant const struct Light *light, vec point, real u, real v) {
-    const seen_rectangle r = rectangle_seen(light, point);
-    const real turn = u * r.angle + r.turned, sine = sin(turn);
-    const real slope = (cos(turn) * r.below - r.above) / pick(less(fabs(sine), R(1e-12)), R(1e-12), sine);
-    real along = R(1.0) / sqrt(slope * slope + r.below * r.below);
+// A place of it; z is its height.
+INLINE vec rectangle_place(const seen_rectangle *r, real u, real v) {
+    const real turn = u * r->angle + r->turned, sine = sin(turn);
+    const real slope = (cos(turn) * r->below - r->above) / pick(less(fabs(sine), R(1e-12)), R(1e-12), sine);
+    real along = R(1.0) / sqrt(slope * slope + r->below * r->below);
     along = least(pick(less(slope, R(0.0)), -along, along), R(1.0) - (real)(REAL_EPSILON));
     along = most(along, (real)(REAL_EPSILON) - R(1.0));
-    real x = along * r.height / sqrt(R(1.0) - along * along);
-    x = most(least(x, r.right), r.left);
-    const real square = x * x + r.height * r.height;
-    const real first = r.lower / sqrt(square + r.lower * r.lower), last = r.upper / sqrt(square + r.upper * r.upper);
+    real x = along * r->height / sqrt(R(1.0) - along * along);
+    x = most(least(x, r->right), r->left);
+    const real square = x * x + r->height * r->height;
+    const real first = r->lower / sqrt(square + r->lower * r->lower), last = r->upper / sqrt(square + r->upper * r->upper);
     const real up = first + v * (last - first);
     real y = up * sqrt(square / most(R(1.0) - up * up, (real)(REAL_EPSILON)));
-    y = most(least(y, r.upper), r.lower);
-    const mask small = less(r.angle, LEAST_ANGLE);
-    x = pick(small, r.left + u * (r.right - r.left), x);
-    y = pick(small, r.lower + v * (r.upper - r.lower), y);
-    return vec_normalize(vec_along(vec_along(vec_scale(r.toward, r.height), x, r.side), y, r.upward));
+    y = most(least(y, r->upper), r->lower);
+    const mask small = less(r->angle, LEAST_ANGLE);
+    x = pick(small, r->left + u * (r->right - r->left), x);
+    y = pick(small, r->lower + v * (r->upper - r->lower), y);
+    return vec_of(x, y, r->height);
+}
+
+// Per steradian, of `rectangle_place`, for a direction that meets the rectangle; `facing` is its part along z.
+INLINE real rectangle_place_density(const seen_rectangle *r, real area, real facing) {
+    facing = most(facing, (real)(REAL_EPSILON));
+    const real distance = r->height / facing;
+    return pick(less(r->angle, LEAST_ANGLE), distance * distance / (area * facing), R(1.0) / r->angle);
+}
+
+// That of a light, and the directions of x, y and z.
+typedef struct {
+    vec side, upward, toward;
+    seen_rectangle seen;
+} light_rectangle;
+
+INLINE light_rectangle rectangle_seen(__constant const struct Light *light, vec point) {
+    light_rectangle r;
+    const vec side = vec_splat(light->side), upward = vec_splat(light->upward), offset = vec_sub(vec_splat(light->vector), point);
+    const real wide = sqrt(vec_dot(side, side)), high = sqrt(vec_dot(upward, upward));
+    r.side = vec_scale(side, R(1.0) / wide);
+    r.upward = vec_scale(upward, R(1.0) / high);
+    r.toward = vec_scale(vec_splat(light->axis), R(-1.0));
+    const real left = vec_dot(offset, r.side) - wide, lower = vec_dot(offset, r.upward) - high;
+    const real height = most(vec_dot(offset, r.toward), (real)(REAL_SMALLEST));
+    r.seen = rectangle_between(left, left + R(2.0) * wide, lower, lower + R(2.0) * high, height);
+    return r;
+}
+
+INLINE vec rectangle_direction(__constant const struct Light *light, vec point, real u, real v) {
+    const light_rectangle r = rectangle_seen(light, point);
+    const vec place = rectangle_place(&r.seen, u, v);
+    return vec_normalize(vec_along(vec_along(vec_scale(r.toward, place.z), place.x, r.side), place.y, r.upward));
 }
 
 // Per steradian, of `rectangle_direction`, for a direction that meets the rectangle.
 INLINE real rectangle_density(__constant const struct Light *light, vec point, vec direction) {
-    const seen_rectangle r = rectangle_seen(light, point);
-    const real facing = most(vec_dot(direction, r.toward), (real)(REAL_EPSILON)), distance = r.height / facing;
-    return pick(less(r.angle, LEAST_ANGLE), distance * distance / ((real)(light->area) * facing), R(1.0) / r.angle);
+    const light_rectangle r = rectangle_seen(light, point);
+    return rectangle_place_density(&r.seen, (real)(light->area), vec_dot(direction, r.toward));
 }

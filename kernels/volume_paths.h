@@ -35,9 +35,9 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     real u, v, choice, roulette;
     wander_square(at, sample, PURPOSE_ASK, bounce, w, &u, &v);
     wander_square(at, sample, PURPOSE_CHOICE, bounce, w, &choice, &roulette);
-    p->total = weight_of_all(p->origin, w);
+    p->total = weight_of_all(p->origin, R(0.0), w);
     const real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
-    const asked a = light_asked(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), numbers, p->total, w);
+    const asked a = light_asked(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), R(0.0), numbers, p->total, w);
     const scalar g = w.settings->anisotropy;
     const real phase = phase_of(vec_dot(p->direction, a.ray.toward), g);
     color brings = color_scale(a.ray.light, phase * asked_weight(&a, phase));

@@ -9,9 +9,10 @@ import numpy.typing as npt
 
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.maps import MappedMaterials, glass_bodies
 from clfractal.renderers.water import WAVES, wave_set
-from clfractal.scene.base import Vector, frame_of
+from clfractal.scene.base import Vector, frame_of, length
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
@@ -43,6 +44,10 @@ OBJECT = Struct(
         Field("mirror", "real", 3, "part that is mirrored sharply, straight on"),
         Field("mirror_edge", "real", 3, "what is mirrored more at grazing angles"),
         Field("emission", "real", 3, "radiance, linear Rec. 709"),
+        Field("asked", "int", 0, "1: along paths it is asked for as lights are"),
+        Field("radiance", "real", 3, "of one that is asked for, linear Rec. 709"),
+        Field("luminance", "real", 0, "of that"),
+        Field("sides", "real", 3, "of a solid: how long its own axes are, scene units"),
         Field("wave_x", "real", WAVES, "changes of phase, radians by scene unit"),
         Field("wave_y", "real", WAVES, ""),
         Field("wave_height", "real", WAVES, "scene units"),
@@ -58,6 +63,7 @@ def object_defines(scene: Scene) -> dict[str, object]:
     """The defines of all programs that send rays, or read what is kept between stages."""
     return {
         "HAS_OBJECTS": int(bool(scene.objects)),
+        "HAS_EMITTERS": int(any(each is not None for each in asked_radiance(scene))),
         "HAS_WATER": int(any(isinstance(each, WaterObject) for each in scene.objects.values())),
         "WAVES": WAVES,
         **{f"OBJECT_{kind.upper()}": number for kind, number in OBJECT_KINDS.items()},
@@ -68,20 +74,30 @@ def object_records(scene: Scene, precision: Precision) -> Record:
     """The objects in their order; one unused record where there are none, since no buffer is empty."""
     numbers = MappedMaterials(scene).blends.roots[1:]
     glass = glass_bodies(scene)[1:]
-    rows = [
+    rows: list[dict[str, object]] = [
         {
             "material": number,
             "glass": int(through),
             **_place(each),
             **_look(scene, each),
+            **_asked(radiance),
             "colored": int(_has_color(scene, each)),
         }
-        for number, through, each in zip(numbers, glass, scene.objects.values(), strict=True)
+        for number, through, radiance, each in zip(
+            numbers, glass, asked_radiance(scene), scene.objects.values(), strict=True
+        )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
         if name in scene.joined:  # the march finds it
             row["kind"] = OBJECT_KINDS["joined"]
     return OBJECT.array(precision, rows) if rows else np.zeros(1, OBJECT.dtype(precision))
+
+
+def _asked(radiance: Vector | None) -> dict[str, object]:
+    """What `kernels/emitters.h` reads, but for its place."""
+    shines = radiance or (0.0, 0.0, 0.0)
+    luminance = float(np.dot(shines, (0.2126, 0.7152, 0.0722)))  # ITU-R BT.709-6, item 3.2
+    return {"asked": int(radiance is not None), "radiance": shines, "luminance": luminance}
 
 
 def mirrors(scene: Scene) -> bool:
@@ -97,11 +113,13 @@ def _place(each: AnyObject) -> dict[str, object]:
         "kind": OBJECT_KINDS["joined" if isinstance(each, FormulaObject) else each.type],
         "middle": each.position,
         **dict.fromkeys(("wave_x", "wave_y", "wave_height", "wave_phase"), nothing),
+        "sides": (1.0, 1.0, 1.0),
         **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
     }
     if isinstance(each, Solid):
         # The axes stand at right angles: each one's own number is the product with it by its square.
         axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
+        row["sides"] = tuple(length(axis) for axis in each.axes)
     elif isinstance(each, FormulaObject):
         axes = [np.array(axis) for axis in AXES]
     else:

@@ -33,6 +33,9 @@ kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog rend
 kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
 kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/objects.h: render/objects render/objects_light
+kernels/emitter*.h: render/emitter_places render/emitters
+kernels/rectangles.h: render/rectangles render/emitter_places render/light_shapes
+kernels/light_asks.h: render/emitters render/light_shapes render/paths
 kernels/media.h: render/glass_objects
 kernels/glass_paths.h: render/glass_paths render/glass_objects
 kernels/bump.h: render/bump

@@ -84,7 +84,9 @@ _MORE = {
     "materials: {clay: {base: {color: [0.8, 0.5, 0.3], diffuse_roughness: 0.5, metalness: 0.2}, coat: {weight: 0.3},"
     " fuzz: {weight: 0.2}, emission: {luminance: 0.05}}}\nmaterial: {name: clay}\n"
     "objects: {sea: {type: water, position: [0, 0, -0.7], material: clay}, floor: {type: plane, position: [0, 0, -1]},"
-    " ball: {position: [0.6, -0.9, 0.2], radius: 0.3, scale: [1, 1, 2], material: clay}}\n",
+    " ball: {position: [0.6, -0.9, 0.2], radius: 0.3, scale: [1, 1, 2], material: clay},"
+    " box: {type: box, position: [-0.6, -0.9, 0.5], size: [0.3, 0.2, 0.4], rotation: [20, 30, 0], material: clay},"
+    " tube: {type: cylinder, position: [0, -1, -0.4], radius: 0.1, height: 0.8, rotation: [0, 70, 0], material: clay}}\n",
     "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
     "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
     " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5},"

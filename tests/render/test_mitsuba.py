@@ -35,6 +35,11 @@ LAMP, POWER = [1.5, -1.5, 2.0], 2.0
 SUN, SUN_POWER = [-1.0, 0.6, -1.2], 0.7
 ALPHA = 0.03
 BULB = [0.75, -0.7, 0.3]
+CRATE = [-0.1, -1.0, -0.3]
+ALONG = [CRATE[0] + math.cos(math.radians(30)), CRATE[1] + math.sin(math.radians(30)), CRATE[2]]
+DARK: dict[str, Any] = {"base": {"color": [0, 0, 0]}, "specular": {"weight": 0}}
+BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0}}
+SHINES = {"type": "area", "radiance": {"type": "rgb", "value": 6}}
 
 STAGE: dict[str, Any] = {
     "title": "A ball and a pillar on a floor",
@@ -179,6 +184,39 @@ LIGHTS: dict[str, tuple[dict[str, Any], list[dict[str, Any]]]] = {
             },
         ],
     ),
+    # Objects that shine: a ball, and a box that is turned about z.
+    "glowing": (
+        {
+            "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]},
+            "lights": [],
+            "objects": {
+                "bulb": {"type": "sphere", "position": BULB, "radius": 0.15, "material": "glow"},
+                "crate": {
+                    "type": "box",
+                    "position": CRATE,
+                    "size": [0.5, 0.3, 0.2],
+                    "rotation": [0, 0, 30],
+                    "material": "glow",
+                },
+            },
+        },
+        [
+            {"type": "sphere", "center": BULB, "radius": 0.15, "bsdf": BLACK, "emitter": SHINES},
+            {
+                "type": "cube",
+                # Its z looks along our x, its y is up.
+                "to_world": {"look_at": [CRATE, ALONG, [0, 0, 1]], "scale": [0.15, 0.1, 0.25]},
+                "bsdf": BLACK,
+                "emitter": SHINES,
+            },
+        ],
+    ),
+}
+
+# Materials of the lights' own objects.
+GLOWS: dict[str, dict[str, Any]] = {
+    **{name: {} for name in LIGHTS},
+    "glowing": {"glow": {**DARK, "emission": {"luminance": 6}}},
 }
 
 
@@ -204,19 +242,18 @@ def theirs(material: str, lights: str, folder: Path) -> Floats:
 
 def ours(kind: str, material: str, lights: str) -> Floats:
     """The same by paths."""
-    pictures = []
+    pictures, given, shown = [], KINDS[kind], LIGHTS[lights][0]
     for seed in range(SEEDS):
         scene = clfractal.Scene(
             version=1,
-            **KINDS[kind],
+            **{**given, **shown, "objects": {**given.get("objects", {}), **shown.get("objects", {})}},
             camera={"position": EYE, "target": TARGET, "fov": FOV},
             image={"width": WIDTH, "height": HEIGHT},
             # A tenth of the footprint: at contacts light would be missing.
             renderer={"samples": SAMPLES, "detail": 0.1, "seed": seed},
             lighting={"mode": "path", "bounces": BOUNCES, "roulette": BOUNCES},
-            materials={"m": MATERIALS[material][0]},
+            materials={"m": MATERIALS[material][0], **GLOWS[lights]},
             material={"name": "m"},
-            **LIGHTS[lights][0],
         )
         film = clfractal.render(scene)
         pictures.append(np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64))
@@ -246,6 +283,7 @@ def factor() -> float:
         ("set", "metal", "sky"),
         ("objects", "lambert", "sky"),
         ("objects", "lambert", "sizes"),
+        ("objects", "lambert", "glowing"),
         ("objects", "metal", "sky"),
     ],
 )

@@ -1,0 +1,37 @@
+"""Objects that shine, which paths ask for as they ask for lights (`kernels/emitters.h`)."""
+
+from __future__ import annotations
+
+from clfractal.renderers.maps import glass_bodies
+from clfractal.renderers.materials import used_materials
+from clfractal.scene.base import Vector
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.maps import Map
+from clfractal.scene.materials import PbrMaterial
+from clfractal.scene.model import Scene
+from clfractal.scene.objects import Solid
+
+
+def asked_radiance(scene: Scene) -> list[Vector | None]:
+    """Of each object the radiance, linear Rec. 709, with which paths ask for it; None where they do not.
+
+    Spheres, boxes and cylinders that stand beside the set are asked for where they shine the same everywhere. What differs
+    from place to place, blends, glass, which shines inside too, and what is joined to the set are found by chance alone.
+    """
+    if not isinstance(scene.lighting, PathLighting):
+        return [None] * len(scene.objects)
+    found: list[Vector | None] = []
+    materials, glass = used_materials(scene)[1:], glass_bodies(scene)[1:]
+    for (name, each), material, through in zip(scene.objects.items(), materials, glass, strict=True):
+        beside = isinstance(each, Solid) and name not in scene.joined
+        found.append(even_radiance(material) if beside and not through else None)
+    return found
+
+
+def even_radiance(material: PbrMaterial) -> Vector | None:
+    """The light of a material that is the same everywhere, linear Rec. 709; None if it is not, or if there is none."""
+    luminance, color = material.emission.luminance, material.emission.color
+    if material.blend is not None or isinstance(luminance, Map) or isinstance(color, Map):
+        return None
+    red, green, blue = color
+    return (luminance * red, luminance * green, luminance * blue) if luminance * max(color) > 0 else None
