@@ -1,10 +1,30 @@
 // Paths of light: at each spot one light is asked for directly, and one direction is followed (Kajiya 1986). What both could have
 // found is weighed by the power heuristic (Veach and Guibas 1995), so neither small lights nor sharp highlights are noise.
 
+#define NEXT_BOUNCE 16u   // from a bounce's purposes to those of the next
+
 INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w, real *u, real *v) {
-    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, purpose + 16u * (uint)s.bounce);
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, purpose + NEXT_BOUNCE * (uint)s.bounce);
     unit_square((bits)((uint)s.sample), seed, u, v);
 }
+
+#if HAS_GLASS_SCATTER
+#include "cloudy.h"
+#endif
+#if HAS_GLASS
+// What a medium does to a path on its way to what it has met: the result says where it scatters it before.
+INLINE mask path_crosses_medium(path *so_far, const carried *with, real far, mask here, world w) {
+    const real way = way_within(with, far, w);
+#if HAS_GLASS_SCATTER
+    const mask scatters = flight_ends(so_far, with, way, here);
+    path_absorbs(so_far, with, way, here & ~is_cloudy(with));
+    return scatters;
+#else
+    path_absorbs(so_far, with, way, here);
+    return here & ~here;
+#endif
+}
+#endif
 
 // One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
 // `behind`: in glass, whether the spot is seen from inside its body.
@@ -83,21 +103,28 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 #endif
 }
 
-// Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set.
-INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, world w) {
+// Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or on the
+// way there a medium `scatters` it.
+INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, mask *scatters, world w) {
     const mask on_path = mask_of(so_far->on_path);
     real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
     lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
     before.met &= on_path;
-    const mask lands = on_path & mask_of(found->found) & ~before.met;
+    mask lands = on_path & mask_of(found->found) & ~before.met;
+    *scatters = on_path & ~on_path;
 #if HAS_GLASS
-    path_absorbs(so_far, with, far, w);
+    *scatters = path_crosses_medium(so_far, with, far, on_path, w);
+    before.met &= ~*scatters;
+    lands &= ~*scatters;
 #endif
     if (s.bounce > 0) {
-        path_ends(so_far, with, &before, on_path & ~lands, picture_y, w);
+        path_ends(so_far, with, &before, on_path & ~lands & ~*scatters, picture_y, w);
     } else {
         so_far->seen = color_pick(before.met, color_mul(before.shows, so_far->through), so_far->seen);
-        spot_of_light(s, found, arrived.origin, arrived.direction, far, before.met);
+        spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), before.met);
+#if HAS_GLASS_SCATTER
+        spot_of_light(s, found, arrived.origin, arrived.direction, with->flight, with->medium, *scatters);
+#endif
     }
     return lands;
 }
@@ -115,9 +142,18 @@ STAGE(scatter_paths) {
     carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
 #if HAS_GLASS
     if (bounce == 0) media_begin(&with, arrived.origin, w);
+#if HAS_GLASS_SCATTER
+    with.flight = (real)(REAL_LARGEST);
+    if (bounce == 0) path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT, mask_of(a.wanted), w);
+#endif
 #endif
     if (bounce > 0) STATE_RECALL(s, with, STATE_CARRIED);
-    const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, w);
+    mask scatters;
+    const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, &scatters, w);
+#if HAS_GLASS_SCATTER
+    path flown = so_far;
+    carried within = with;
+#endif
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
@@ -168,6 +204,20 @@ STAGE(scatter_paths) {
         so_far.footprint = found.cone;
         so_far.spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, a.time, w.view), found.cone);
     }
+#if HAS_GLASS_SCATTER
+    path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
+    if (any_lane(scatters)) {
+        flown.origin = arrived.origin;
+        flown.direction = arrived.direction;
+        flown.footprint = arrived.footprint;
+        flown.spread = arrived.spread;
+        within.density = R(-1.0);
+        path_flies(&flown, &within, scatters);
+        path_scatters(s, &here.at, &flown, &within, scatters, w);
+        so_far = path_pick(scatters, flown, so_far);
+        with = carried_pick(scatters, within, with);
+    }
+#endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
     if (bounce == 1) glance_once(s, so_far.seen);
@@ -201,7 +251,12 @@ STAGE(gather_paths) {
 #endif
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
-    const ray r = {so_far.origin, so_far.direction, R(0.0), (real)(REAL_LARGEST), so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
+#if HAS_GLASS_SCATTER
+    const real far = with.flight;
+#else
+    const real far = (real)(REAL_LARGEST);
+#endif
+    const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS_SET
     const mask within = equal(with.medium, set_body(w));
     send_clipped(s, 1, r, R(0.0), WHICH, mask_of(so_far.on_path) & within, w);
@@ -233,7 +288,9 @@ STAGE(end_paths) {
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
 #if HAS_GLASS
-    path_absorbs(&so_far, &with, far, w);
+    const mask scatters = path_crosses_medium(&so_far, &with, far, on_path, w);
+    on_path &= ~scatters;
+    before.met &= ~scatters;
 #endif
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
 #if HAS_PARTS
