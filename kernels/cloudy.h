@@ -7,6 +7,7 @@
 //
 // No lamp is asked for: the boundary would bend the way to it. So the density of the direction is -1, and all light is met by chance.
 #define MOST_SCATTERINGS 1024   // between two things that a path meets
+#define SOUGHT_BEYOND R(4.0)     // footprints
 #define PURPOSE_TURN 0x10000u   // from the numbers of one scattering to those of the next
 
 INLINE mask is_cloudy(const carried *with) { return less(R(0.0), brightest(with->scatters)); }
@@ -51,6 +52,12 @@ INLINE mask flight_ends(path *so_far, const carried *with, real far, mask here) 
 #undef WEIGHED
     so_far->through = color_pick(here, color_mul(so_far->through, weights), so_far->through);
     return scatters;
+}
+
+// How far a ray is marched for a flight: a surface just before its end is found some footprints beyond it.
+INLINE real flight_sought(const path *so_far, const carried *with, world w) {
+    const real cone = (real)(w.settings->detail) * (so_far->footprint + so_far->spread * with->flight);
+    return fmin(with->flight + SOUGHT_BEYOND * cone, (real)(REAL_LARGEST));
 }
 
 // Brings a path to where it is scattered.

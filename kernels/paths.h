@@ -252,7 +252,7 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
 #if HAS_GLASS_SCATTER
-    const real far = with.flight;
+    const real far = flight_sought(&so_far, &with, w);
 #else
     const real far = (real)(REAL_LARGEST);
 #endif

@@ -329,7 +329,8 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         ),
     ]
     if has_glass_set(scene):
-        within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+        cloudy = {"HAS_GLASS_SCATTER": int(has_cloudy_glass(scene))}
+        within = {**search_defines(scene, plan), **cloudy, "SEARCH": SEARCH_INSIDE, "POLISH": 0}
         texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
     if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
