@@ -77,10 +77,10 @@ class Transmission(Mapped):
     )
     scatter: ReflectanceMap = Field(
         BLACK,
-        description="light that it scatters on the way through `depth`, in mean free paths; needs a `depth`",
+        description="how often light is scattered on the way through `depth`, in the mean; needs a `depth`",
     )
     scatter_anisotropy: ForwardMap = Field(
-        0.0, description="where to: 0 all around, near 1 straight on, below 0 back"
+        0.0, description="where `scatter` sends light: 0 all around, 0.99 straight on, below 0 back"
     )
     dispersion_scale: FractionMap = Field(0.0, description="0: all colours bend alike; 1: by the Abbe number")
     dispersion_abbe_number: AbbeMap = Field(

@@ -35,6 +35,7 @@ kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/objects.h: render/objects render/objects_light
 kernels/media.h: render/glass_objects
 kernels/glass_paths.h: render/glass_paths render/glass_objects
+kernels/cloudy.h: render/cloudy
 kernels/bump.h: render/bump
 kernels/bsdf_bumped.h: render/bumped_materials
 kernels/water.h: render/objects

@@ -216,8 +216,8 @@ def test_what_differs_from_place_to_place_is_that_where_paths_go_in() -> None:
         colors_of(scene(objects, {"m": milk(1.0, scatter=each, **dark)}), 32)[..., 0].mean(axis=1)
         for each in (scatter, [0.9, 0.9, 0.9])
     )
-    assert abs(mixed[4:12] / cloudy[4:12] - 1).max() < 0.05
-    assert (mixed[20:28] < cloudy[20:28] - 0.1).all()
+    assert abs(mixed[4:9] / cloudy[4:9] - 1).max() < 0.05
+    assert (mixed[20:26] < cloudy[20:26] - 0.1).all()
 
 
 @pytest.mark.parametrize(
