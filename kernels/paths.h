@@ -129,6 +129,23 @@ INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found
     return lands;
 }
 
+// What a path carries when it arrives.
+INLINE carried path_carries(stage s, const packet_pixels *at, const path *so_far, vec eye, world w) {
+    carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
+    if (s.bounce > 0) {
+        STATE_RECALL(s, with, STATE_CARRIED);
+        return with;
+    }
+#if HAS_GLASS
+    media_begin(&with, eye, w);
+#if HAS_GLASS_SCATTER
+    with.flight = (real)(REAL_LARGEST);
+    path_sets_out(s, at, so_far, &with, PURPOSE_FLIGHT, mask_of(so_far->on_path), w);
+#endif
+#endif
+    return with;
+}
+
 // The light of the path's present spot: what shines there, what one light brings, and where the path goes on.
 STAGE(scatter_paths) {
     if (IS_BEYOND) return;
@@ -139,20 +156,12 @@ STAGE(scatter_paths) {
     spot found = spot_kept(s.state, bounce, s.stride);
     path so_far;
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
-    carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
-#if HAS_GLASS
-    if (bounce == 0) media_begin(&with, arrived.origin, w);
-#if HAS_GLASS_SCATTER
-    with.flight = (real)(REAL_LARGEST);
-    if (bounce == 0) path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT, mask_of(a.wanted), w);
-#endif
-#endif
-    if (bounce > 0) STATE_RECALL(s, with, STATE_CARRIED);
+    carried with = path_carries(s, &here.at, &so_far, arrived.origin, w);
     mask scatters;
     const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, &scatters, w);
 #if HAS_GLASS_SCATTER
-    path flown = so_far;
-    carried within = with;
+    const path flown = so_far;
+    const carried within = with;
 #endif
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
@@ -206,17 +215,7 @@ STAGE(scatter_paths) {
     }
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
-    if (any_lane(scatters)) {
-        flown.origin = arrived.origin;
-        flown.direction = arrived.direction;
-        flown.footprint = arrived.footprint;
-        flown.spread = arrived.spread;
-        within.density = R(-1.0);
-        path_flies(&flown, &within, scatters);
-        path_scatters(s, &here.at, &flown, &within, scatters, w);
-        so_far = path_pick(scatters, flown, so_far);
-        with = carried_pick(scatters, within, with);
-    }
+    path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, scatters, w);
 #endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);

@@ -329,8 +329,8 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         ),
     ]
     if has_glass_set(scene):
-        cloudy = {"HAS_GLASS_SCATTER": int(has_cloudy_glass(scene))}
-        within = {**search_defines(scene, plan), **cloudy, "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+        within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+        within["HAS_GLASS_SCATTER"] = int(has_cloudy_glass(scene))
         texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
     if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}

@@ -160,7 +160,7 @@ def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> Non
     for each in (1, lanes):
         monkeypatch.setenv("CLFRACTAL_LANES", str(each))
         pictures.append(colors_of(found, 8))
-    assert np.isclose(*pictures, rtol=1e-3, atol=1e-4).mean() > 0.8
+    assert np.isclose(pictures[0], pictures[1], rtol=1e-3, atol=1e-4).mean() > 0.8
     assert abs(pictures[0].mean() / pictures[1].mean() - 1) < 0.01
 
 
@@ -211,7 +211,7 @@ def test_what_differs_from_place_to_place_is_that_where_paths_go_in() -> None:
     """A ball before white that is milk above and only dark below."""
     scatter = {"by": "normal", "palette": [[0, 0, 0], [0, 0, 0], [0.9, 0.9, 0.9], [0.9, 0.9, 0.9]]}
     objects = {"body": {**BODIES["sphere"], "material": "m"}}
-    dark = {"color": [E, E, E], "depth": 0.3}
+    dark: dict[str, Any] = {"color": [E, E, E], "depth": 0.3}
     mixed, cloudy = (
         colors_of(scene(objects, {"m": milk(1.0, scatter=each, **dark)}), 32)[..., 0].mean(axis=1)
         for each in (scatter, [0.9, 0.9, 0.9])
