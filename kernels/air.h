@@ -1,6 +1,5 @@
 // Light that fog scatters towards the eye: for each light and sample one place of the ray, and from there a ray to the light. Where
 // the set is in the way, the fog is dark: shafts of light stand between the shadows.
-#include "phase.h"
 
 // The fog's density at a distance along a ray.
 INLINE real fog_density_at(vec origin, vec direction, real t, __constant const struct Material *m) {
@@ -65,7 +64,7 @@ INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, i
     }
     // A light of intensity 1 is an irradiance of pi.
     const real share = R(3.141592653589793) * found.in.strength * weight
-                       * phase_of(vec_dot(found.in.toward, r.direction), w.material->fog_anisotropy);
+                       * phase_of(vec_dot(found.in.toward, r.direction), (real)(w.material->fog_anisotropy));
     found.light = color_mul(color_splat(w.material->fog_scattering), color_scale(color_splat(light->color), share));
     return found;
 }

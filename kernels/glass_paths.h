@@ -53,23 +53,27 @@ INLINE mask leads_out(vec toward, vec normal, mask leaving) {
 }
 
 // What a medium leaves of light on a way through it.
-INLINE color absorbed(color light, color absorption, real way) {
-    return color_of(light.r * exp(-way * absorption.r), light.g * exp(-way * absorption.g), light.b * exp(-way * absorption.b));
+INLINE color absorbed(color light, color extinction, real way) {
+    return color_of(light.r * exp(-way * extinction.r), light.g * exp(-way * extinction.g), light.b * exp(-way * extinction.b));
+}
+
+// The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.
+INLINE real way_within(const carried *with, real way, world w) {
+    const real most = R(2.0) * (real)(w.settings->bounds_radius);
+    return pick(equal(with->medium, set_body(w)), fmin(way, most), way);
 }
 
 // Lets the medium absorb light on a path's way through it.
-INLINE void path_absorbs(path *so_far, const carried *with, real way, world w) {
-    // The set ends where its bounds do, though its exit may not be found.
-    const real most = R(2.0) * (real)(w.settings->bounds_radius);
-    const real far = pick(equal(with->medium, set_body(w)), fmin(way, most), way);
-    so_far->through = color_pick(less(R(0.0), with->medium), absorbed(so_far->through, with->absorption, far), so_far->through);
+INLINE void path_absorbs(path *so_far, const carried *with, real way, mask here) {
+    here &= less(R(0.0), with->medium);
+    so_far->through = color_pick(here, absorbed(so_far->through, with->extinction, way), so_far->through);
 }
 
 // Lets the glass on the outer side of a boundary absorb the light that was asked for there.
 INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
     const mask through_glass = less(R(0.0), pick(edge.leaving, edge.around, with->medium));
     if (!any_lane(through_glass)) return;
-    const color around = color_pick(edge.leaving, medium_of(edge.around, w).absorption, with->absorption);
+    const color around = color_pick(edge.leaving, medium_of(edge.around, w).extinction, with->extinction);
     with->awaited = color_pick(through_glass, absorbed(with->awaited, around, way), with->awaited);
 }
 
@@ -101,6 +105,10 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     media_enter(with, edge.body, crosses & ~edge.leaving);
     if (!any_lane(crosses)) return;
     const mask enters = crosses & ~edge.leaving & equal(with->medium, edge.body);
-    const color own = absorption_of(p->transmission_color, p->transmission_depth);
-    with->absorption = color_pick(crosses, color_pick(enters, own, medium_of(with->medium, w).absorption), with->absorption);
+    medium next = medium_of(with->medium, w), own = next;
+    own.extinction = absorption_of(p->transmission_color, p->transmission_depth);
+#if HAS_GLASS_SCATTER
+    medium_scatters(&own, p->transmission_scatter, p->transmission_depth, p->transmission_scatter_anisotropy);
+#endif
+    media_found(with, medium_pick(enters, own, next), crosses);
 }

@@ -68,8 +68,9 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     return gathered;
 }
 
-// The first thing that the eye sees here is a light: a spot for depth and coverage, without light of others.
-INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real far, mask met) {
+// The first thing that the eye sees here is a light, or a medium: a spot for depth and coverage, without light of others. `object`: -1
+// for a light, or the number of the medium's.
+INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real far, real object, mask met) {
     if (!any_lane(met) || s.bounce > 0) return;
     sighting first;
     STATE_RECALL(s, first, STATE_SIGHTING);
@@ -80,7 +81,7 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->seen = vec_pick(met, found->point, found->seen);
     found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
 #if HAS_MATTES
-    found->object = pick(met, R(-1.0), found->object);
+    found->object = pick(met, object, found->object);
 #endif
     spot_keep(found, s.state, 0, s.stride);
 }
@@ -94,7 +95,7 @@ INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, wo
     if (!any_lane(met)) return;
     so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(shows, so_far->through)), so_far->seen);
     so_far->on_path = number_of(mask_of(so_far->on_path) & ~met);
-    spot_of_light(s, found, arrived.origin, arrived.direction, far, met);
+    spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), met);
 }
 
 // Adds the light of the path's present spot, or of the sky past it, to what the path has seen.

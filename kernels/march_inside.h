@@ -2,9 +2,10 @@
 // and the inside test alone, then a binary search. What is thinner than a step may be missed.
 //
 // A ray begins where another has met the surface, which may be some footprints before the set: until it is inside its steps grow from
-// a part of a footprint. One that does not find the set there has met a sheet without an inside, and leaves at once.
+// a part of a footprint. One that does not find the set there has met a sheet without an inside, and leaves at once. Where media scatter
+// light, rays begin within the set, too: the first place to test is then the very beginning.
 #define ENTRANCE_REACH R(16.0)      // footprints before the set, at the most ...
-#define ENTRANCE_START R(0.0625)    // ... and the first place to test
+#define ENTRANCE_START R(0.0625)    // ... and the first place to test beyond its beginning
 #define ENTRANCE_GROWTH R(0.5)      // of the way so far
 #define EXIT_TOLERANCE R(0.01)      // of the footprint
 #define EXIT_NEARER R(0.25)         // part of the height over the exit at which the place beyond is looked for next
@@ -21,7 +22,11 @@ typedef struct {
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+#if HAS_GLASS_SCATTER
+    const real start = r.near;
+#else
     const real start = r.near + ENTRANCE_START * (real)(settings->detail) * r.footprint;
+#endif
     m->r = ray_pick(fresh, r, m->r);
     m->active |= fresh;
     m->found = crossing_pick(fresh, nothing_met(r.near), m->found);

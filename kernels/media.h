@@ -7,7 +7,11 @@ INLINE real set_body(world w) { return (real)((scalar)(w.settings->object_count 
 // What a material's own numbers say of a medium: its index, and what it takes away for each unit of the way, in natural logarithms.
 typedef struct {
     real index;
-    color absorption;
+    color extinction;
+#if HAS_GLASS_SCATTER
+    color scatters;    // part of the extinction
+    real anisotropy;
+#endif
 } medium;
 
 INLINE color absorption_of(color left, real depth) {
@@ -18,19 +22,54 @@ INLINE color absorption_of(color left, real depth) {
 #undef ABSORBED
 }
 
+#if HAS_GLASS_SCATTER
+// Lets a medium that takes so much away scatter a part (OpenPBR 1.1, Translucent base): what it absorbs is the rest, raised by the same
+// for all colours where it would be below nothing.
+INLINE void medium_scatters(medium *found, color scatter, real depth, real anisotropy) {
+    const real each = pick(less(R(0.0), depth), R(1.0) / fmax(depth, R(1e-6)), R(0.0));
+    const color scattered = color_scale(scatter, each), taken = found->extinction;
+    const real least_absorbed = fmin(fmin(taken.r - scattered.r, taken.g - scattered.g), taken.b - scattered.b);
+    const real raised = fmax(-least_absorbed, R(0.0));
+#define RAISED(c)                                                                           \
+    found->extinction.c = taken.c + raised;                                                 \
+    found->scatters.c = scattered.c / fmax(found->extinction.c, R(1e-20));
+    RAISED(r)
+    RAISED(g)
+    RAISED(b)
+#undef RAISED
+    found->anisotropy = anisotropy;
+}
+#endif
+
+// Of lanes `here` one medium, of the others another.
+INLINE medium medium_pick(mask here, medium yes, medium no) {
+    for (int i = 0; i < NUMBERS_OF(medium); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
+    return no;
+}
+
 INLINE void medium_of_material(int number, mask here, medium *found, world w) {
     if (!any_lane(here)) return;
     __constant const struct Pbr *material = w.materials + number;
     // A blend is a medium like its first part.
     while (material->blend[0] >= 0) material = w.materials + material->blend[0];
-    found->index = pick(here, (real)(material->specular_ior), found->index);
-    const color taken = absorption_of(color_splat(material->transmission_color), (real)(material->transmission_depth));
-    found->absorption = color_pick(here, taken, found->absorption);
+    const real depth = (real)(material->transmission_depth);
+    medium own;
+    own.index = (real)(material->specular_ior);
+    own.extinction = absorption_of(color_splat(material->transmission_color), depth);
+#if HAS_GLASS_SCATTER
+    const color scatter = color_splat(material->transmission_scatter);
+    medium_scatters(&own, scatter, depth, (real)(material->transmission_scatter_anisotropy));
+#endif
+    *found = medium_pick(here, own, *found);
 }
 
 // The medium of a body, or the open.
 CALLED medium medium_of(real body, world w) {
     medium found = {R(1.0), color_of(R(0.0), R(0.0), R(0.0))};
+#if HAS_GLASS_SCATTER
+    found.scatters = found.extinction;
+    found.anisotropy = R(0.0);
+#endif
     if (!any_lane(less(R(0.0), body))) return found;
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
@@ -57,6 +96,15 @@ INLINE void media_leave(carried *with, real body, mask here) {
     with->under = pick(first | second, R(0.0), with->under);
 }
 
+// Notes what the medium does that a path is in now.
+INLINE void media_found(carried *with, medium found, mask here) {
+    with->extinction = color_pick(here, found.extinction, with->extinction);
+#if HAS_GLASS_SCATTER
+    with->scatters = color_pick(here, found.scatters, with->scatters);
+    with->anisotropy = pick(here, found.anisotropy, with->anisotropy);
+#endif
+}
+
 // The open around the eye, or the glass that it is in.
 INLINE void media_begin(carried *with, vec eye, world w) {
     with->medium = with->under = R(0.0);
@@ -66,7 +114,7 @@ INLINE void media_begin(carried *with, vec eye, world w) {
         if (w.objects[i].glass) media_enter(with, (real)((scalar)(i + 1)), object_holds(w.objects + i, eye));
     }
 #endif
-    with->absorption = medium_of(with->medium, w).absorption;
+    media_found(with, medium_of(with->medium, w), less(R(0.0), R(1.0)));
 }
 
 // A boundary at which a path arrives.

@@ -70,7 +70,12 @@ typedef struct {
     real medium;        // the glass that the path is in, by the number of its body, see media.h; 0: the open
     real under;         // the glass that this one stands in likewise
     real wave;          // its place in the spectrum; below 0 while it has all colours
-    color absorption;   // of the medium, per unit of the way
+    color extinction;   // of the medium: what it absorbs and scatters, per unit of the way
+#if HAS_GLASS_SCATTER
+    color scatters;     // the part of it that is scattered
+    real anisotropy;    // of that, Henyey and Greenstein's g
+    real flight;        // how far the path goes until it is scattered, if nothing is nearer
+#endif
 #endif
 } carried;
 

@@ -18,6 +18,7 @@
 #include "eye.h"
 #include "cones.h"
 #include "sky.h"
+#include "phase.h"
 #include "spot.h"
 #include "pixel_points.h"
 #include "light_places.h"

@@ -38,7 +38,7 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     p->total = weight_of_all(p->origin, R(0.0), w);
     const real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
     const asked a = light_asked(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), R(0.0), numbers, p->total, w);
-    const scalar g = w.settings->anisotropy;
+    const real g = (real)(w.settings->anisotropy);
     const real phase = phase_of(vec_dot(p->direction, a.ray.toward), g);
     color brings = color_scale(a.ray.light, phase * asked_weight(&a, phase));
     const mask asks = here & less(R(0.0), brightest(brings));

@@ -13,7 +13,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
 from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
 from clfractal.scene.base import unit
-from clfractal.scene.blends import Blends, blends_of, is_glass
+from clfractal.scene.blends import Blends, blends_of, is_cloudy, is_glass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.model import Scene
@@ -231,6 +231,11 @@ def has_glass(scene: Scene) -> bool:
 def has_glass_set(scene: Scene) -> bool:
     """Whether paths go through the set."""
     return bool(glass_bodies(scene)[0])
+
+
+def has_cloudy_glass(scene: Scene) -> bool:
+    """Whether anything that paths go through scatters light on the way."""
+    return has_glass(scene) and any(is_cloudy(each, scene.materials) for each in used_materials(scene))
 
 
 def glass_bodies(scene: Scene) -> list[bool]:

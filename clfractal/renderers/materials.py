@@ -46,6 +46,8 @@ PBR = Struct(
         Field("transmission_weight", "real", 0, "part of the body that is glass"),
         Field("transmission_color", "real", 3, "what is left of light after the depth"),
         Field("transmission_depth", "real", 0, "scene units; 0: the colour tints the boundary"),
+        Field("transmission_scatter", "real", 3, "scattered on that way, in mean free paths"),
+        Field("transmission_scatter_anisotropy", "real", 0, "Henyey and Greenstein's g"),
         Field("transmission_dispersion_scale", "real", 0, "0 to 1"),
         Field("transmission_dispersion_abbe_number", "real", 0, "1 or more"),
         Field("first_map", "int", 0, "of the parameters that differ from place to place"),

@@ -30,6 +30,7 @@ from clfractal.renderers.maps import (
     asked_maps,
     bump_numbers,
     has_bump,
+    has_cloudy_glass,
     has_glass,
     has_glass_set,
     map_defines,
@@ -84,8 +85,8 @@ STATE_NUMBERS = 120
 _PARTS_NUMBERS = 15 + 9
 # Of mattes likewise; and each spot's object.
 _MATTE_NUMBERS = 13
-# And of what a path carries through glass.
-_GLASS_NUMBERS = 8
+# And of what a path carries through glass, and more through that which scatters light.
+_GLASS_NUMBERS, _CLOUDY_NUMBERS = 8, 5
 
 Floats = npt.NDArray[np.float32]
 
@@ -169,6 +170,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         **map_defines(scene),
         "HAS_GLASS": int(has_glass(scene)),
         "HAS_GLASS_SET": int(has_glass_set(scene)),
+        "HAS_GLASS_SCATTER": int(has_cloudy_glass(scene)),
         "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
         "HAS_GLOW": int(scene.glow is not None),
     }
@@ -200,6 +202,7 @@ def state_numbers(scene: Scene, plan: Plan) -> int:
     if has_parts(plan):
         more += _PARTS_NUMBERS + 3 * has_bump(scene)
     more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
+    more += _CLOUDY_NUMBERS * has_cloudy_glass(scene)
     return STATE_NUMBERS + 4 * normal_count(scene) + more
 
 
@@ -332,6 +335,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     ]
     if has_glass_set(scene):
         within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+        within["HAS_GLASS_SCATTER"] = int(has_cloudy_glass(scene))
         texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
     if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.scene.maps import Map
-from clfractal.scene.materials import PbrMaterial
+from clfractal.scene.materials import BLACK, PbrMaterial
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +55,13 @@ def is_glass(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
         return any(is_glass(named[name], named) for name in material.blend)
     weight = material.transmission.weight
     return isinstance(weight, Map) or weight > 0
+
+
+def is_cloudy(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
+    """Whether a material, or a part of what it is blended of, scatters light on its way through; likewise."""
+    if material.blend is not None:
+        return any(is_cloudy(named[name], named) for name in material.blend)
+    return is_glass(material, named) and material.transmission.scatter != BLACK
 
 
 def check_blends(named: Mapping[str, PbrMaterial]) -> None:

@@ -6,7 +6,7 @@ from pydantic import Field, Tag
 
 from clfractal.scene.base import Section, chosen_by
 
-MAX_BOUNCES = 64
+MAX_BOUNCES = 256
 
 
 class DirectLighting(Section):

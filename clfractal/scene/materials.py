@@ -14,10 +14,12 @@ StandMap = Annotated[Annotated[Stand, Tag("given")] | Annotated[NumberMap, Tag("
 Depth = Annotated[float, Field(strict=True, ge=0, le=1e6, allow_inf_nan=False)]
 DepthMap = Annotated[Annotated[Depth, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 Abbe = Annotated[float, Field(strict=True, ge=1, le=1000, allow_inf_nan=False)]
+Forward = Annotated[float, Field(strict=True, ge=-0.99, le=0.99)]
+ForwardMap = Annotated[Annotated[Forward, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 AbbeMap = Annotated[Annotated[Abbe, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 HeightMap = Annotated[Annotated[Coordinate, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
 ShineMap = Annotated[Annotated[Color, Tag("given")] | Annotated[ColorMap, Tag("map")], FORM]
-WHITE = (1.0, 1.0, 1.0)
+WHITE, BLACK = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 
 class Base(Mapped):
@@ -73,10 +75,23 @@ class Transmission(Mapped):
     depth: DepthMap = Field(
         0.0, description="way through the set after which light has that colour, scene units"
     )
+    scatter: ReflectanceMap = Field(
+        BLACK,
+        description="how often light is scattered on the way through `depth`, in the mean; needs a `depth`",
+    )
+    scatter_anisotropy: ForwardMap = Field(
+        0.0, description="where `scatter` sends light: 0 all around, 0.99 straight on, below 0 back"
+    )
     dispersion_scale: FractionMap = Field(0.0, description="0: all colours bend alike; 1: by the Abbe number")
     dispersion_abbe_number: AbbeMap = Field(
         20.0, description="the smaller, the farther colours spread: 20 more than any glass, 60 window glass"
     )
+
+    @model_validator(mode="after")
+    def _deep_enough(self) -> Self:
+        if self.scatter != BLACK and self.depth == 0:
+            raise problem("needs a depth above 0: scattering is told for the way through it", "scatter")
+        return self
 
 
 class Emission(Mapped):

@@ -91,7 +91,8 @@ _MORE = {
     "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
     " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5},"
     " bump: {height: {by: iterations, range: [0, 9], curve: [[0, 0], [1, 0.1]]}, width: 0.1}},"
-    " sea: {specular: {ior: 1.3}, transmission: {weight: 1, color: [0.5, 0.8, 0.9], depth: 2}}}\nmaterial: {name: glass}\n"
+    " sea: {specular: {ior: 1.3}, transmission: {weight: 1, color: [0.5, 0.8, 0.9], depth: 2,"
+    " scatter: [0.5, 0.6, 0.8], scatter_anisotropy: 0.4}}}\nmaterial: {name: glass}\n"
     "objects: {sea: {type: water, position: [0, 0, -0.7], material: sea}, floor: {type: plane, position: [0, 0, -1.2]},"
     " ball: {position: [0.5, -0.7, -0.4], radius: 0.5, material: glass}}\n",
     "joined": "coloring: {by: trap, scale: 1, palette: opal}\n"

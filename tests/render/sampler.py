@@ -1,4 +1,4 @@
-"""Runs the functions of `sampling.h` for lists of pixels and numbers."""
+"""Runs the functions of `sampling.h` and `phase.h` for lists of pixels and numbers."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ _TEXT = """\
 #include "lanes.h"
 #include "vectors.h"
 #include "sampling.h"
+#include "phase.h"
 
 INLINE real load_lanes(__global const scalar *from) {
     scalar each[LANES];
@@ -80,6 +81,17 @@ __kernel void shapes(__global const scalar *numbers, __global scalar *result, in
     }
     for (int plane = 0; plane < 20; ++plane) store_lanes(result + plane * n + at, planes[plane]);
 }
+
+__kernel void turns(__global const scalar *numbers, __global scalar *result, int n) {
+    const int at = (int)get_global_id(0) * LANES;
+    numbers += at;
+    const real u = load_lanes(numbers), v = load_lanes(numbers + n), g = load_lanes(numbers + 5 * n);
+    const vec before = vec_of(load_lanes(numbers + 2 * n), load_lanes(numbers + 3 * n), load_lanes(numbers + 4 * n));
+    const vec found = phase_direction(before, u, v, g);
+    const real cosine = phase_cosine(u, g);
+    const real planes[5] = {cosine, phase_of(cosine, g), found.x, found.y, found.z};
+    for (int plane = 0; plane < 5; ++plane) store_lanes(result + plane * n + at, planes[plane]);
+}
 """
 
 _POINTS = """
@@ -124,6 +136,12 @@ class Sampler:
         planes = self._run("shapes", numbers, sum(SHAPES.values()), np.dtype(self.precision).type(width))
         parts = np.split(planes, np.cumsum(list(SHAPES.values()))[:-1])
         return dict(zip(SHAPES, parts, strict=True))
+
+    def turns(self, u: Array, v: Array, before: Array, g: Array) -> tuple[Array, Array, Array]:
+        """Of light from directions (3, n) that a medium scatters: cosines (n,), their densities (n,), directions (3, n)."""
+        numbers = np.stack(np.broadcast_arrays(u, v, *before, g)).astype(self.precision)
+        planes = self._run("turns", numbers, 5)
+        return planes[0], planes[1], planes[2:]
 
     def points(self, x: Array, y: Array, count: int, seed: int = 0) -> Array:
         """Offsets of each pixel's points, shape (count, 2, n)."""

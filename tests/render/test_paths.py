@@ -244,7 +244,7 @@ def test_the_light_of_a_part_is_limited_and_told() -> None:
             {"materials": {"m": {"specular": {"ior": 0.9}}}},
             "materials.m.specular.ior: must be at least 1, got 0.9",
         ),
-        ({"lighting": {"mode": "path", "bounces": 65}}, "lighting.bounces: must be at most 64, got 65"),
+        ({"lighting": {"mode": "path", "bounces": 257}}, "lighting.bounces: must be at most 256, got 257"),
         ({"lighting": {"mode": "direct", "bounces": 3}}, "lighting"),
     ],
 )

@@ -1,0 +1,173 @@
+// Paths of light: at each spot one light is asked for directly, and one direction is followed (Kajiya 1986). What both could have
+// found is weighed by the power heuristic (Veach and Guibas 1995), so neither small lights nor sharp highlights are noise.
+
+#define NEXT_BOUNCE 16u   // from a bounce's purposes to those of the next
+
+INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w, real *u, real *v) {
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, purpose + NEXT_BOUNCE * (uint)s.bounce);
+    unit_square((bits)((uint)s.sample), seed, u, v);
+}
+
+#if HAS_GLASS_SCATTER
+#include "cloudy.h"
+#endif
+#if HAS_GLASS
+// What a medium does to a path on its way to what it has met: the result says where it scatters it before.
+INLINE mask path_crosses_medium(path *so_far, const carried *with, real far, mask here, world w) {
+    const real way = way_within(with, far, w);
+#if HAS_GLASS_SCATTER
+    const mask scatters = flight_ends(so_far, with, way, here);
+    path_absorbs(so_far, with, way, here & ~is_cloudy(with));
+    return scatters;
+#else
+    path_absorbs(so_far, with, way, here);
+    return here & ~here;
+#endif
+}
+#endif
+
+// One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
+// `behind`: in glass, whether the spot is seen from inside its body.
+INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, real own, const bsdf *b, real total, mask behind, world w, color *brings) {
+    real u, v, choice, unused;
+    path_square(s, at, PURPOSE_ASK, w, &u, &v);
+    path_square(s, at, PURPOSE_CHOICE, w, &choice, &unused);
+    real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
+#if HAS_SET_LIGHTS
+    path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
+#endif
+    const asked a = light_asked(point, from, b->normal, own, numbers, total, w);
+    light_ray chosen = a.ray;
+    real density;
+    color scattered;
+    scatter_value(b, &chosen.toward, w.albedos, &scattered, &density);
+    *brings = color_scale(color_mul(scattered, chosen.light), asked_weight(&a, density));
+    mask dark = ~less(R(0.0), brightest(*brings));
+#if HAS_GLASS
+    // A body hides what is behind its surface.
+    dark |= ~leads_out(chosen.toward, SURFACE_NORMAL(b), behind);
+#endif
+    *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
+    // What nothing can block needs no march.
+    chosen.distance = pick(~a.unblocked & ~dark, chosen.distance, R(-1.0));
+    return chosen;
+}
+
+// Goes on in a direction that the surface chooses, unless Russian roulette ends the path (Arvo and Kirk 1990).
+INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
+    real u, v, choice, roulette;
+    path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
+    path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
+#if HAS_BUMP
+    real wall, unused;
+    color value;
+    path_square(s, at, PURPOSE_WALL, w, &wall, &unused);
+    so_far->direction = scatter_sample(b, choice, u, v, wall);
+    scatter_value(b, &so_far->direction, w.albedos, &value, &with->density);
+#else
+    so_far->direction = bsdf_sample(b, choice, u, v, &with->density);
+    const color value = bsdf_value(b, so_far->direction, w.albedos);
+#endif
+    mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density);
+    const color part = color_scale(value, R(1.0) / with->density);
+    so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
+    on_path &= less(R(0.0), brightest(so_far->through));
+    if (s.bounce >= w.settings->roulette) {
+        const real stays = fmin(brightest(so_far->through), R(0.95));
+        on_path &= less(roulette, stays);
+        so_far->through = color_pick(on_path, color_scale(so_far->through, R(1.0) / stays), so_far->through);
+    }
+    so_far->on_path = number_of(on_path);
+}
+
+// Adds what a path sees at its end: a lamp, or where it leaves the set what is past it.
+INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mask leaves, real picture_y, world w) {
+    color past = light_past(so_far->direction, picture_y, so_far->origin, with->density, with->total, w);
+    const mask alone = less(with->density, R(0.0));
+    const real share = pick(alone, R(1.0), power_share(with->density, before->weight / with->total * before->density));
+    past = color_pick(before->met, color_scale(before->shows, share), past);
+    const color more = limited(color_mul(past, so_far->through), w.settings);
+    so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
+}
+
+// Adds what a spot shines with by itself.
+INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *here, color light, mask shows, world w) {
+    color more = color_mul(light, so_far->through);
+#if HAS_EMITTERS
+    const real distance = vec_dot(vec_sub(here->seen, so_far->origin), so_far->direction);
+    if (s.bounce > 0) {
+        more = color_scale(more, emitter_share(so_far->origin, so_far->direction, distance, here->object, with->density, with->total, w));
+    }
+#endif
+    if (s.bounce > 0) more = limited(more, w.settings);
+    so_far->seen = color_pick(shows, color_add(so_far->seen, more), so_far->seen);
+}
+
+#if HAS_EMITTERS
+// Adds the light of an object that the last ray of a path has met, as far as the path could also have asked for it.
+INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, encounter last, mask here, world w) {
+    const real number = queue_object(s.q, 0, s.slot, last);
+    const color light = emitter_light(number, w);
+    here &= less(R(0.0), brightest(light));
+    if (!any_lane(here)) return;
+    const real share = emitter_share(so_far->origin, so_far->direction, last.t, number, with->density, with->total, w);
+    const color more = limited(color_mul(color_scale(light, share), so_far->through), w.settings);
+    so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
+}
+#endif
+
+// A spot's material, ready to scatter by the normal `shading`, which is the surface's own, or that of its relief. `behind`: in glass,
+// whether the spot is seen from inside its body.
+INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, vec to_viewer, vec *shading, world w) {
+#if HAS_BUMP
+    bumped_normal(s, here, &behind, &to_viewer, shading, w);
+    bsdf b = bsdf_at(p, *shading, to_viewer, w.albedos);
+    bsdf_lean(&b, here->normal);
+    return b;
+#else
+    return bsdf_at(p, *shading, to_viewer, w.albedos);
+#endif
+}
+
+// Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or on the
+// way there a medium `scatters` it.
+INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, mask *scatters, world w) {
+    const mask on_path = mask_of(so_far->on_path);
+    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+    lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
+    before.met &= on_path;
+    mask lands = on_path & mask_of(found->found) & ~before.met;
+    *scatters = on_path & ~on_path;
+#if HAS_GLASS
+    *scatters = path_crosses_medium(so_far, with, far, on_path, w);
+    before.met &= ~*scatters;
+    lands &= ~*scatters;
+#endif
+    if (s.bounce > 0) {
+        path_ends(so_far, with, &before, on_path & ~lands & ~*scatters, picture_y, w);
+    } else {
+        so_far->seen = color_pick(before.met, color_mul(before.shows, so_far->through), so_far->seen);
+        spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), before.met);
+#if HAS_GLASS_SCATTER
+        spot_of_light(s, found, arrived.origin, arrived.direction, with->flight, with->medium, *scatters);
+#endif
+    }
+    return lands;
+}
+
+// What a path carries when it arrives.
+INLINE carried path_carries(stage s, const packet_pixels *at, const path *so_far, vec eye, world w) {
+    carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
+    if (s.bounce > 0) {
+        STATE_RECALL(s, with, STATE_CARRIED);
+        return with;
+    }
+#if HAS_GLASS
+    media_begin(&with, eye, w);
+#if HAS_GLASS_SCATTER
+    with.flight = (real)(REAL_LARGEST);
+    path_sets_out(s, at, so_far, &with, PURPOSE_FLIGHT, mask_of(so_far->on_path), w);
+#endif
+#endif
+    return with;
+}

@@ -1,0 +1,242 @@
+"""Glass that scatters light (`kernels/cloudy.h`): media keep light, weaken it by Beer and Lambert's law, and are as deep as
+Chandrasekhar's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import yaml
+
+import clfractal
+from clfractal.device.select import choose
+from clfractal.device.tune import accepted_lanes
+from clfractal.errors import SceneError
+from clfractal.files.channels import CHANNELS, NOISY
+from clfractal.renderers.plan import make_plan
+from clfractal.renderers.surface import program_texts
+from tests.render.test_glass_objects import BODIES, colors_of, glass, scene
+from tests.render.test_glass_paths import ball
+from tests.render.test_paths import BALL, BLACK, path, scene_of, seen
+
+Floats = npt.NDArray[np.float64]
+
+WHITE = {"scatter": [1, 1, 1]}
+E = float(np.exp(-1))
+
+
+def milk(ior: float = 1.5, roughness: float = 0, **transmission: Any) -> dict[str, Any]:
+    """A medium that absorbs nothing, unless more is said."""
+    return glass(roughness, ior, **{"depth": 0.5, **WHITE, **transmission})
+
+
+@pytest.mark.parametrize("anisotropy", [0.0, 0.8, -0.5])
+@pytest.mark.parametrize(
+    ("body", "ior"), [("sphere", 1.005), ("sphere", 1.5), ("box", 1.3), ("cylinder", 1.5)]
+)
+def test_milk_before_white_is_not_seen(body: str, ior: float, anisotropy: float) -> None:
+    """Where nothing is absorbed a white furnace stays white."""
+    objects = {"body": {**BODIES[body], "material": "milk"}}
+    found = scene(objects, {"milk": milk(ior, scatter_anisotropy=anisotropy)}, bounces=64)
+    assert abs(colors_of(found, 64).mean() - 1) < 0.01
+
+
+@pytest.mark.parametrize("ior", [1.005, 1.5])
+def test_sets_of_milk_before_white_are_not_seen(ior: float) -> None:
+    """Within a set each scattering is a bounce."""
+    found = ball(0, ior, bounces=64, transmission={"depth": 1.0, "scatter_anisotropy": 0.3, **WHITE})
+    assert abs(seen(found, 64)[0].mean() - 1) < 0.01
+
+
+def test_what_stands_in_milk_before_white_is_not_seen() -> None:
+    """A white ball, a bubble of air's index, and milk in milk; the eye outside and inside."""
+    materials = {
+        "milk": milk(1.3),
+        "cream": milk(1.5, 0.3, depth=0.2),
+        "air": glass(0, 1.0),
+        "white": {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}},
+    }
+    parts = {
+        "milk": {"type": "box", "size": [3, 3, 3], "material": "milk"},
+        "core": {"type": "sphere", "radius": 0.5, "position": [0.6, -0.5, 0.4], "material": "white"},
+        "cream": {"type": "sphere", "radius": 0.6, "position": [-0.7, -0.8, -0.3], "material": "cream"},
+        "bubble": {"type": "sphere", "radius": 0.4, "position": [0.5, -1, -0.7], "material": "air"},
+    }
+    for eye in ([0, 39, 0], [0.1, 42.7, 0.5]):
+        found = scene(parts, materials, camera={"position": eye, "target": [0, 44, 0], "fov": 50}, bounces=64)
+        colors = colors_of(found, 64)
+        assert abs(colors.mean() - 1) < 0.015
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_light_that_is_not_scattered_obeys_beer_and_lambert(precision: str) -> None:
+    """A small lamp behind a slab that bends nothing, of a medium whose colours differ. (Next to nothing is scattered.)"""
+    color, depth, width = np.array([0.7, 0.4, 0.2]), 0.8, 1.2
+    scatter = np.array([0.3, 0.2, 0.9])
+    materials = {
+        "slab": milk(1.0, color=color.tolist(), depth=depth, scatter=scatter.tolist()),
+        "lamp": {"base": {"weight": 0}, "specular": {"weight": 0}, "emission": {"luminance": 1}},
+    }
+    objects = {
+        "slab": {"type": "box", "size": [9, width, 9], "material": "slab"},
+        "lamp": {"type": "sphere", "radius": 3, "position": [0, 40, 0], "material": "lamp"},
+    }
+    colors = colors_of(scene(objects, materials, background=BLACK, bounces=16), 64, precision=precision)
+    # It absorbs some of each colour, so nothing has to be raised.
+    extinction = np.log(1 / color) / depth
+    expected = np.exp(-extinction * width)
+    assert 0 < colors[:4].mean() < 0.002
+    np.testing.assert_allclose(colors[14:18, 14:18].mean(axis=(0, 1)), expected, rtol=0.03, atol=0.001)
+
+
+def depth_function(albedo: float, cosines: Floats) -> Floats:
+    """Chandrasekhar's H for isotropic scattering (Radiative Transfer, 1950, chapter V), at given cosines."""
+    nodes, weights = np.polynomial.legendre.leggauss(48)
+    x, w = (nodes + 1) / 2, weights / 2
+    h = np.ones_like(x)
+    for _ in range(400):
+        h = 1 / (np.sqrt(1 - albedo) + albedo / 2 * (w * x * h / (x[:, None] + x)).sum(axis=1))
+    sums = (w * x * h / (cosines[..., None] + x)).sum(axis=-1)
+    return np.asarray(1 / (np.sqrt(1 - albedo) + albedo / 2 * sums))
+
+
+def test_a_sea_of_milk_is_as_bright_as_chandrasekhars() -> None:
+    """What a half space that bends nothing sends back of a white sky: 1 - H sqrt(1 - albedo), for three albedos at once."""
+    albedo = np.array([0.5, 0.8, 0.95])
+    sea = {"sea": {"type": "plane", "position": [0, 0, -1], "material": "milk"}}
+    materials = {"milk": milk(1.0, color=[E, E, E], depth=1, scatter=albedo.tolist())}
+    camera = {"position": [0, 40, 2], "target": [0, 44, -1], "fov": 30}
+    colors = colors_of(scene(sea, materials, camera=camera, bounces=64), 64)
+    side = ((np.arange(32) + 0.5) / 16 - 1) * np.tan(np.radians(15))
+    right, up = np.meshgrid(side, -side)
+    forward, above = np.array([0, 0.8, -0.6]), np.array([0, 0.6, 0.8])
+    down = -(forward[2] + up * above[2]) / np.sqrt(1 + right**2 + up**2)
+    for channel in range(3):
+        expected = 1 - depth_function(albedo[channel], down) * np.sqrt(1 - albedo[channel])
+        rows = np.abs(colors[..., channel] - expected).reshape(4, -1)
+        assert rows.mean() < 0.1
+        errors = (colors[..., channel] - expected).reshape(4, -1).mean(axis=1)
+        assert np.abs(errors).max() < 0.012
+
+
+def test_walks_and_bounces_agree() -> None:
+    """Where something may be near, each scattering is a bounce; else all until the next boundary are one."""
+    objects = {"body": {**BODIES["sphere"], "material": "jade"}}
+    jade = milk(1.4, color=[0.6, 0.8, 0.5], scatter=[0.7, 0.8, 0.9], scatter_anisotropy=0.4)
+    gradient = {"top": [1, 0.6, 0.2], "bottom": [0.1, 0.2, 0.5]}
+    blocks = []
+    for radius in (1.2, 60):
+        bounds = {"bounds": {"radius": radius}}
+        found = scene(objects, {"jade": jade}, background=gradient, renderer=bounds, bounces=64)
+        blocks.append(colors_of(found, 64).reshape(4, 8, 4, 8, 3).mean(axis=(1, 3)))
+    assert np.ptp(blocks[0]) > 0.2
+    assert np.abs(blocks[0] - blocks[1]).max() < 0.02
+
+
+def test_the_eye_in_milk_sees_milk() -> None:
+    """Where nothing but the medium is before it: all of the picture is covered, and its places are in the medium."""
+    around = {"around": {"type": "sphere", "radius": 6, "position": [0, -4, 0], "material": "fog"}}
+    fog = milk(1.0, color=[E, E, E], depth=0.2, scatter=[0.9, 0.9, 0.9])
+    found = scene(around, {"fog": fog}, bounces=32)
+    film = clfractal.render(found, channels=("R", "A", "Z", "N.Y", "object"))
+    assert film["A"].min() == 1
+    assert 0 < np.median(film["Z"]) < 0.5
+    assert (film["N.Y"] < 0).all()
+    assert (film["object"] == film["object"][0, 0]).mean() > 0.99
+    assert film["object"][0, 0] > 0
+
+
+@pytest.mark.parametrize("lanes", [4, 16])
+def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    if lanes not in accepted_lanes(choose(), "float32"):
+        pytest.skip("the device has no such packets")
+    found = scene(
+        {"body": {**BODIES["box"], "material": "milk"}}, {"milk": milk(color=[0.8, 0.9, 0.7])}, bounces=16
+    )
+    pictures = []
+    for each in (1, lanes):
+        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
+        pictures.append(colors_of(found, 8))
+    assert np.isclose(pictures[0], pictures[1], rtol=1e-3, atol=1e-4).mean() > 0.8
+    assert abs(pictures[0].mean() / pictures[1].mean() - 1) < 0.01
+
+
+def test_parts_of_a_picture_have_its_bits() -> None:
+    found = scene({"body": {**BODIES["box"], "material": "milk"}}, {"milk": milk()}, bounces=8)
+    whole = colors_of(found, 4)
+    part = colors_of(found, 4, region=(8, 12, 10, 9))
+    assert np.array_equal(part, whole[12:21, 8:18])
+
+
+def test_all_that_pixels_keep_has_room() -> None:
+    """Milk with a relief and waves in fog that shines, through a lens, with a glow and all channels."""
+    relief = {"height": {"by": "trap", "curve": [[0, 0], [1, 0.1]]}}
+    found = scene_of(
+        materials={"milk": {**milk(1.5, 0.1, dispersion_scale=1), "bump": relief}},
+        material={"name": "milk"},
+        lighting=path(2),
+        glow={"by": "trap"},
+        fog={"density": 0.05, "scattering": {}},
+        objects={"sea": {"type": "water", "position": [0, 0, -1], "material": "milk"}},
+        lights=[{"direction": [1, 1, -1]}, {"type": "sphere", "position": [3, 0, 3], "radius": 0.2}],
+        coloring={"by": "trap"},
+        camera={"position": [0, -4, 0], "f_number": 4},
+        image={"width": 16, "height": 16},
+    )
+    film = clfractal.render(found, channels=[name for name in CHANNELS if name not in NOISY])
+    assert film["A"].max() == 1
+    assert all(np.isfinite(film[name]).all() for name in CHANNELS if name not in ("Z", *NOISY))
+
+
+def test_scenes_of_clear_glass_do_not_know_it() -> None:
+    """Glass that scatters nothing, and a body that is no glass, have the texts of those without the setting."""
+    texts = []
+    for transmission in (
+        {"weight": 1, "depth": 1},
+        {"weight": 1, "depth": 1, "scatter": [0, 0, 0], "scatter_anisotropy": 0.5},
+    ):
+        found = scene_of(
+            lighting=path(2), materials={"m": {"transmission": transmission}}, material={"name": "m"}
+        )
+        plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
+        texts.append([text.flat.text for text in program_texts(found, plan)])
+        assert "#define HAS_GLASS_SCATTER 0" in texts[-1][1]
+    assert texts[0] == texts[1]
+
+
+def test_what_differs_from_place_to_place_is_that_where_paths_go_in() -> None:
+    """A ball before white that is milk above and only dark below."""
+    scatter = {"by": "normal", "palette": [[0, 0, 0], [0, 0, 0], [0.9, 0.9, 0.9], [0.9, 0.9, 0.9]]}
+    objects = {"body": {**BODIES["sphere"], "material": "m"}}
+    dark: dict[str, Any] = {"color": [E, E, E], "depth": 0.3}
+    mixed, cloudy = (
+        colors_of(scene(objects, {"m": milk(1.0, scatter=each, **dark)}), 32)[..., 0].mean(axis=1)
+        for each in (scatter, [0.9, 0.9, 0.9])
+    )
+    assert abs(mixed[4:9] / cloudy[4:9] - 1).max() < 0.05
+    assert (mixed[20:26] < cloudy[20:26] - 0.1).all()
+
+
+@pytest.mark.parametrize(
+    ("transmission", "message"),
+    [
+        (
+            {"scatter": [0.5, 0.5, 0.5]},
+            "materials.m.transmission.scatter: needs a depth above 0: scattering is told for the way through it",
+        ),
+        ({"scater": [1, 1, 1]}, "materials.m.transmission: unknown key 'scater'; did you mean 'scatter'?"),
+        ({"depth": 1, "scatter": [2, 1, 1]}, "materials.m.transmission.scatter.0: must be at most 1, got 2"),
+        (
+            {"depth": 1, "scatter_anisotropy": 1},
+            "materials.m.transmission.scatter_anisotropy: must be at most 0.99, got 1",
+        ),
+    ],
+)
+def test_what_cannot_be_is_told(transmission: dict[str, Any], message: str) -> None:
+    values = {"version": 1, "formula": BALL, "camera": {}, "materials": {"m": {"transmission": transmission}}}
+    with pytest.raises(SceneError) as caught:
+        clfractal.load_scene(yaml.safe_dump(values))
+    assert message in str(caught.value)
