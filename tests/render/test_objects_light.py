@@ -162,7 +162,7 @@ def test_a_mirror_shows_what_the_mirrored_ray_meets(device: Device) -> None:
         seen = np.isfinite(met(scene, points + 1e-6 * normal, mirrored)[0])
         assert (seen & on_floor).sum() > 60
         expected = np.where(seen[..., None], [3, 1.5, 0], 0)[on_floor]
-        # (Along paths a mirror is a very narrow lobe, which rays at the rim may miss. What it scatters beside is asked for.)
+        # (Along paths a mirror is a very narrow lobe, which rays at the rim may miss; the rest is asked for.)
         near = 0.01 if mode == "direct" else 0.1
         wrong = (np.abs(colors(film)[on_floor] - expected) > near).any(axis=-1)
         assert wrong.sum() <= (3 if mode == "direct" else 12)
