@@ -67,6 +67,11 @@ _OBJECTS = {
     "sea": {"type": "water", "position": [0, 0, -3], "material": "wood"},
     "ball": {"type": "sphere", "position": [3, 0, 0], "radius": 1, "material": "wood"},
 }
+_LAMPS = {
+    "ball": {"type": "sphere", "position": [3, 0, 0], "material": "glow"},
+    "box": {"type": "box", "position": [0, 3, 0], "material": "glow"},
+    "tube": {"type": "cylinder", "position": [0, 0, 3], "material": "glow"},
+}
 _JOINED = {
     "hole": {"type": "sphere", "join": "cut"},
     "drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"},
@@ -96,6 +101,7 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "objects": {
         "": {},
         "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
+        "shining": {"objects": _LAMPS, "materials": {"glow": {"emission": {"luminance": 5}}}},
         "joined": {"objects": _JOINED},
     },
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
