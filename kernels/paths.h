@@ -2,7 +2,6 @@
 // found is weighed by the power heuristic (Veach and Guibas 1995), so neither small lights nor sharp highlights are noise.
 
 #define NEXT_BOUNCE 16u   // from a bounce's purposes to those of the next
-
 INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w, real *u, real *v) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, purpose + NEXT_BOUNCE * (uint)s.bounce);
     unit_square((bits)((uint)s.sample), seed, u, v);
@@ -150,6 +149,7 @@ INLINE carried path_carries(stage s, const packet_pixels *at, const path *so_far
 STAGE(scatter_paths) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
+    if (paths_are_over(s)) return;
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
@@ -231,6 +231,7 @@ STAGE(scatter_paths) {
 STAGE(gather_paths) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
+    if (paths_are_over(s)) return;
     const world w = WORLD;
     path so_far;
     carried with;
@@ -250,10 +251,9 @@ STAGE(gather_paths) {
 #endif
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
+    real far = (real)(REAL_LARGEST);
 #if HAS_GLASS_SCATTER
-    const real far = flight_sought(&so_far, &with, w);
-#else
-    const real far = (real)(REAL_LARGEST);
+    far = flight_sought(&so_far, &with, w);
 #endif
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS_SET
