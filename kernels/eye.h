@@ -94,3 +94,20 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     r.spread = so_far->spread;
     return r;
 }
+
+#if HAS_PATHS
+// Whether all paths of a packet ended at an earlier spot, and no light that they asked for is awaited: nothing is left to do for them.
+// (What is kept says so from the second bounce on, and rays that are not sent stay so.)
+INLINE int paths_are_over(stage s) {
+    if (s.bounce < 2) return 0;
+    path so_far;
+    carried with;
+    spot here;
+    const int on_path = STATE_PATH + (int)(&so_far.on_path - (real *)&so_far), found = STATE_SPOT(s.bounce) + (int)(&here.found - (real *)&here);
+    const int awaited = STATE_CARRIED + (int)(&with.awaited.r - (real *)&with);
+    const int numbers[5] = {on_path, found, awaited, awaited + 1, awaited + 2};
+    mask left = less(R(1.0), R(0.0));
+    for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));
+    return !any_lane(left);
+}
+#endif

@@ -5,6 +5,7 @@
 STAGE(scatter_paths) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
+    if (paths_are_over(s)) return;
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);
@@ -86,6 +87,7 @@ STAGE(scatter_paths) {
 STAGE(gather_paths) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
+    if (paths_are_over(s)) return;
     const world w = WORLD;
     path so_far;
     carried with;
@@ -105,10 +107,9 @@ STAGE(gather_paths) {
 #endif
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
+    real far = (real)(REAL_LARGEST);
 #if HAS_GLASS_SCATTER
-    const real far = flight_sought(&so_far, &with, w);
-#else
-    const real far = (real)(REAL_LARGEST);
+    far = flight_sought(&so_far, &with, w);
 #endif
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS_SET

@@ -124,6 +124,9 @@ INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, real
 STAGE(find_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
+#if HAS_PATHS
+    if (paths_are_over(s)) return;
+#endif
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s.state, s.stride);

@@ -48,6 +48,18 @@ SCENES: dict[str, Scene] = {
     "hast": scene_of(
         {"name": "hast", "iterations": 20}, CAMERA, SIZE, lights=LIGHTS, renderer={"samples": 3}
     ),
+    # Paths are scattered within the set, and beside it.
+    "milk": scene_of(
+        {"name": "quaternion_julia", "iterations": 6},
+        CAMERA,
+        SIZE,
+        lights=LIGHTS,
+        renderer={"samples": 2},
+        lighting={"mode": "path", "bounces": 2},
+        materials={"milk": {"transmission": {"weight": 1, "depth": 0.3, "scatter": [0.9, 0.8, 0.7]}}},
+        material={"name": "milk"},
+        objects={"ball": {"type": "sphere", "position": [0.8, -3, 0.6], "radius": 0.4, "material": "milk"}},
+    ),
     # Rays end while a hit is being proved: what they would find later must not count if others of their packet go on.
     "hast, few steps": scene_of(
         {"name": "hast", "iterations": 20},
