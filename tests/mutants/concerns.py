@@ -36,6 +36,7 @@ kernels/objects.h: render/objects render/objects_light
 kernels/emitter*.h: render/emitter_places render/emitters
 kernels/rectangles.h: render/rectangles render/emitter_places render/light_shapes
 kernels/light_asks.h: render/emitters render/light_shapes render/paths
+kernels/path_ends.h: render/paths render/emitters render/set_lights
 kernels/media.h: render/glass_objects
 kernels/glass_paths.h: render/glass_paths render/glass_objects
 kernels/bump.h: render/bump
