@@ -29,7 +29,7 @@ INLINE real ball_density(__global const struct Object *o, real square, vec direc
     const real sx = EMITTER_SIDE(o, 0), sy = EMITTER_SIDE(o, 1), sz = EMITTER_SIDE(o, 2);
     const vec own = vec_of(direction.x / sx, direction.y / sy, direction.z / sz);
     const real stretch = sqrt(vec_dot(own, own));
-    return R(0.15915494309189535) / (spread * (sx * sy * sz) * (stretch * stretch * stretch));
+    return R(0.15915494309189535) / (spread * (sx * stretch) * (sy * stretch) * (sz * stretch));
 }
 
 INLINE emitter_place ball_place(__global const struct Object *o, vec point, real u, real v) {

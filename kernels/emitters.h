@@ -53,7 +53,7 @@ INLINE real emitter_share(vec origin, vec direction, real distance, real number,
         if (!o->asked || !any_lane(here)) continue;
         const real weight = emitter_weight(o, &origin);
         const real asks = weight / total * emitter_density(o, &origin, &direction, distance);
-        share = pick(here & less(R(0.0), weight), power_share(density, asks), share);
+        share = pick(here & less(R(0.0), weight) & less(R(0.0), asks), power_share(density, asks), share);
     }
     return share;
 }
