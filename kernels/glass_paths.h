@@ -74,7 +74,8 @@ INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
     const mask through_glass = less(R(0.0), pick(edge.leaving, edge.around, with->medium));
     if (!any_lane(through_glass)) return;
     const color around = color_pick(edge.leaving, medium_of(edge.around, w).extinction, with->extinction);
-    with->awaited = color_pick(through_glass, absorbed(with->awaited, around, way), with->awaited);
+    // Lights that throw no shadow have no way to go.
+    with->awaited = color_pick(through_glass, absorbed(with->awaited, around, fmax(way, R(0.0))), with->awaited);
 }
 
 // Over a boundary that is hidden a path goes on as it came.
