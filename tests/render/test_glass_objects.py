@@ -242,3 +242,22 @@ def test_only_lamps_with_a_size_may_stand_in_glass() -> None:
     clfractal.load_scene(yaml.safe_dump({**values, "lights": [{"type": "sphere", "radius": 0.1, **lamp}]}))
     with pytest.raises(SceneError, match=r"lights.0.position: must be outside the object 'ball'"):
         clfractal.load_scene(yaml.safe_dump({**values, "lights": [{"type": "point", **lamp}]}))
+
+
+def test_a_light_without_shadows_is_no_brighter_in_water_that_absorbs() -> None:
+    def seen(color: list[float]) -> float:
+        objects = {
+            "floor": {"type": "plane", "position": [0, 0, -1.5], "material": "floor"},
+            "sea": {"type": "plane", "material": "sea"},
+        }
+        materials = {"sea": glass(ior=1.33, color=color, depth=1), "floor": {"base": {"color": [0.5] * 3}}}
+        lights = [{"direction": [0, 0, -1], "shadow": False}]
+        dark = {"lights": lights, "background": [0, 0, 0], "bounces": 4}
+        found = scene(
+            objects, materials, camera={"position": [0, 41, 3], "target": [0, 44, -1], "fov": 30}, **dark
+        )
+        return float(colors_of(found, 16).mean())
+
+    clear, deep = seen([1, 1, 1]), seen([0.3, 0.3, 0.3])
+    assert clear > 0.02
+    assert deep < 0.6 * clear
