@@ -34,21 +34,21 @@ INLINE void store_whole(__global int *result, int first, mask value) {
     for (int lane = 0; lane < LANES; ++lane) result[first + lane] = each[lane];
 }
 
-#if SOLIDS == 1
 // result: escape counts, then 1 for points that never escaped.
 __kernel void escape_counts(__global const scalar *points, __global int *result, int stride,
                             __constant const struct Orbit *orbit, __constant const scalar *k) {
     if (orbit_cancelled(orbit)) return;
     const int first = (int)get_global_id(0) * LANES;
     const vec point = load_point(points, stride, first);
+#if SOLIDS == 1
     const orbit_counted end = orbit_count(point, equal(R(0.0), R(0.0)), orbit, k);
     store_whole(result, first, end.count);
     store_whole(result, stride + first, -end.inside);
-}
 #endif
+}
 
 // result: the marching distance, the Jacobian's distance, the Jacobian's gradient x, y, z (length 1; inside it is that of |z|
-// after the last application), smooth count, inside, the number of the object that is nearest.
+// after the last application), smooth count, inside; of several solids the number of the object that is nearest.
 __kernel void distances(__global const scalar *points, __global scalar *result, int stride,
                         __constant const struct Orbit *orbit, __constant const scalar *k) {
     if (orbit_cancelled(orbit)) return;
@@ -68,7 +68,5 @@ __kernel void distances(__global const scalar *points, __global scalar *result, 
     store_plane(result, 6 * stride + first, pick(full.end.inside, R(1.0), R(0.0)));
 #if SOLIDS > 1
     store_plane(result, 7 * stride + first, surface.solid);
-#else
-    store_plane(result, 7 * stride + first, R(0.0));
 #endif
 }

@@ -107,14 +107,15 @@ def nearest(
         What is known of the points, and numbers of objects, from 1; 0 is the scene's own formula.
     """
     array = _checked(points)
-    result = np.empty((8, len(array)), precision)
+    planes = 7 if body.scene is None else 8
+    result = np.empty((planes, len(array)), precision)
     _run(body, array, "distances", result, device, lanes, precision, token)
     inside = result[6] > 0
     # Inside the kernel's gradient is that of |z| after the last application; the distance is 0 all around.
     normal = np.where(inside[:, None], 0.0, result[2:5].T)
     step, full, smooth = (result[plane].astype(np.float64) for plane in (0, 1, 5))
     found = Distances(step, full, normal.astype(np.float64), smooth, inside)
-    return found, result[7].astype(np.int64)
+    return found, (result[7] if body.scene is not None else np.zeros(len(array))).astype(np.int64)
 
 
 def program_text(body: Body, lanes: int, precision: Precision) -> FlatText:

@@ -19,7 +19,7 @@ from clfractal.scene.volume import VolumeRenderer
 from clfractal.solids import Body
 from clfractal.voxels import programs
 from clfractal.work import canvas, show
-from tests.portability.pictures import CHANNELS, cases, scene_of
+from tests.portability.pictures import CHANNELS, SIZE, cases, scene_of
 
 Named = tuple[str, FlatText]
 
@@ -108,6 +108,20 @@ def of_grids(count: int, precision: Precision) -> Iterator[Named]:
         recipes += [programs.blocks_recipe("byte"), programs.blocks_recipe("float")]
     for recipe in recipes:
         yield f"{recipe.kernel} {_choices(recipe.defines)}".strip(), programs.program_text(recipe)
+    for recipe in _joined_recipes(count, precision):
+        yield f"{recipe.kernel} {_choices(recipe.defines)} joined", programs.program_text(recipe)
+
+
+def _joined_recipes(count: int, precision: Precision) -> Iterator[programs.Recipe]:
+    """Of several solids that are joined: each kernel that asks them."""
+    for name in ("filled", "counted"):
+        scene = scene_of(name, SIZE)
+        assert isinstance(scene.renderer, VolumeRenderer)
+        body = Body.of(scene)
+        yield programs.fill_recipe(body, scene.renderer, count, precision)
+        yield programs.normals_recipe(body, scene.renderer, count, precision)
+        if name == "filled":
+            yield programs.nodes_recipe(body, count, precision)
 
 
 def _choices(defines: Mapping[str, object]) -> str:
