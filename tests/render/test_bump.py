@@ -366,6 +366,7 @@ def test_white_before_white_is_not_seen(name: str) -> None:
     assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
 
 
+@pytest.mark.combination
 def test_glass_before_white_is_not_seen() -> None:
     steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.1], [1, 0]]}
     glass = {

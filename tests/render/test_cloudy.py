@@ -51,6 +51,7 @@ def test_sets_of_milk_before_white_are_not_seen(ior: float) -> None:
     assert abs(seen(found, 64)[0].mean() - 1) < 0.01
 
 
+@pytest.mark.combination
 def test_what_stands_in_milk_before_white_is_not_seen() -> None:
     """A white ball, a bubble of air's index, and milk in milk; the eye outside and inside."""
     materials = {

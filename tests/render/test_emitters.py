@@ -320,6 +320,7 @@ def test_all_kinds_of_light_add_up(device: Device) -> None:
     assert mean(GLOW, lights=lights, environment=sky) == pytest.approx(sum(parts), rel=0.005)
 
 
+@pytest.mark.combination
 def test_lamps_in_glass_and_under_water(device: Device) -> None:
     """Where glass is in the way only chance finds them; spots in the same glass ask for them, through what it absorbs."""
     clear = {

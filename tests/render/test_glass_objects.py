@@ -150,7 +150,7 @@ def test_what_stands_later_in_the_file_displaces_what_it_overlaps() -> None:
     materials["post"] = {"base": {"color": [0.2, 0.3, 0.9]}, "emission": {"luminance": 0.5}}
 
     def blocks(objects: dict[str, Any]) -> Floats:
-        inner = colors_of(scene({**objects, **behind}, materials), 256)[6:-6, 6:-6]
+        inner = colors_of(scene({**objects, **behind}, materials, bounces=16), 256)[6:-6, 6:-6]
         return np.asarray(inner.reshape(4, 5, 4, 5, 3).mean(axis=(1, 3)))
 
     alone = blocks(one)

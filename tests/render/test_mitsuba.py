@@ -279,12 +279,12 @@ def factor() -> float:
     ("kind", "material", "lights"),
     [
         ("set", "lambert", "sky"),
-        ("set", "lambert", "lamps"),
-        ("set", "metal", "sky"),
-        ("objects", "lambert", "sky"),
+        pytest.param("set", "lambert", "lamps", marks=pytest.mark.combination),
+        pytest.param("set", "metal", "sky", marks=pytest.mark.combination),
+        pytest.param("objects", "lambert", "sky", marks=pytest.mark.combination),
         ("objects", "lambert", "sizes"),
         ("objects", "lambert", "glowing"),
-        ("objects", "metal", "sky"),
+        pytest.param("objects", "metal", "sky", marks=pytest.mark.combination),
     ],
 )
 def test_pictures_agree_with_mitsuba(kind: str, material: str, lights: str, tmp_path: Path) -> None:

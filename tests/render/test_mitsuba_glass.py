@@ -202,7 +202,14 @@ def regions(pictures: Floats) -> Floats:
     return np.asarray(pictures.reshape(len(pictures), REGIONS, each, REGIONS, each, 3).mean(axis=(2, 4)))
 
 
-@pytest.mark.parametrize("ball", BALLS)
+# The others are kinds of these.
+KINDS = ("rough", "core", "rose")
+
+
+@pytest.mark.parametrize(
+    "ball",
+    [*KINDS, *(pytest.param(name, marks=pytest.mark.combination) for name in BALLS if name not in KINDS)],
+)
 def test_balls_of_glass_agree_with_mitsuba(ball: str, tmp_path: Path) -> None:
     from scipy.stats import t
 

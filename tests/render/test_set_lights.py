@@ -198,7 +198,9 @@ def test_the_eye_sees_the_nearest_ball(device: Device) -> None:
     assert not (shoot(hidden, device)["R"] > 0.5).any()
 
 
-@pytest.mark.parametrize("mode", [{}, PATHS], ids=["direct", "path"])
+@pytest.mark.parametrize(
+    "mode", [pytest.param({}, id="direct", marks=pytest.mark.combination), pytest.param(PATHS, id="path")]
+)
 def test_pictures_repeat_for_any_number_of_lanes(device: Device, mode: dict[str, Any]) -> None:
     scene = lit({"count": 300, "radius": 0.01}, 8, **mode)
     one, many = (shoot(scene, device, lanes=lanes)["R"] for lanes in (1, 8))
