@@ -20,19 +20,16 @@ from imgui_bundle import imgui
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import load_scene
 from clfractal.scene.palette import named_table
 from clfractal.scene.palettes import PALETTES
-from clfractal.scene.plane import rotated
 from clfractal.scene.volume import Transfer
 from clfractal.viewer.controls import Controls
 from clfractal.viewer.histogram import BINS, Histogram, HistogramTask, histogram_of
 from clfractal.viewer.motion import Motion
+from clfractal.viewer.panels import device as device_panel
 from clfractal.viewer.panels import (
-    cut_planes,
     differences,
-    objects,
     palette_editor,
     renderer,
     scene_dock,
@@ -41,7 +38,6 @@ from clfractal.viewer.panels import (
     volume,
     widgets,
 )
-from clfractal.viewer.panels import device as device_panel
 from clfractal.viewer.panels.ui import Ui
 from clfractal.work.local import LocalExecutor
 from tests.viewer.panel_harness import INFO, Stage, background, headless, make_ui, screenshot
@@ -401,120 +397,6 @@ def test_settings_of_pacing_take_effect_at_once() -> None:
     device_panel._change(ui, "coarse", False)
     assert ui.settings.frame_rate == 60
     assert (ui.studio.pacing.rate, ui.studio.pacing.coarsest) == (60, 1)
-
-
-# Cut planes
-
-
-def test_a_new_plane_faces_the_camera_and_cuts() -> None:
-    ui, _ = make_ui("scenes/mandelbulb.yaml")
-    assert ui.studio.edit({"cut_planes": [cut_planes._first_plane(ui)]})
-    plane, camera = ui.studio.scene.cut_planes[0], ui.studio.scene.camera
-    away = np.array(camera.position) - np.array(plane.plane.center)
-    assert plane.cut
-    assert away @ np.array(plane.plane.normal) > 0
-
-
-@pytest.mark.parametrize("axis", ["normal", "side", "up", "x", "y", "z"])
-def test_a_plane_is_rotated_by_its_buttons(axis: str) -> None:
-    ui, _ = make_ui("scenes/cut_geode.yaml")
-    ui.size = (1280, 3000)
-    before = ui.studio.scene.cut_planes[0].plane
-    path = "cut_planes.0.plane"
-    places: dict[str, tuple[float, float]] = {}
-    plain = cut_planes._step
-
-    def step(ui: Ui, path: str, label: str, change: Any, about: str = "") -> None:
-        corner = imgui.get_cursor_screen_pos()
-        places[label] = (corner.x + 255, corner.y + 10)
-        plain(ui, path, label, change, about)
-
-    cut_planes._step = step
-    try:
-        stage = Stage(ui, lambda ui: cut_planes.place(ui, path))
-        label = f"Axis {axis}" if axis in "xyz" else f"Own {axis}"
-        stage.click(*places[label])
-    finally:
-        cut_planes._step = plain
-    after = ui.studio.scene.cut_planes[0].plane.placed
-    wanted = rotated(before, axis, 5.0).placed  # type: ignore[arg-type]
-    for name in ("center", "normal", "up"):
-        assert getattr(after, name) == pytest.approx(getattr(wanted, name), abs=1e-12)
-
-
-def test_objects_are_added_given_a_material_and_removed() -> None:
-    ui = opened("scenes/mandelbulb.yaml")
-    ui.size = (1280, 4000)
-    for kind in ("plane", "water", "sphere", "box", "cylinder", "sphere"):
-        objects._add(ui, kind, {"type": kind})
-    assert list(ui.studio.scene.objects) == ["plane", "water", "sphere", "box", "cylinder", "sphere 2"]
-    assert ui.studio.edit({"materials.red": {"base": {"color": [0.7, 0, 0]}}, "objects.box.material": "red"})
-    ui.memory["object"] = "box"
-    before = ui.studio.scene
-    Stage(ui, scene_dock.draw, window=False)
-    assert ui.studio.scene is before
-    # What another renderer cannot show comes back with the surface, at its place.
-    assert renderer.switch(ui, "volume")
-    assert list(ui.studio.scene.objects) == ["plane", "sphere", "box", "cylinder", "sphere 2"]
-    Stage(ui, scene_dock.draw, window=False)
-    assert renderer.switch(ui, "cut_plane")
-    assert list(ui.studio.scene.objects) == ["plane", "sphere", "box", "cylinder", "sphere 2"]
-    Stage(ui, scene_dock.draw, window=False)
-    assert renderer.switch(ui, "surface")
-    assert ui.studio.scene.objects == before.objects
-    assert list(ui.studio.scene.objects) == list(before.objects)
-    assert renderer.switch(ui, "volume")
-    assert ui.studio.edit({"objects.box.position": [0.0, 0.0, 3.0], "objects.cylinder.radius": 0.1})
-    assert renderer.switch(ui, "surface")
-    assert ui.studio.scene.objects["box"].position == (0, 0, 3)
-    assert ui.studio.scene.objects["water"] == before.objects["water"]
-
-
-def test_a_plane_names_the_objects_that_it_cuts() -> None:
-    ui = opened("scenes/mandelbulb.yaml")
-    ui.size = (1280, 4000)
-    for kind in ("box", "water"):
-        objects._add(ui, kind, {"type": kind})
-    assert ui.studio.edit({"cut_planes": [{"cut": True}]})
-    ui.memory["open.cut_planes"] = True
-    Stage(ui, scene_dock.draw, window=False)
-    assert not ui.studio.scene.joined
-    assert ui.studio.edit({"cut_planes.0.objects": ["box"]})
-    assert list(ui.studio.scene.joined) == ["box"]
-    Stage(ui, scene_dock.draw, window=False)
-    assert not ui.studio.edit({"cut_planes.0.objects": ["water"]})
-
-
-def test_a_formula_beside_the_set_is_edited() -> None:
-    ui = opened("scenes/mandelbulb.yaml")
-    ui.size = (1280, 4000)
-    objects._add(ui, "formula", {"type": "formula", "formula": {"name": "mandelbulb", "iterations": 6}})
-    ui.memory["object"] = "formula"
-    before = ui.studio.scene
-    Stage(ui, scene_dock.draw, window=False)
-    assert ui.studio.scene is before
-    path = "objects.formula"
-    assert ui.studio.edit({f"{path}.formula.parameters.power": 5.0, f"{path}.join": "smooth_union"})
-    assert ui.studio.scene.joined_chains["formula"].first.values["power"] == 5
-    Stage(ui, scene_dock.draw, window=False)
-    assert not ui.studio.edit({f"{path}.join": "cut"})
-    assert ui.studio.edit({f"{path}.formula": {"name": "hast", "iterations": 9}})
-    assert renderer.switch(ui, "volume")
-    assert list(ui.studio.scene.joined) == ["formula"]
-
-
-def test_the_cut_alone_and_back() -> None:
-    ui, _ = make_ui("scenes/cut_geode.yaml")
-    shown = ui.studio.scene.cut_planes[0]
-    changes = {
-        "renderer.plane": shown.plane.model_dump(mode="json"),
-        "renderer.colors": shown.colors.model_dump(mode="json"),
-    }
-    assert renderer.switch(ui, "cut_plane", changes)
-    made = ui.studio.scene.renderer
-    assert isinstance(made, CutPlaneRenderer)
-    assert made.plane == shown.plane
-    assert made.colors == shown.colors
 
 
 # What differs
