@@ -66,47 +66,46 @@ class Body:
 
     @property
     def defines(self) -> dict[str, object]:
-        """The defines of its programs."""
-        return {} if self.scene is None else solid_defines(self.scene)
+        """The defines of all programs that ask it, or read what marches have found."""
+        return {"SOLIDS": 1 if self.scene is None else 1 + len(self.scene.joined)}
 
     def texts(
         self, *, files: Sequence[str] = (), defines: Callable[[Chain], Mapping[str, object]] | None = None
     ) -> dict[str, str]:
-        """As `solid_texts`."""
+        """The generated texts of a program that asks it.
+
+        Args:
+            files: what it asks beside `orbit.h`: other kernel files that _JOINED replaces.
+            defines: what these depend on, of each formula.
+        """
+        lines = _lines_of(defines)
         if self.scene is not None:
-            return solid_texts(self.scene, files=files, defines=defines)
-        return {"formula.h": write_formula(self.chain).text}
+            return _joined_texts(self.scene, ("orbit.h", *files), lines)
+        return {"formula.h": lines(self.chain) + write_formula(self.chain).text}
 
     def records(self, precision: Precision) -> Record:
         """The `Orbit` records, shape (solids,)."""
         if self.scene is not None:
-            return np.stack(solid_records(self.scene, precision))
+            return np.stack(_joined_records(self.scene, precision))
         return orbit_record(self.chain, self.iterations, precision, self.bailout).reshape(1)
 
     def constants(self, precision: Precision) -> Record:
         """The constants of all formulas, one after the other."""
-        if self.scene is not None:
-            return solid_constants(self.scene, precision)
-        return np.array(write_formula(self.chain).constants, precision)
+        constants = _Constants()
+        for chain in [self.chain] if self.scene is None else _chains(self.scene):
+            constants.place(write_formula(chain))
+        return np.array(constants.values, precision)
 
 
-def solid_defines(scene: Scene) -> dict[str, object]:
-    """The defines of all programs that march rays, or read what marches have found."""
-    return {"SOLIDS": 1 + len(scene.joined)}
+def _lines_of(defines: Callable[[Chain], Mapping[str, object]] | None) -> Callable[[Chain], str]:
+    """Defines of a formula as text."""
+    if defines is None:
+        return lambda chain: ""
+    return lambda chain: "".join(f"#define {name} {value}\n" for name, value in defines(chain).items())
 
 
-def solid_texts(
-    scene: Scene, *, files: Sequence[str] = (), defines: Callable[[Chain], Mapping[str, object]] | None = None
-) -> dict[str, str]:
-    """The generated texts of a program that asks the scene's formulas.
-
-    Args:
-        files: what it asks beside `orbit.h`: other kernel files that _JOINED replaces.
-        defines: what they depend on, of each formula, where several are joined.
-    """
-    if not scene.joined:
-        return {"formula.h": write_formula(scene.chain).text}
-    names = ("orbit.h", *files)
+def _joined_texts(scene: Scene, names: tuple[str, ...], lines: Callable[[Chain], str]) -> dict[str, str]:
+    """Every text of a formula once, with its number, and kernel files that ask them all in the places of `names`."""
     derivative = all(write_formula(chain).has_derivative for chain in _chains(scene))
     head = [
         *(f"#define SOLID_{kind.upper()} {number}" for kind, number in SOLID_KINDS.items()),
@@ -114,11 +113,10 @@ def solid_texts(
         f"#define JOINS_SMOOTHLY {int(any(each.join == 'smooth_union' for each in scene.joined.values()))}",
         *(f'#include "{header}"' for name in names for header in _HEADERS.get(name, ())),
     ]
-    body = []
-    for number, (text, chain) in enumerate(_texts(scene).items()):
-        own = defines(chain) if defines is not None else {}
-        lines = "".join(f"#define {name} {value}\n" for name, value in own.items())
-        body.append(numbered(lines + text, names, number))
+    body = [
+        numbered(lines(chain) + text, names, number)
+        for number, (text, chain) in enumerate(_texts(scene).items())
+    ]
     each = " ".join(f"DO({number})" for number in range(len(body)))
     tail = [
         f"#define HAS_DERIVATIVE {int(derivative)}",
@@ -138,11 +136,9 @@ def numbered(text: str, after: tuple[str, ...], number: int) -> str:
     return pattern.sub(lambda found: f"{found[0]}_{number}", whole)
 
 
-def solid_records(scene: Scene, precision: Precision) -> list[Record]:
+def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
     """The scene's own formula, and what is joined to it."""
     iterations = scene.formula.iterations
-    if not scene.joined:
-        return [orbit_record(scene.chain, iterations, precision)]
     radius = scene.bounds[1]
     texts = list(_texts(scene))
     constants = _Constants()
@@ -192,16 +188,8 @@ def _ball(scene: Scene) -> Ball:
     return own
 
 
-def solid_constants(scene: Scene, precision: Precision) -> Record:
-    """The constants of all formulas, one after the other."""
-    constants = _Constants()
-    for chain in _chains(scene):
-        constants.place(write_formula(chain))
-    return np.array(constants.values, precision)
-
-
 def _chains(scene: Scene) -> list[Chain]:
-    chains = scene.joined_chains if scene.joined else {}
+    chains = scene.joined_chains
     return [scene.chain, *(chains[name] for name in scene.joined if name in chains)]
 
 

@@ -42,8 +42,6 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
     structs = "".join(struct.c_text() for struct in (VIEW, SAMPLING, ORBIT, PLANE_SETTINGS, ESCAPE_COLORS))
     defines = {
         **pass_defines(plan),
-        # Of several formulas each text has its own.
-        **({} if scene.joined else escape_defines(scene.chain)),
         **body.defines,
         "PALETTE_SIZE": PALETTE_SIZE,
         "SMOOTH": int(renderer.colors.mode == "smooth"),

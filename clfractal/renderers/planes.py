@@ -12,7 +12,6 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
     escape_colors_values,
-    escape_defines,
     escape_palette,
 )
 from clfractal.scene.checks import used_boxes
@@ -59,8 +58,6 @@ def plane_defines(scene: Scene) -> dict[str, object]:
     return {
         "PLANES": plane_count(scene),
         "ESCAPE_COLORS": "__global const struct CutPlane",
-        # Of several formulas each text has its own.
-        **({} if scene.joined else escape_defines(scene.chain)),
     }
 
 

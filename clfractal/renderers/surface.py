@@ -64,7 +64,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
-from clfractal.solids import solid_constants, solid_defines, solid_records, solid_texts
+from clfractal.solids import Body
 
 PALETTE_SIZE = 256
 COLORINGS = {
@@ -106,7 +106,7 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_LENS": 0,
         "HAS_MOTION": 0,
         "HAS_OBJECTS": 0,
-        **solid_defines(scene),
+        **Body.of(scene).defines,
     }
 
 
@@ -164,7 +164,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
         **object_defines(scene),
-        **solid_defines(scene),
+        **Body.of(scene).defines,
         "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
@@ -249,11 +249,11 @@ class SurfaceKernel(TileKernel):
         packed = None
         if surroundings is not None:
             packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
-        on_set = set_lights_of(scene)
+        on_set, body = set_lights_of(scene), Body.of(scene)
         return [
             records.march_record(scene, precision, self.plan.averaged, packed, on_set),
-            np.stack(solid_records(scene, precision)),
-            solid_constants(scene, precision),
+            body.records(precision),
+            body.constants(precision),
             records.material_record(scene, precision, packed),
             records.light_records(scene, precision),
             self._palette(),
@@ -316,7 +316,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
             *(("escape.h",) if "ESCAPE_COLORS" in defines else ()),
         ]
         turns = escape_defines if "escape.h" in files else None
-        generated = {**solid_texts(scene, files=files, defines=turns), **structs}
+        generated = {**Body.of(scene).texts(files=files, defines=turns), **structs}
         return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
 
     points = ("send_points",) if scene.surface.used_points.count > 1 else ()

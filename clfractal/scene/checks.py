@@ -19,7 +19,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_objects
-from clfractal.scene.objects import FormulaObject
+from clfractal.scene.objects import FormulaObject, Simple
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
@@ -309,6 +309,7 @@ def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_AP
             own = [each.own_place(point) for point in points]
             more = _inside_formula(scene.joined_chains[name], min(each.formula.iterations, most), own)
         else:
+            assert isinstance(each, Simple)
             more = [each.holds(point) for point in points]
         if each.join == "cut":
             found = [a and not b for a, b in zip(found, more, strict=True)]

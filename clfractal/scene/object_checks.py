@@ -40,7 +40,9 @@ def _check_named(scene: Scene) -> None:
                 raise SceneError(unknown_name("object", name, tuple(scene.objects)), where)
             each = scene.objects[name]
             if isinstance(each, Level):
-                raise SceneError(f"{name!r} is a {each.type}, which has no end; a flat box can be cut", where)
+                raise SceneError(
+                    f"{name!r} cannot be cut: a {each.type} surface has no end; a flat box can", where
+                )
 
 
 def _check_filled(scene: Scene, renderer: VolumeRenderer | CutPlaneRenderer) -> None:

@@ -1,6 +1,7 @@
 """Objects beside the set: planes, water, spheres, boxes, cylinders and formulas, by name."""
 
 import math
+from abc import abstractmethod
 from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, Field, Tag, model_validator
@@ -56,9 +57,13 @@ class Joined(ObjectBase):
         0.2, description="of a smooth union: how far apart surfaces begin to flow together, scene units"
     )
 
+
+class Simple(Joined):
+    """A body that an equation tells; of a formula only its chain knows what is inside."""
+
+    @abstractmethod
     def holds(self, point: Vector) -> bool:
-        """Whether a point is inside; of a formula only its chain knows."""
-        raise NotImplementedError
+        """Whether a point is inside."""
 
 
 class Level(ObjectBase):
@@ -73,7 +78,7 @@ class Level(ObjectBase):
         return self
 
 
-class PlaneObject(Joined, Level):
+class PlaneObject(Simple, Level):
     """A plane without an end; as a part of the set, all below it."""
 
     tag = "plane"
@@ -168,7 +173,7 @@ class FormulaObject(Joined):
         return (x, y, z), self.scale * radius
 
 
-class Solid(Joined):
+class Solid(Simple):
     """A body with an inside."""
 
     rotation: Angles = Field(
@@ -177,9 +182,9 @@ class Solid(Joined):
     scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
 
     @property
+    @abstractmethod
     def half_sides(self) -> Vector:
         """Of the box around it, along its own axes, before `scale`."""
-        raise NotImplementedError
 
     @property
     def axes(self) -> tuple[Vector, Vector, Vector]:

@@ -239,8 +239,7 @@ def _texts(body: Body, *files: str) -> dict[str, str]:
 
 
 def _body_defines(body: Body, lanes: int, precision: Precision) -> dict[str, object]:
-    own = _turns(body.chain) if body.scene is None else {}  # else each text has its own
-    return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines, **own}
+    return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines}
 
 
 def _turns(chain: Chain) -> dict[str, object]:

@@ -69,11 +69,11 @@ def as_volume(scene: Scene) -> tuple[Scene, Coloring]:
     not support every coloring.
 
     Raises:
-        SceneError: the scene has objects, which grids do not know; at `objects`.
+        SceneError: the scene has an object that cannot be filled, such as water; at its key.
     """
     renderer: Any = scene.renderer if isinstance(scene.renderer, VolumeRenderer) else {"type": "volume"}
     changed = scene.model_copy(update={"renderer": renderer, "coloring": {}, "layout": None})
-    # Else objects would be missing without a word.
+    # Else water would be missing without a word.
     check_objects(changed)
     return changed, scene.coloring
 

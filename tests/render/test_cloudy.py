@@ -9,18 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import yaml
 
 import clfractal
 from clfractal.device.select import choose
 from clfractal.device.tune import accepted_lanes
-from clfractal.errors import SceneError
-from clfractal.files.channels import CHANNELS, NOISY
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
 from tests.render.test_glass_objects import BODIES, colors_of, glass, scene
 from tests.render.test_glass_paths import ball
-from tests.render.test_paths import BALL, BLACK, path, scene_of, seen
+from tests.render.test_paths import BLACK, path, scene_of, seen
 
 Floats = npt.NDArray[np.float64]
 
@@ -172,26 +169,6 @@ def test_parts_of_a_picture_have_its_bits() -> None:
     assert np.array_equal(part, whole[12:21, 8:18])
 
 
-def test_all_that_pixels_keep_has_room() -> None:
-    """Milk with a relief and waves in fog that shines, through a lens, with a glow and all channels."""
-    relief = {"height": {"by": "trap", "curve": [[0, 0], [1, 0.1]]}}
-    found = scene_of(
-        materials={"milk": {**milk(1.5, 0.1, dispersion_scale=1), "bump": relief}},
-        material={"name": "milk"},
-        lighting=path(2),
-        glow={"by": "trap"},
-        fog={"density": 0.05, "scattering": {}},
-        objects={"sea": {"type": "water", "position": [0, 0, -1], "material": "milk"}},
-        lights=[{"direction": [1, 1, -1]}, {"type": "sphere", "position": [3, 0, 3], "radius": 0.2}],
-        coloring={"by": "trap"},
-        camera={"position": [0, -4, 0], "f_number": 4},
-        image={"width": 16, "height": 16},
-    )
-    film = clfractal.render(found, channels=[name for name in CHANNELS if name not in NOISY])
-    assert film["A"].max() == 1
-    assert all(np.isfinite(film[name]).all() for name in CHANNELS if name not in ("Z", *NOISY))
-
-
 def test_scenes_of_clear_glass_do_not_know_it() -> None:
     """Glass that scatters nothing, and a body that is no glass, have the texts of those without the setting."""
     texts = []
@@ -219,25 +196,3 @@ def test_what_differs_from_place_to_place_is_that_where_paths_go_in() -> None:
     )
     assert abs(mixed[4:9] / cloudy[4:9] - 1).max() < 0.05
     assert (mixed[20:26] < cloudy[20:26] - 0.1).all()
-
-
-@pytest.mark.parametrize(
-    ("transmission", "message"),
-    [
-        (
-            {"scatter": [0.5, 0.5, 0.5]},
-            "materials.m.transmission.scatter: needs a depth above 0: scattering is told for the way through it",
-        ),
-        ({"scater": [1, 1, 1]}, "materials.m.transmission: unknown key 'scater'; did you mean 'scatter'?"),
-        ({"depth": 1, "scatter": [2, 1, 1]}, "materials.m.transmission.scatter.0: must be at most 1, got 2"),
-        (
-            {"depth": 1, "scatter_anisotropy": 1},
-            "materials.m.transmission.scatter_anisotropy: must be at most 0.99, got 1",
-        ),
-    ],
-)
-def test_what_cannot_be_is_told(transmission: dict[str, Any], message: str) -> None:
-    values = {"version": 1, "formula": BALL, "camera": {}, "materials": {"m": {"transmission": transmission}}}
-    with pytest.raises(SceneError) as caught:
-        clfractal.load_scene(yaml.safe_dump(values))
-    assert message in str(caught.value)

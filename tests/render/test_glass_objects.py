@@ -55,6 +55,18 @@ def colors_of(found: Scene, samples: int, **options: Any) -> Floats:
     return np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64)
 
 
+def plain_scene(objects: dict[str, Any]) -> dict[str, Any]:
+    """As a file has it, with objects of glass."""
+    return {
+        "version": 1,
+        "formula": BALL,
+        "camera": {},
+        "lighting": {"mode": "path"},
+        "materials": {"glass": glass()},
+        "objects": objects,
+    }
+
+
 @pytest.mark.parametrize("roughness", [0, 0.5])
 @pytest.mark.parametrize("body", BODIES)
 def test_glass_before_white_is_not_seen(body: str, roughness: float) -> None:
@@ -175,11 +187,14 @@ def test_objects_within_a_set_of_glass_are_seen() -> None:
     assert abs(colors[16, 26].mean() - 1) < 0.02
 
 
-def test_all_that_pixels_keep_has_room() -> None:
-    """Glass with a relief and waves in fog that shines, through a lens, with a glow and all channels."""
+@pytest.mark.parametrize(
+    "more", [{}, {"color": [0.9, 0.9, 0.9], "depth": 1, "scatter": [0.8, 0.8, 0.8]}], ids=["clear", "milk"]
+)
+def test_all_that_pixels_keep_has_room(more: dict[str, Any]) -> None:
+    """Glass, clear or not, with a relief and waves in fog that shines, through a lens, with a glow and all channels."""
     relief = {"height": {"by": "trap", "curve": [[0, 0], [1, 0.1]]}}
     found = scene_of(
-        materials={"glass": {**glass(0.1, dispersion_scale=1), "bump": relief}},
+        materials={"glass": {**glass(0.1, dispersion_scale=1, **more), "bump": relief}},
         material={"name": "glass"},
         lighting=path(2),
         glow={"by": "trap"},
@@ -216,28 +231,13 @@ def test_sets_that_are_no_glass_have_no_march_within() -> None:
     ],
 )
 def test_what_cannot_be_is_told(objects: dict[str, Any], message: str) -> None:
-    values = {
-        "version": 1,
-        "formula": BALL,
-        "camera": {},
-        "lighting": {"mode": "path"},
-        "materials": {"glass": glass()},
-        "objects": objects,
-    }
     with pytest.raises(SceneError) as caught:
-        clfractal.load_scene(yaml.safe_dump(values))
+        clfractal.load_scene(yaml.safe_dump(plain_scene(objects)))
     assert message in str(caught.value)
 
 
 def test_only_lamps_with_a_size_may_stand_in_glass() -> None:
-    values = {
-        "version": 1,
-        "formula": BALL,
-        "camera": {},
-        "lighting": {"mode": "path"},
-        "materials": {"glass": glass()},
-        "objects": {"ball": {"type": "sphere", "position": [4, 0, 0], "material": "glass"}},
-    }
+    values = plain_scene({"ball": {"type": "sphere", "position": [4, 0, 0], "material": "glass"}})
     lamp = {"position": [4, 0, 0.2]}
     clfractal.load_scene(yaml.safe_dump({**values, "lights": [{"type": "sphere", "radius": 0.1, **lamp}]}))
     with pytest.raises(SceneError, match=r"lights.0.position: must be outside the object 'ball'"):

@@ -144,6 +144,16 @@ def test_scenes_without_glass_do_not_know_it() -> None:
 @pytest.mark.parametrize(
     ("transmission", "message"),
     [
+        (
+            {"scatter": [0.5, 0.5, 0.5]},
+            "materials.m.transmission.scatter: needs a depth above 0: scattering is told for the way through it",
+        ),
+        ({"scater": [1, 1, 1]}, "materials.m.transmission: unknown key 'scater'; did you mean 'scatter'?"),
+        ({"depth": 1, "scatter": [2, 1, 1]}, "materials.m.transmission.scatter.0: must be at most 1, got 2"),
+        (
+            {"depth": 1, "scatter_anisotropy": 1},
+            "materials.m.transmission.scatter_anisotropy: must be at most 0.99, got 1",
+        ),
         ({"wait": 1}, "materials.m.transmission: unknown key 'wait'; did you mean 'weight'?"),
         ({"weight": 1.5}, "materials.m.transmission.weight: must be at most 1, got 1.5"),
         ({"depth": -1}, "materials.m.transmission.depth: must be at least 0, got -1"),

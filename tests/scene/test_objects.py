@@ -111,7 +111,7 @@ CASES = [
     ),
     (
         "objects: {sea: {type: water}}\ncut_planes: [{cut: true, objects: [§sea]}]",
-        "cut_planes.0.objects.0: 'sea' is a water, which has no end; a flat box can be cut",
+        "cut_planes.0.objects.0: 'sea' cannot be cut: a water surface has no end; a flat box can",
     ),
     (
         "renderer: {type: volume}\nobjects: {sea: {type: §water}}",

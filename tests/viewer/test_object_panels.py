@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ pytest.importorskip("imgui_bundle")
 from imgui_bundle import imgui
 
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.load import load_scene
 from clfractal.scene.plane import rotated
 from clfractal.viewer.panels import cut_planes, objects, renderer, scene_dock
 from clfractal.viewer.panels.ui import Ui
@@ -91,6 +93,12 @@ def test_objects_are_added_given_a_material_and_removed() -> None:
     assert renderer.switch(ui, "surface")
     assert ui.studio.scene.objects["box"].position == (0, 0, 3)
     assert ui.studio.scene.objects["water"] == before.objects["water"]
+    # Another scene does not get what this one has hidden.
+    assert renderer.switch(ui, "volume")
+    ui.studio.open(load_scene(Path("scenes/mandelbulb.yaml")))
+    assert renderer.switch(ui, "volume")
+    assert renderer.switch(ui, "surface")
+    assert not ui.studio.scene.objects
 
 
 def test_a_plane_names_the_objects_that_it_cuts() -> None:

@@ -6,8 +6,8 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from clfractal.scene.object_checks import can_show
 from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined
-from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer.panels import formula, maps, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import plain
@@ -98,7 +98,7 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
         else:
             imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
         about = _ABOUT.get(kind, f"Add a {kind}")
-        possible = room and (kind != "water" or isinstance(ui.studio.scene.renderer, SurfaceRenderer))
+        possible = room and can_show(ui.studio.scene.renderer.type, kind)
         if w.button(_KINDS[kind], icon=theme.PLUS, enabled=possible, about=about):
             _add(ui, kind, {"type": kind, **values})
     w.in_row(4)

@@ -73,11 +73,14 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
 def _objects_of(ui: Ui, kind: str) -> dict[str, Any]:
     """The objects that another renderer shows; those that it does not show come back with one that does."""
     now = {name: plain(each) for name, each in ui.studio.scene.objects.items()}
-    before, hidden = ui.memory.get("renderer.objects", ({}, set()))
+    # Those of another scene, whose history was another one, do not.
+    history, before, hidden = ui.memory.get("renderer.objects", (None, {}, set()))
+    if history is not ui.studio.history:
+        before, hidden = {}, set()
     every = {name: now.get(name, each) for name, each in before.items() if name in now or name in hidden}
     every |= {name: each for name, each in now.items() if name not in every}
     shown = {name: each for name, each in every.items() if can_show(kind, each["type"])}
-    ui.memory["renderer.objects"] = every, every.keys() - shown.keys()
+    ui.memory["renderer.objects"] = ui.studio.history, every, every.keys() - shown.keys()
     return shown
 
 
