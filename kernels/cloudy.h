@@ -68,12 +68,12 @@ INLINE void path_flies(path *so_far, const carried *with, mask here) {
 
 // Whether nothing at all is in the way of a flight, as far as is known here: only the march knows where the set is.
 INLINE mask flight_is_free(const path *so_far, const carried *with, mask here, world w) {
-#if HAS_OBJECTS
+#if HAS_OBJECTS && !HAS_CLOUDS
     here &= less(with->medium, set_body(w)) & less(with->flight, (real)(REAL_LARGEST));
     if (!any_lane(here)) return here;
     ray r = {so_far->origin, so_far->direction, R(0.0), with->flight, so_far->footprint, so_far->spread, RAY_NOTHING_KNOWN};
     real number, far = with->flight;
-    here &= less(with->flight, objects_met(&r, w.objects, w.settings->object_count, &number));
+    here &= less(with->flight, objects_met(&r, w.objects, w.settings->object_count, w.tables, &number));
     here &= ~lamp_met(r.origin, r.direction, 0, &far, w).met;
     return here & ~ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
 #else
@@ -106,16 +106,6 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
         here &= on_path;
         path_sets_out(s, at, so_far, with, PURPOSE_FLIGHT + NEXT_BOUNCE + more, here, w);
     }
-}
-
-INLINE path path_pick(mask here, path yes, path no) {
-    for (int i = 0; i < NUMBERS_OF(path); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
-    return no;
-}
-
-INLINE carried carried_pick(mask here, carried yes, carried no) {
-    for (int i = 0; i < NUMBERS_OF(carried); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
-    return no;
 }
 
 // Follows paths that a medium `scatters` on their way: what they were when they arrived is `flown` and `within`.

@@ -57,7 +57,7 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask 
     real number = R(0.0), met = (real)(REAL_LARGEST);
     __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
     if (any_lane(wanted)) {
-        const real nearest = objects_met(&r, w.objects, w.settings->object_count, &number);
+        const real nearest = objects_met(&r, w.objects, w.settings->object_count, w.tables, &number);
         met = pick(wanted, nearest, met);
     }
     lanes_store(met, at + RAY_OBJECT * s.q.stride);

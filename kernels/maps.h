@@ -70,7 +70,7 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
     const mask beside_set = ~of_the_set(there->object, w);
     if (any_lane(beside_set)) {
         const vec down = vec_scale(there->normal, R(-1.0));
-        const vec own = objects_normal(&there->point, &down, there->object, w.objects, w.settings->object_count);
+        const vec own = objects_normal(&there->point, &down, there->object, w.objects, w.settings->object_count, w.tables);
         *normal = vec_pick(beside_set, own, *normal);
         *smooth = pick(beside_set, there->smooth, *smooth);
     }

@@ -140,7 +140,7 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
         if (!w.objects[i].glass || !any_lane(this_one)) continue;
         glass |= this_one;
         // The spot's normal is towards the viewer.
-        found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen), here->normal), R(0.0));
+        found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen, w.tables), here->normal), R(0.0));
     }
 #endif
     found.around = pick(equal(with->medium, found.body), with->under, with->medium);

@@ -55,7 +55,7 @@ INLINE span span_of_tube(vec from, vec way) {
 INLINE span object_span(__global const struct Object *o, vec origin, vec direction) {
     const vec from = object_own(o, vec_sub(origin, vec_splat(o->middle))), way = object_own(o, direction);
     if (o->kind == OBJECT_SPHERE) return span_of_ball(from, way);
-    if (o->kind == OBJECT_BOX) {
+    if (o->kind == OBJECT_BOX || o->kind == OBJECT_VOLUME || o->kind == OBJECT_CLOUD) {
         return span_of_both(span_of_both(span_of_slab(from.x, way.x), span_of_slab(from.y, way.y)), span_of_slab(from.z, way.z));
     }
     if (o->kind == OBJECT_CYLINDER) return span_of_both(span_of_tube(from, way), span_of_slab(from.z, way.z));
@@ -71,12 +71,21 @@ INLINE real span_first(span s) {
     return pick(less(s.entry, s.exit) & less(R(0.0), first), first, (real)(REAL_LARGEST));
 }
 
+#if HAS_LEVELS || HAS_CLOUDS
+#include "object_grids.h"
+#endif
+
+// Objects with a boundary that an equation tells at once.
+INLINE int is_met_by_span(__global const struct Object *o) {
+    return o->kind != OBJECT_WATER && o->kind != OBJECT_JOINED && o->kind != OBJECT_VOLUME && o->kind != OBJECT_CLOUD;
+}
+
 // The nearest object that a ray meets before its `far`: how far it is, or the largest number; and its number from 1, or 0.
-CALLED real objects_met(const ray *r, __global const struct Object *objects, int count, real *number) {
+CALLED real objects_met(const ray *r, __global const struct Object *objects, int count, __global const float *tables, real *number) {
     real nearest = (real)(REAL_LARGEST);
     *number = R(0.0);
     for (int i = 0; i < count; ++i) {
-        if (objects[i].kind == OBJECT_WATER || objects[i].kind == OBJECT_JOINED) continue;
+        if (!is_met_by_span(objects + i)) continue;
         const real t = span_first(object_span(objects + i, r->origin, r->direction));
         const mask here = less(t, nearest) & less(t, r->far);
         nearest = pick(here, t, nearest);
@@ -93,11 +102,21 @@ CALLED real objects_met(const ray *r, __global const struct Object *objects, int
         *number = pick(here, (real)((scalar)(i + 1)), *number);
     }
 #endif
+#if HAS_LEVELS
+    // So are values on grids.
+    for (int i = 0; i < count; ++i) {
+        if (objects[i].kind != OBJECT_VOLUME) continue;
+        const real t = level_met(objects + i, tables, r->origin, r->direction, fmin(nearest, r->far));
+        const mask here = less(t, nearest) & less(t, r->far);
+        nearest = pick(here, t, nearest);
+        *number = pick(here, (real)((scalar)(i + 1)), *number);
+    }
+#endif
     return nearest;
 }
 
 // The normal at a place of an object's surface, length 1, away from its inside.
-INLINE vec object_normal(__global const struct Object *o, vec point) {
+INLINE vec object_normal(__global const struct Object *o, vec point, __global const float *tables) {
     const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
     vec n = vec_of(R(0.0), R(0.0), R(1.0));
     if (o->kind == OBJECT_SPHERE) {
@@ -112,6 +131,14 @@ INLINE vec object_normal(__global const struct Object *o, vec point) {
     }
 #if HAS_WATER
     if (o->kind == OBJECT_WATER) n = water_normal(o, own.x, own.y);
+#endif
+#if HAS_LEVELS
+    if (o->kind == OBJECT_VOLUME) {
+        // What places are rounded to, in units of the box.
+        const real far_out = fmax(fmax(fabs(point.x), fabs(point.y)), fabs(point.z));
+        const scalar thinnest = fmin(fmin(o->sides[0], o->sides[1]), o->sides[2]);
+        n = level_normal(o, tables, own, R(16.0) * (real)(REAL_EPSILON) * (R(1.0) + far_out / (real)(thinnest)));
+    }
 #endif
     // A normal goes from its own units to scene units by the transposed matrix.
     const vec x = vec_scale(vec_splat(o->own_x), n.x), y = vec_scale(vec_splat(o->own_y), n.y);
@@ -136,13 +163,18 @@ INLINE mask object_holds(__global const struct Object *o, vec point) {
 #endif
 
 // The normals of the objects at places of theirs, towards the viewer.
-CALLED vec objects_normal(const vec *point, const vec *direction, real number, __global const struct Object *objects, int count) {
+CALLED vec objects_normal(const vec *point, const vec *direction, real number, __global const struct Object *objects, int count,
+                          __global const float *tables) {
     vec normal = vec_scale(*direction, R(-1.0));
     for (int i = 0; i < count; ++i) {
         const mask here = equal(number, (real)((scalar)(i + 1)));
         if (!any_lane(here)) continue;
-        normal = vec_pick(here, object_normal(objects + i, *point), normal);
+        normal = vec_pick(here, object_normal(objects + i, *point, tables), normal);
     }
+#if HAS_LEVELS
+    // Where values around a place are the same there is none.
+    normal = vec_pick(less(vec_dot(normal, normal), R(0.5)), vec_scale(*direction, R(-1.0)), normal);
+#endif
     const mask away = less(R(0.0), vec_dot(normal, *direction));
     return vec_pick(away, vec_scale(normal, R(-1.0)), normal);
 }

@@ -8,8 +8,24 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
     unit_square((bits)((uint)s.sample), seed, u, v);
 }
 
+#if HAS_GLASS_SCATTER || HAS_CLOUDS
+// Of lanes `here` one path, of the others another; likewise what they carry.
+INLINE path path_pick(mask here, path yes, path no) {
+    for (int i = 0; i < NUMBERS_OF(path); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
+    return no;
+}
+
+INLINE carried carried_pick(mask here, carried yes, carried no) {
+    for (int i = 0; i < NUMBERS_OF(carried); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
+    return no;
+}
+#endif
+
 #if HAS_GLASS_SCATTER
 #include "cloudy.h"
+#endif
+#if HAS_CLOUDS
+#include "clouds.h"
 #endif
 #if HAS_GLASS
 // What a medium does to a path on its way to what it has met: the result says where it scatters it before.
@@ -129,27 +145,48 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 #endif
 }
 
+// What scatters a path before it has met anything.
+typedef struct {
+    mask glass;          // the glass that it is in
+#if HAS_CLOUDS
+    cloud_place cloud;
+#endif
+} scatterer;
+
 // Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or on the
-// way there a medium `scatters` it.
-INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, mask *scatters, world w) {
+// way there something scatters it.
+INLINE mask path_arrives(stage s, const packet_pixels *at, path *so_far, const carried *with, spot *found, ray arrived, real picture_y,
+                         scatterer *by, world w) {
     const mask on_path = mask_of(so_far->on_path);
     real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
     lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
     before.met &= on_path;
     mask lands = on_path & mask_of(found->found) & ~before.met;
-    *scatters = on_path & ~on_path;
-#if HAS_GLASS
-    *scatters = path_crosses_medium(so_far, with, far, on_path, w);
-    before.met &= ~*scatters;
-    lands &= ~*scatters;
+    by->glass = on_path & ~on_path;
+    mask scatters = by->glass;
+#if HAS_CLOUDS
+    by->cloud = path_meets_clouds(s, at, so_far, arrived.origin, arrived.direction, &far, on_path, w);
+    scatters |= by->cloud.met;
 #endif
+#if HAS_GLASS
+    by->glass = path_crosses_medium(so_far, with, far, on_path, w);
+    scatters |= by->glass;
+#endif
+#if HAS_CLOUDS
+    by->cloud.met &= ~by->glass;
+#endif
+    before.met &= ~scatters;
+    lands &= ~scatters;
     if (s.bounce > 0) {
-        path_ends(so_far, with, &before, on_path & ~lands & ~*scatters, picture_y, w);
+        path_ends(so_far, with, &before, on_path & ~lands & ~scatters, picture_y, w);
     } else {
         so_far->seen = color_pick(before.met, color_mul(before.shows, so_far->through), so_far->seen);
         spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), before.met);
 #if HAS_GLASS_SCATTER
-        spot_of_light(s, found, arrived.origin, arrived.direction, with->flight, with->medium, *scatters);
+        spot_of_light(s, found, arrived.origin, arrived.direction, with->flight, with->medium, by->glass);
+#endif
+#if HAS_CLOUDS
+        spot_of_light(s, found, arrived.origin, arrived.direction, by->cloud.t, by->cloud.number, by->cloud.met);
 #endif
     }
     return lands;

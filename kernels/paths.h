@@ -13,9 +13,10 @@ STAGE(scatter_paths) {
     path so_far;
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
     carried with = path_carries(s, &here.at, &so_far, arrived.origin, w);
-    mask scatters;
-    const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, &scatters, w);
-#if HAS_GLASS_SCATTER
+    scatterer by;
+    const mask lands = path_arrives(s, &here.at, &so_far, &with, &found, arrived, a.y, &by, w);
+    mask asking = lands;
+#if HAS_GLASS_SCATTER || HAS_CLOUDS
     const path flown = so_far;
     const carried within = with;
 #endif
@@ -50,6 +51,9 @@ STAGE(scatter_paths) {
         with.total = weight_of_all(so_far.origin, OBJECT_OF(found), w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, OBJECT_OF(found), &b, with.total, behind, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
+#if HAS_CLOUDS
+        with.awaited = color_scale(with.awaited, light_passes_clouds(s, &here.at, so_far.origin, light.toward, light.distance, shows, w));
+#endif
         if (bounce > 0) with.awaited = limited(with.awaited, w.settings);
         asks.origin = so_far.origin;
         asks.direction = light.toward;
@@ -71,16 +75,20 @@ STAGE(scatter_paths) {
     }
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
-    path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, scatters, w);
+    path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, by.glass, w);
+#endif
+#if HAS_CLOUDS
+    path_in_cloud(s, &here.at, &so_far, &with, flown, within, arrived, &by.cloud, &asks, by.cloud.met, w);
+    asking |= by.cloud.met;
 #endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
     if (bounce == 1) glance_once(s, so_far.seen);
 #endif
-    with.awaited = color_pick(lands, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));
+    with.awaited = color_pick(asking, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));
     STATE_KEEP(s, so_far, STATE_PATH);
     STATE_KEEP(s, with, STATE_CARRIED);
-    send_clipped(s, 0, asks, R(0.0), WHETHER, lands & less(R(0.0), asks.far), w);
+    send_clipped(s, 0, asks, R(0.0), WHETHER, asking & less(R(0.0), asks.far), w);
 }
 
 // Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
@@ -142,10 +150,18 @@ STAGE(end_paths) {
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
+#if HAS_CLOUDS
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+    const cloud_place cloud = path_meets_clouds(s, &here.at, &so_far, so_far.origin, so_far.direction, &far, on_path, w);
+#endif
 #if HAS_GLASS
     const mask scatters = path_crosses_medium(&so_far, &with, far, on_path, w);
     on_path &= ~scatters;
     before.met &= ~scatters;
+#endif
+#if HAS_CLOUDS
+    on_path &= ~cloud.met;
+    before.met &= ~cloud.met;
 #endif
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
 #if HAS_EMITTERS

@@ -37,7 +37,7 @@ STAGE(find_faces) {
 #if HAS_OBJECTS
     const ray whole = eye_ray(&a, view);
     real number;
-    bare &= less(face.t, objects_met(&whole, w.objects, settings->object_count, &number));
+    bare &= less(face.t, objects_met(&whole, w.objects, settings->object_count, w.tables, &number));
 #endif
     face.bare = number_of(bare);
     STATE_KEEP(s, face, STATE_FACE);

@@ -40,7 +40,7 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
     const mask here = less(R(0.0), *object);
     if (any_lane(here)) {
         const vec point = vec_along(r.origin, met.t, r.direction);
-        const vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count);
+        const vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count, w.tables);
         met.normal = vec_pick(here, normal, met.normal);
         met.touch = pick(here, met.t, met.touch);
         met.smooth = pick(here, R(0.0), met.smooth);

@@ -1,7 +1,9 @@
 // Paths through a medium: at each place where light is scattered one light is asked for, and one direction followed (Kajiya 1986), both
 // weighed as at surfaces. The colour of the transfer function is the part that is scattered, not absorbed.
 #include "phase.h"
+#include "volume_bounds.h"
 #include "volume_track.h"
+#include "medium_light.h"
 
 // A path while it is followed.
 typedef struct {
@@ -37,10 +39,9 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     wander_square(at, sample, PURPOSE_CHOICE, bounce, w, &choice, &roulette);
     p->total = weight_of_all(p->origin, R(0.0), w);
     const real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
-    const asked a = light_asked(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), R(0.0), numbers, p->total, w);
     const real g = (real)(w.settings->anisotropy);
-    const real phase = phase_of(vec_dot(p->direction, a.ray.toward), g);
-    color brings = color_scale(a.ray.light, phase * asked_weight(&a, phase));
+    asked a;
+    const color brings = medium_asks(p->origin, p->direction, g, numbers, p->total, w, &a);
     const mask asks = here & less(R(0.0), brightest(brings));
     grid_ray to_light;
     real far;
@@ -68,7 +69,7 @@ typedef struct {
 
 // Follows paths from the eye; what is past all is left to the picture's own background.
 INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, int sample, world w, real *looked) {
-    stream random = stream_of(at, w.settings->seed, sample);
+    stream random = stream_of(at, w.settings->seed, PURPOSE_FLIGHT, sample);
     first_met first = {p->on_path & ~p->on_path, vec_of(R(0.0), R(0.0), R(0.0)), vec_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
     for (int bounce = 0; bounce <= w.settings->bounces + 1; ++bounce) {
         if (!any_lane(p->on_path)) break;

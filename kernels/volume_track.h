@@ -1,8 +1,8 @@
 // Unbiased ways through a medium whose density differs from place to place, by a bound of its extinction in each brick: delta tracking
 // (Woodcock et al. 1965) finds where light is scattered, ratio tracking (Novak et al. 2014) what comes through.
 //
-// Lengths are numbers of a grid_ray, which here count sides of a voxel, as extinction does.
-#define NUDGE R(0.002)          // past a brick's side, in sides of a voxel
+// Lengths are numbers of a grid_ray, which here count sides of a voxel, as extinction does. What a ray meets `volume_bounds.h` tells of a
+// grid in bricks, and `clouds.h` of an object: `bound_at`, `value_met` and `extinction_at`.
 #define MOST_FLIGHTS 1000000    // that may end within one ray
 
 // Random numbers of a lane, as many as it needs, whatever the others need.
@@ -11,8 +11,8 @@ typedef struct {
     ints count;
 } stream;
 
-INLINE stream stream_of(const packet_pixels *at, uint seed, int sample) {
-    const bits own = hash_bits(pixel_seed(at->columns, at->rows, seed, PURPOSE_FLIGHT) + (bits)((uint)sample) * 0x9e3779b9u);
+INLINE stream stream_of(const packet_pixels *at, uint seed, uint purpose, int sample) {
+    const bits own = hash_bits(pixel_seed(at->columns, at->rows, seed, purpose) + (bits)((uint)sample) * 0x9e3779b9u);
     stream s;
     s.seed = own;
     s.stride = hash_bits(own ^ 0x68bc21ebu) | 1u;
@@ -26,40 +26,6 @@ INLINE real stream_next(stream *s, mask active) {
     ints_store(s->count, counts);
     s->count -= active;
     return unit_of_bits(hash_bits(hash_bits(s->seed + bits_load(counts) * s->stride) + s->stride));
-}
-
-// The number at which a ray leaves the node of 1 << shift cells around a cell, `side` such nodes on; never past the outermost middles,
-// beyond which their values go on.
-INLINE real axis_left(ints at, ints shift, ints side, ints back, int sides, real per_step, real passed) {
-    const ints edge = (((at >> shift) + (side ^ back) - 2 * back) << shift);
-    const real place = to_reals(edge);
-    const mask inner = less(R(0.0), place) & less(place, (real)((scalar)(sides - 1)));
-    return pick(inner, place * per_step + passed, (real)(REAL_LARGEST));
-}
-
-// What a flight may meet: the bound of its extinction, and where that ends.
-INLINE real bound_at(grid_ray r, real number, mask active, world w, real *until) {
-    const cell c = cell_at(place_of(r, number + NUDGE), w.grid.about);
-    const ints entry = brick_at(c, w.grid);
-    const mask stored = is_stored(entry);
-    const ints digits = (~entry >> r.octant) & 0x010101;
-    const ints side = pick_ints(stored, (ints)(1), (ints)(1) << ((digits | digits >> 7 | digits >> 14) & 7));
-    const ints shift = (ints)(3);
-    const real x = axis_left(c.x, shift, side, r.back[0], w.grid.about->sides[0], r.per_step.x, r.passed.x);
-    const real y = axis_left(c.y, shift, side, r.back[1], w.grid.about->sides[1], r.per_step.y, r.passed.y);
-    const real z = axis_left(c.z, shift, side, r.back[2], w.grid.about->sides[2], r.per_step.z, r.passed.z);
-    const real first = least(x, y);
-    *until = least(first, z);
-    return pick(stored & active, gather_floats(w.bounds, pick_ints(stored, entry, (ints)(0))), R(0.0));
-}
-
-// The value at a place of a ray; 0 in extinction where no brick is stored.
-INLINE mask value_met(grid_ray r, real number, mask active, world w, real *value) {
-    const cell c = cell_at(place_of(r, number), w.grid.about);
-    const ints entry = brick_at(c, w.grid);
-    const mask stored = active & is_stored(entry);
-    *value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
-    return stored;
 }
 
 // The next place at which the medium might do something, before `far`; lanes that reach `far` are no longer `active`. Past a brick's
@@ -90,7 +56,7 @@ INLINE mask track(grid_ray r, real far, mask active, stream *random, world w, re
         if (!any_lane(tries)) continue;
         real here;
         const mask stored = value_met(r, *number, tries, w, &here);
-        const real chance = pick(stored, opacity_of(here, w), R(0.0));
+        const real chance = pick(stored, extinction_at(r, here, w), R(0.0));
 #if HAS_EMISSION
         // One over the bound is how far apart, in the mean, such places are.
         *shines = color_pick(stored, color_add(*shines, color_scale(emission_of(here, w), R(1.0) / bound)), *shines);
@@ -112,7 +78,7 @@ INLINE real track_through(grid_ray r, real far, mask active, stream *random, wor
         const mask tries = flight(r, random, &number, far, &active, w, &bound, looked);
         if (!any_lane(tries)) continue;
         const mask stored = value_met(r, number, tries, w, &here);
-        const real left = fmax(R(1.0) - opacity_of(here, w) / pick(tries, bound, R(1.0)), R(0.0));
+        const real left = fmax(R(1.0) - extinction_at(r, here, w) / pick(tries, bound, R(1.0)), R(0.0));
         through = pick(stored, through * left, through);
         // Russian roulette, which keeps the mean.
         const mask faint = tries & less(through, R(0.1));

@@ -242,6 +242,9 @@ class _Moved:
                 if section.get("file") is not None:
                     section["file"] = self._from_there(section["file"])
         rename_textures(data.get("materials") or {}, self._from_there)
+        for each in (data.get("objects") or {}).values():
+            if each.get("file") is not None:
+                each["file"] = self._from_there(each["file"])
 
     def _from_there(self, file: str) -> str:
         whole = (self.base / file).resolve()

@@ -17,6 +17,7 @@ from clfractal.scene.blends import Blends, blends_of, is_cloudy, is_glass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.model import Scene
+from clfractal.scene.objects import VolumeObject
 
 MAP = Struct(
     "Map",
@@ -242,7 +243,13 @@ def glass_bodies(scene: Scene) -> list[bool]:
     """Whether paths go through the set, then through each object."""
     if not isinstance(scene.lighting, PathLighting):
         return [False] * (1 + len(scene.objects))
-    return [is_glass(material, scene.materials) for material in used_materials(scene)]
+    own, *others = [is_glass(material, scene.materials) for material in used_materials(scene)]
+    # (A cloud has no material of its own, and not the set's either.)
+    named = scene.objects.values()
+    return [
+        own,
+        *(glass and not isinstance(each, VolumeObject) for glass, each in zip(others, named, strict=True)),
+    ]
 
 
 def map_defines(scene: Scene) -> dict[str, object]:

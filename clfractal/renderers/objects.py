@@ -11,14 +11,25 @@ from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.maps import MappedMaterials, glass_bodies
+from clfractal.renderers.object_grids import NO_GRID, ObjectGrids, grid_defines
 from clfractal.renderers.water import WAVES, wave_set
 from clfractal.scene.base import Vector, frame_of, length
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import AXES, AnyObject, FormulaObject, Solid, WaterObject
+from clfractal.scene.object_grids import placed
+from clfractal.scene.objects import AXES, AnyObject, FormulaObject, Solid, VolumeObject, WaterObject
 
-OBJECT_KINDS = {"plane": 0, "water": 1, "sphere": 2, "box": 3, "cylinder": 4, "joined": 5}
+OBJECT_KINDS = {
+    "plane": 0,
+    "water": 1,
+    "sphere": 2,
+    "box": 3,
+    "cylinder": 4,
+    "joined": 5,
+    "volume": 6,
+    "cloud": 7,
+}
 # Roughness up to which a material mirrors sharply in Phong's light, and from which on it does not.
 MIRRORS, DULL = 0.1, 0.4
 _LARGEST_EXPONENT = 1e5
@@ -55,6 +66,16 @@ OBJECT = Struct(
         Field("wave_sharp", "real", 0, "part of the second harmonic"),
         Field("wave_reach", "real", 0, "no wave is higher or deeper, scene units"),
         Field("wave_slope", "real", 0, "no wave is steeper"),
+        Field("grid_sides", "int", 3, "of a volume: voxels along its own axes"),
+        Field("grid", "int", 0, "where its values begin among the tables"),
+        Field("bricks", "int", 0, "likewise the least and the largest value of each brick"),
+        Field("transfer", "int", 0, "likewise a cloud's transfer table"),
+        Field("bounds", "int", 0, "likewise the most extinction in each brick"),
+        Field("voxel", "real", 0, "the least side of a voxel, scene units"),
+        Field("level", "real", 0, "the value at its surface"),
+        Field("value_low", "real", 0, "the first value of the transfer table"),
+        Field("value_range", "real", 0, "one over the width of its values"),
+        Field("anisotropy", "real", 0, "Henyey and Greenstein's g"),
     ],
 )
 
@@ -66,25 +87,32 @@ def object_defines(scene: Scene) -> dict[str, object]:
         "HAS_EMITTERS": int(any(each is not None for each in asked_radiance(scene))),
         "HAS_WATER": int(any(isinstance(each, WaterObject) for each in scene.objects.values())),
         "WAVES": WAVES,
+        **grid_defines(scene),
         **{f"OBJECT_{kind.upper()}": number for kind, number in OBJECT_KINDS.items()},
     }
 
 
-def object_records(scene: Scene, precision: Precision) -> Record:
-    """The objects in their order; one unused record where there are none, since no buffer is empty."""
+def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> Record:
+    """The objects in their order; one unused record where there are none, since no buffer is empty.
+
+    Args:
+        grids_begin: the number of the tables at which the volumes' grids begin.
+    """
+    grids = ObjectGrids(scene)
     numbers = MappedMaterials(scene).blends.roots[1:]
     glass = glass_bodies(scene)[1:]
     rows: list[dict[str, object]] = [
         {
             "material": number,
             "glass": int(through),
-            **_place(each),
+            **_place(scene, each),
             **_look(scene, each),
             **_asked(radiance),
             "colored": int(_has_color(scene, each)),
+            **(grids.fields(name, grids_begin) if isinstance(each, VolumeObject) else NO_GRID),
         }
-        for number, through, radiance, each in zip(
-            numbers, glass, asked_radiance(scene), scene.objects.values(), strict=True
+        for number, through, radiance, (name, each) in zip(
+            numbers, glass, asked_radiance(scene), scene.objects.items(), strict=True
         )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
@@ -106,20 +134,28 @@ def mirrors(scene: Scene) -> bool:
     return any(np.any(look["mirror"]) or np.any(look["mirror_edge"]) for look in looks)
 
 
-def _place(each: AnyObject) -> dict[str, object]:
+def _kind(each: AnyObject) -> str:
+    """The kind of an object, among OBJECT_KINDS."""
+    if isinstance(each, FormulaObject):
+        return "joined"
+    return "cloud" if isinstance(each, VolumeObject) and each.is_cloud else each.type
+
+
+def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
     """Where it is, and its waves."""
     nothing = (0.0,) * WAVES
     row: dict[str, object] = {
-        "kind": OBJECT_KINDS["joined" if isinstance(each, FormulaObject) else each.type],
+        "kind": OBJECT_KINDS[_kind(each)],
         "middle": each.position,
         **dict.fromkeys(("wave_x", "wave_y", "wave_height", "wave_phase"), nothing),
         "sides": (1.0, 1.0, 1.0),
         **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
     }
-    if isinstance(each, Solid):
+    if isinstance(each, (Solid, VolumeObject)):
+        ends = each.axes if isinstance(each, Solid) else placed(each, scene.grids[each.file]).axes
         # The axes stand at right angles: each one's own number is the product with it by its square.
-        axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
-        row["sides"] = tuple(length(axis) for axis in each.axes)
+        axes = [np.array(axis) / np.dot(axis, axis) for axis in ends]
+        row["sides"] = tuple(length(axis) for axis in ends)
     elif isinstance(each, FormulaObject):
         axes = [np.array(axis) for axis in AXES]
     else:

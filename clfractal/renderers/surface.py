@@ -37,6 +37,7 @@ from clfractal.renderers.maps import (
     mapped_materials,
 )
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
+from clfractal.renderers.object_grids import ObjectGrids
 from clfractal.renderers.objects import object_defines, object_records
 from clfractal.renderers.passes import has_mattes, has_parts, pass_defines
 from clfractal.renderers.plan import Plan
@@ -250,6 +251,7 @@ class SurfaceKernel(TileKernel):
         if surroundings is not None:
             packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
         on_set, body = set_lights_of(scene), Body.of(scene)
+        of_maps, tables = self._tables()
         return [
             records.march_record(scene, precision, self.plan.averaged, packed, on_set),
             body.records(precision),
@@ -264,26 +266,31 @@ class SurfaceKernel(TileKernel):
                 else [np.zeros(4, np.float32)] * 2
             ),
             *self._materials(),
+            tables,
             set_light_data(on_set, precision),
-            object_records(self.scene, self.precision),
+            object_records(scene, precision, of_maps),
         ]
 
     def _materials(self) -> list[KernelArgument]:
+        """The materials, the tables of their lobes, and their maps."""
+        no_maps = np.zeros(1, MAP.dtype(self.precision))
         if not isinstance(self.scene.lighting, PathLighting):
-            none = [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32)]
-            return [*none, *self._no_maps()]
+            return [np.zeros(1, PBR.dtype(self.precision)), np.zeros(4, np.float32), no_maps]
         albedos = albedo_tables()
         if has_glass(self.scene):
             albedos = np.concatenate([albedos, glass_tables()])
         found = mapped_materials(self.scene)
         records_of = MappedMaterials(self.scene).records(self.precision)
-        if found is None:
-            return [records_of, albedos, *self._no_maps()]
-        tables = self.resources.kept.once(f"maps {found.key}", found.tables)
-        return [records_of, albedos, found.map_records(self.precision), tables]
+        return [records_of, albedos, no_maps if found is None else found.map_records(self.precision)]
 
-    def _no_maps(self) -> list[KernelArgument]:
-        return [np.zeros(1, MAP.dtype(self.precision)), np.zeros(4, np.float32)]
+    def _tables(self) -> tuple[int, Floats]:
+        """How many numbers the tables of maps have, and these, with the grids of objects behind them."""
+        once, found, grids = self.resources.kept.once, mapped_materials(self.scene), ObjectGrids(self.scene)
+        of_maps = np.zeros(0, np.float32) if found is None else once(f"maps {found.key}", found.tables)
+        if not grids.volumes:
+            return of_maps.size, of_maps if of_maps.size else np.zeros(4, np.float32)
+        key = f"{grids.key} {'' if found is None else found.key}"
+        return of_maps.size, once(key, lambda: np.concatenate([of_maps, grids.data()]))
 
     def _palette(self) -> Floats:
         coloring = self.scene.coloring

@@ -22,26 +22,33 @@ from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, 
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_palettes, plane_records
+from clfractal.renderers.transfer import (
+    MOST_OPACITY,
+    SHINING_RATE,
+    TRANSFER_SIZE,
+    Floats,
+    extinction,
+    medium_table,
+    mixed,
+    table_bounds,
+    transfer_columns,
+    value_limits,
+)
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.sampled import Sampled
-from clfractal.scene.volume import Transfer, VolumeRenderer
+from clfractal.scene.volume import VolumeRenderer
 from clfractal.solids import Body
 from clfractal.voxels.blocks import brick_ranges, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.fill import fill_grid, shows_outside
 from clfractal.voxels.grid import Grid
 
-TRANSFER_SIZE = 1024
 # Shadow rays leave the surface by this many voxels, so that they do not meet the voxel that they start from.
 SHADOW_LIFT = 1.5
-# What is opaque still has a depth, of which its own light comes and into which paths go.
-MOST_OPACITY = 0.9999
-# How often, at least, a ray stops per side of a voxel to see what shines there.
-SHINING_RATE = 0.25
 
 GRID = Struct(
     "Grid",
@@ -77,7 +84,6 @@ VOLUME = Struct(
 )
 
 STRUCTS = (records.VIEW, SAMPLING, records.LIGHT, records.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
-Floats = npt.NDArray[np.float32]
 
 
 def settings_of(scene: Scene) -> VolumeRenderer:
@@ -332,25 +338,7 @@ def brick_bounds(scene: Scene, grid: Grid, ranges: Floats) -> Floats:
     table = transfer_table(scene, value_range(scene, grid))
     most = table[:, 0].astype(np.float64)
     most = np.where((table[:, 4:] > 0).any(axis=1), np.maximum(most, SHINING_RATE), most)
-    # An entry further either way, for what rounding does to a place in the table.
-    with np.errstate(invalid="ignore", over="ignore"):
-        places = (
-            (ranges.astype(np.float64) - float(record["low"])) * float(record["range"]) * (TRANSFER_SIZE - 1)
-        )
-    places = np.clip(np.nan_to_num(places, posinf=np.inf, neginf=-np.inf), 0, TRANSFER_SIZE - 1)
-    first = np.maximum(np.floor(places[:, 0]).astype(int) - 1, 0)
-    last = np.minimum(np.ceil(places[:, 1]).astype(int) + 1, TRANSFER_SIZE - 1)
-    # The largest of 2^k entries from each on; two of these cover any range.
-    levels = [most]
-    while 2 ** len(levels) <= TRANSFER_SIZE:
-        half = 2 ** (len(levels) - 1)
-        before = levels[-1]
-        levels.append(np.maximum(before, np.append(before[half:], np.full(half, before[-1]))))
-    last = np.maximum(last, first)
-    level = np.log2(last - first + 1).astype(int)
-    stacked = np.stack(levels)
-    bounds = np.maximum(stacked[level, first], stacked[level, last + 1 - 2**level])
-    return np.asarray(bounds * (1 + 1e-5), np.float32)
+    return table_bounds(most, ranges, float(record["low"]), float(record["range"]))
 
 
 def full_sample(grid: Grid) -> float:
@@ -379,13 +367,8 @@ def unseen_sample(scene: Scene, grid: Grid) -> float:
 
 def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
     """The values between which the transfer table lies: those of its stops, or of the grid."""
-    transfer = settings_of(scene).transfer
-    stops = [stop.at for part in (transfer.opacity, transfer.color, transfer.emission) for stop in part or ()]
-    if not stops:
-        given = scene.given
-        stops = list(grid.range) if given is None else [given.low, given.high]
-    low, high = min(stops), max(stops)
-    return (low, high) if high > low else (low - 0.5, high + 0.5)
+    given = scene.given
+    return value_limits(settings_of(scene).transfer, grid.range if given is None else (given.low, given.high))
 
 
 def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
@@ -398,36 +381,27 @@ def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
     """
     settings = settings_of(scene)
     transfer = settings.transfer
+    if has_paths(scene) and transfer.opacity is not None:
+        return medium_table(transfer, limits, scene.material.color)
     values = np.linspace(*limits, TRANSFER_SIZE)
     table = np.empty((TRANSFER_SIZE, 4))
     if transfer.opacity is None:
         table[:, 0] = 1.0
     else:
-        opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
+        opacity = mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
         if transfer.emission is not None:
             opacity = np.minimum(opacity, MOST_OPACITY)
-        # An opacity is that of one voxel's side; a step is a part of it (Beer's law). Paths want what it is made of.
-        if has_paths(scene):
-            table[:, 0] = extinction(values, transfer)
-        else:
-            table[:, 0] = 1 - (1 - opacity) ** settings.step
+        # An opacity is that of one voxel's side; a step is a part of it (Beer's law).
+        table[:, 0] = 1 - (1 - opacity) ** settings.step
     if transfer.color is None:
         table[:, 1:] = scene.material.color
     else:
-        table[:, 1:] = _mixed(values, [(stop.at, stop.color) for stop in transfer.color])
+        table[:, 1:] = mixed(values, [(stop.at, stop.color) for stop in transfer.color])
     if transfer.opacity is not None and transfer.emission is not None:
-        shines = _mixed(values, [(stop.at, stop.emission) for stop in transfer.emission])
-        if not has_paths(scene):
-            shines = shines * _shining_length(extinction(values, transfer), settings.step)
+        shines = mixed(values, [(stop.at, stop.emission) for stop in transfer.emission])
+        shines = shines * _shining_length(extinction(values, transfer), settings.step)
         table = np.hstack([table, shines])
     return np.ascontiguousarray(table, np.float32)
-
-
-def extinction(values: npt.NDArray[np.float64], transfer: Transfer) -> npt.NDArray[np.float64]:
-    """Extinction per side of a voxel where a voxel has these values; an opacity of 1 counts as MOST_OPACITY."""
-    assert transfer.opacity is not None
-    opacity = _mixed(values, [(stop.at, (stop.opacity,)) for stop in transfer.opacity])[:, 0]
-    return -np.log1p(-np.minimum(opacity, MOST_OPACITY))
 
 
 def _shining_length(extinctions: npt.NDArray[np.float64], step: float) -> npt.NDArray[np.float64]:
@@ -435,19 +409,6 @@ def _shining_length(extinctions: npt.NDArray[np.float64], step: float) -> npt.ND
     depth = extinctions * step
     length = step * -np.expm1(-depth) / np.where(depth > 0, depth, 1)
     return np.where(depth > 0, length, step)[:, None]
-
-
-def transfer_columns(transfer: Transfer) -> int:
-    """Numbers of the transfer table for one value."""
-    return 4 if transfer.emission is None else 7
-
-
-def _mixed(
-    values: npt.NDArray[np.float64], stops: Sequence[tuple[float, Sequence[float]]]
-) -> npt.NDArray[np.float64]:
-    at = [place for place, _ in stops]
-    columns = zip(*(numbers for _, numbers in stops), strict=True)
-    return np.stack([np.interp(values, at, column) for column in columns], axis=1)
 
 
 def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:

@@ -1,4 +1,4 @@
-"""A grid from a file that a volume scene shows: it is read, turned along the axes, and kept with the scene."""
+"""Grids from files that volume scenes and objects show: they are read, turned along the axes, and kept with the scene."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from clfractal.errors import FileError, Where
 from clfractal.scene.base import Vector
 
 if TYPE_CHECKING:
-    from clfractal.scene.volume import VolumeRenderer
+    from clfractal.scene.volume import Box, VolumeRenderer
 
 _WHERE = Where(path="renderer.file")
 
@@ -47,26 +47,35 @@ class GivenGrid:
 def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
     """The grid of a scene that was loaded from `folder`, in the renderer's box if it has one, else in its own place.
 
-    A grid whose axes are tilted is shown as if they were the axes of space.
-
     Raises:
         FileError: at renderer.file, for a file out of the folder, or whatever is wrong with it.
     """
+    assert renderer.file is not None
+    return read_grid(renderer.file, folder, _WHERE, renderer.box)
+
+
+def read_grid(file: str, folder: Path, where: Where, box: Box | None = None) -> GivenGrid:
+    """The grid of a file beside a scene that was loaded from `folder`, in a box or in its own place.
+
+    A grid whose axes are tilted is shown as if they were the axes of space.
+
+    Raises:
+        FileError: at `where`, for a file out of the folder, or whatever is wrong with it.
+    """
     from clfractal.formulas.catalog import safe_path
 
-    assert renderer.file is not None
-    path = safe_path(renderer.file, folder, _WHERE)
+    path = safe_path(file, folder, where)
     with doing(f"reading {path}"):
-        return _read(renderer, path)
+        return _read(path, where, box)
 
 
-def _read(renderer: VolumeRenderer, path: Path) -> GivenGrid:
+def _read(path: Path, where: Where, box: Box | None) -> GivenGrid:
     from clfractal.files.volume import read_volume
 
     try:
         volume = read_volume(path)
     except FileError as error:
-        raise FileError(error.inside(str(path)), _WHERE, details=error.details) from error
+        raise FileError(error.inside(str(path)), where, details=error.details) from error
     values, directions = volume.values, volume.directions
     # Which axis of space each axis of the array follows most closely, and whether it runs against it.
     order = _order(directions)
@@ -83,12 +92,12 @@ def _read(renderer: VolumeRenderer, path: Path) -> GivenGrid:
         ]
     )
     corner = ends.min(axis=0) - spacing / 2
-    if renderer.box is not None:
+    if box is not None:
         size = spacing * shape
         # As large as fits into the box, in its middle.
-        scale = float((np.array(renderer.box.sides) / size).min())
+        scale = float((np.array(box.sides) / size).min())
         spacing = spacing * scale
-        corner = np.array(renderer.box.center) - spacing * shape / 2
+        corner = np.array(box.center) - spacing * shape / 2
     low, high = _range(values)
     return GivenGrid(values, _vector(corner), _vector(spacing), low, high)
 

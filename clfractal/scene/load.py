@@ -27,6 +27,7 @@ from clfractal.scene.inline import inlined
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.maps import ColorMap, maps_of
 from clfractal.scene.model import Scene
+from clfractal.scene.objects import VolumeObject
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,6 +234,10 @@ def _check_names(scene: Scene) -> None:
             _ = scene.surroundings
     _ = scene.given
     _ = scene.textures
+    if any(isinstance(each, VolumeObject) for each in scene.objects.values()):
+        from clfractal.scene.grid_checks import check_grids
+
+        check_grids(scene)
 
 
 def _check_views(scene: Scene) -> None:

@@ -46,6 +46,7 @@ _SECTIONS = {
     "joined_chains": "objects",
     "surroundings": "environment",
     "given": "renderer",
+    "grids": "objects",
     "textures": "materials",
 }
 
@@ -84,7 +85,9 @@ class Scene(Section):
     environment: Environment | None = None
     fog: Fog | None = None
     glow: Glow | None = None
-    objects: Objects = Field({}, description="planes, water, spheres, boxes, cylinders and formulas by name")
+    objects: Objects = Field(
+        {}, description="planes, water, spheres, boxes, cylinders, formulas and volumes by name"
+    )
     cut_planes: CutPlanes = Field(
         (), description="planes that are shown in the picture or cut the object open"
     )
@@ -239,6 +242,11 @@ class Scene(Section):
             # Other values of materials, as of each frame of a film, show the same pictures.
             if set(texture_files(copied.materials)) <= set(self._read["textures"]):
                 copied._read["textures"] = self._read["textures"]
+        if "objects" in (update or ()) and "grids" in self._read:
+            from clfractal.scene.object_grids import grid_files
+
+            if set(grid_files(copied.objects)) <= set(self._read["grids"]):
+                copied._read["grids"] = self._read["grids"]
         return copied
 
     def __getstate__(self) -> dict[Any, Any]:
@@ -323,6 +331,20 @@ class Scene(Section):
         from clfractal.scene.textures import read_textures
 
         return self.once("textures", lambda: read_textures(self.materials, self.folder))
+
+    @property
+    def grids(self) -> "Mapping[str, GivenGrid]":
+        """The grids of objects that are volumes, by the names of their files; in a loaded scene they have been checked.
+
+        Raises:
+            FileError: a file is missing or no grid; the path says where it is named.
+            SceneError: they have too many values.
+        """
+        from clfractal.scene.object_grids import grid_files, read_grids
+
+        if not grid_files(self.objects):
+            return {}
+        return self.once("grids", lambda: read_grids(self.objects, self.folder))
 
     @property
     def given(self) -> "GivenGrid | None":

@@ -7,7 +7,16 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
 from clfractal.scene.maps import maps_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import MAX_FORMULAS, FormulaObject, Level, PlaneObject, Solid, WaterObject
+from clfractal.scene.objects import (
+    MAX_FORMULAS,
+    MAX_VOLUMES,
+    FormulaObject,
+    Level,
+    PlaneObject,
+    Solid,
+    VolumeObject,
+    WaterObject,
+)
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 
@@ -20,6 +29,7 @@ def check_objects(scene: Scene) -> None:
     if not isinstance(scene.renderer, SurfaceRenderer):
         _check_filled(scene, scene.renderer)
     _check_joined(scene)
+    _check_volumes(scene)
     for name, each in scene.objects.items():
         _check_material(scene, name, each.material)
         if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
@@ -28,7 +38,7 @@ def check_objects(scene: Scene) -> None:
 
 def can_show(renderer: str, kind: str) -> bool:
     """Whether a type of renderer shows objects of a type."""
-    return renderer == "surface" or kind != "water"
+    return renderer == "surface" or kind not in ("water", "volume")
 
 
 def _check_named(scene: Scene) -> None:
@@ -43,6 +53,8 @@ def _check_named(scene: Scene) -> None:
                 raise SceneError(
                     f"{name!r} cannot be cut: a {each.type} surface has no end; a flat box can", where
                 )
+            if isinstance(each, VolumeObject):
+                raise SceneError(f"{name!r} cannot be cut: it is a volume, which no plane opens", where)
 
 
 def _check_filled(scene: Scene, renderer: VolumeRenderer | CutPlaneRenderer) -> None:
@@ -54,6 +66,35 @@ def _check_filled(scene: Scene, renderer: VolumeRenderer | CutPlaneRenderer) -> 
             raise SceneError(
                 f"cannot be water with renderer {renderer.type}: its waves have no end; {{type: plane}} can",
                 Where(path=f"objects.{name}.type"),
+            )
+        if isinstance(each, VolumeObject):
+            raise SceneError(
+                f"cannot be volume with renderer {renderer.type}: its values are in a file, not in a formula; use the"
+                " surface renderer",
+                Where(path=f"objects.{name}.type"),
+            )
+
+
+def _check_volumes(scene: Scene) -> None:
+    """How many there may be, and what clouds need."""
+    volumes = {name: each for name, each in scene.objects.items() if isinstance(each, VolumeObject)}
+    if len(volumes) > MAX_VOLUMES:
+        raise SceneError(
+            f"at most {MAX_VOLUMES} objects can be volumes, and this is one more",
+            Where(path=f"objects.{list(volumes)[MAX_VOLUMES]}.type"),
+        )
+    for name, each in volumes.items():
+        if not each.is_cloud:
+            continue
+        if not isinstance(scene.lighting, PathLighting):
+            raise SceneError(
+                "makes a cloud, which needs lighting.mode: path; without it a surface at `level` is shown",
+                Where(path=f"objects.{name}.transfer.opacity"),
+            )
+        if scene.fog is not None and scene.fog.scattering is not None:
+            raise SceneError(
+                f"cannot be combined with a cloud, objects.{name}; remove it, and the fog has its colour alone",
+                Where(path="fog.scattering"),
             )
 
 
@@ -106,12 +147,15 @@ def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> 
     if not isinstance(scene.renderer, SurfaceRenderer):
         return
     used = material if material is not None else scene.material.name
-    if used is None:
+    each = scene.objects[name]
+    if used is None or (isinstance(each, VolumeObject) and each.is_cloud):
         return
     if name in scene.joined and _lets_through(scene, used):
         raise SceneError(
             f"{used!r} is glass, which formulas beside the set and what is joined cannot be", where
         )
+    if isinstance(each, VolumeObject) and _lets_through(scene, used):
+        raise SceneError(f"{used!r} is glass, which volumes cannot be; name another material", where)
     if isinstance(scene.lighting, PathLighting) or material is None:
         return
     if scene.materials[used].blend is not None or any(maps_of(scene.materials[used])):

@@ -1,4 +1,4 @@
-"""Objects beside the set: planes, water, spheres, boxes, cylinders and formulas, by name."""
+"""Objects beside the set: planes, water, spheres, boxes, cylinders, formulas and volumes, by name."""
 
 import math
 from abc import abstractmethod
@@ -12,6 +12,7 @@ from clfractal.scene.base import (
     Coordinate,
     Fraction,
     Length,
+    Number,
     Position,
     Section,
     Vector,
@@ -24,10 +25,15 @@ from clfractal.scene.base import (
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.materials import MAX_NAME, MaterialName
 from clfractal.scene.plane import turn
+from clfractal.scene.volume import Transfer
 
 MAX_OBJECTS = 64
 MAX_FORMULAS = 8
 """Most objects that are formulas: each one's text is a part of the programs."""
+MAX_VOLUMES = 8
+"""Most objects that are volumes: a ray looks for each one's surface, or goes through each one's cloud."""
+MAX_VALUES = 1 << 28
+"""Most values of all volumes' grids together: what their places are counted in, and a gigabyte of memory."""
 Ball: TypeAlias = tuple[Vector, float]
 """A centre and a radius, scene units."""
 AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -264,14 +270,56 @@ class CylinderObject(Solid):
         return x * x + y * y < 1 and abs(z) < 1
 
 
-AnyObject: TypeAlias = PlaneObject | WaterObject | SphereObject | BoxObject | CylinderObject | FormulaObject
+class VolumeObject(ObjectBase):
+    """A grid of values from a file: a surface where they pass a level, or along paths a cloud."""
+
+    tag = "volume"
+    type: Literal["volume"] = "volume"
+    file: str = Field(min_length=1, description="its values: a NRRD or NPY file beside the scene")
+    size: Length | None = Field(
+        None, description="how long its longest side is, scene units; null: as the file says"
+    )
+    rotation: Angles = Field(
+        (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
+    )
+    scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
+    level: Number | None = Field(
+        None, description="value at the surface; null: the middle of the range of values"
+    )
+    transfer: Transfer = Field(
+        default_factory=dict,
+        validate_default=True,
+        description="with `opacity` it is a cloud, with lighting.mode path: opacity, colour and light of its values",
+    )
+    anisotropy: Annotated[float, Field(strict=True, ge=-0.95, le=0.95)] = Field(
+        0.0, description="of a cloud: light is scattered 0 all around, 0.95 straight on, below 0 back"
+    )
+
+    @property
+    def is_cloud(self) -> bool:
+        """Whether light goes through it; else it has a surface."""
+        return self.transfer.opacity is not None
+
+    @model_validator(mode="after")
+    def _has_one_color(self) -> Self:
+        if self.transfer.color is not None and not self.is_cloud:
+            raise problem("needs opacity, since a surface has its material's color", "transfer.color")
+        if self.is_cloud and self.material is not None:
+            raise problem("is for surfaces; a cloud, which transfer.opacity makes, has none", "material")
+        return self
+
+
+AnyObject: TypeAlias = (
+    PlaneObject | WaterObject | SphereObject | BoxObject | CylinderObject | FormulaObject | VolumeObject
+)
 SceneObject = Annotated[
     Annotated[PlaneObject, Tag("plane")]
     | Annotated[WaterObject, Tag("water")]
     | Annotated[SphereObject, Tag("sphere")]
     | Annotated[BoxObject, Tag("box")]
     | Annotated[CylinderObject, Tag("cylinder")]
-    | Annotated[FormulaObject, Tag("formula")],
+    | Annotated[FormulaObject, Tag("formula")]
+    | Annotated[VolumeObject, Tag("volume")],
     chosen_by("type", "sphere"),
 ]
 

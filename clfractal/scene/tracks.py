@@ -19,6 +19,7 @@ from clfractal.scene.objects import (
     Joined,
     Solid,
     SphereObject,
+    VolumeObject,
     Waves,
 )
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
@@ -46,6 +47,7 @@ _SCALES: tuple[tuple[type[Section], frozenset[str]], ...] = (
     (StereoPlane, frozenset({"width", "height"})),
     (Solid, frozenset({"scale"})),
     (FormulaObject, frozenset({"scale"})),
+    (VolumeObject, frozenset({"size", "scale"})),
     (Joined, frozenset({"smoothness"})),
     (SphereObject, frozenset({"radius"})),
     (BoxObject, frozenset({"size"})),

@@ -19,6 +19,7 @@ from clfractal.formulas.catalog import safe_path
 from clfractal.scene.layout import LayoutView
 from clfractal.scene.lighting import Environment
 from clfractal.scene.model import Scene
+from clfractal.scene.object_grids import grid_files, with_grids
 from clfractal.scene.textures import texture_files, with_textures
 from clfractal.scene.volume import VolumeRenderer
 
@@ -48,7 +49,7 @@ def data_files(scene: Scene) -> list[str]:
             found.append(part.environment.file)
         if isinstance(part.renderer, VolumeRenderer) and part.renderer.file is not None:
             found.append(part.renderer.file)
-    return list(dict.fromkeys([*found, *texture_files(scene.materials)]))
+    return list(dict.fromkeys([*found, *texture_files(scene.materials), *grid_files(scene.objects)]))
 
 
 def renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
@@ -57,6 +58,9 @@ def renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
     materials = with_textures(scene.materials, names)
     if materials != scene.materials:
         changes["materials"] = materials
+    objects = with_grids(scene.objects, names)
+    if objects != scene.objects:
+        changes["objects"] = objects
     if scene.layout is not None:
         views = tuple(
             view.model_copy(update=parts) if (parts := _renamed_parts(view, names)) else view

@@ -250,6 +250,7 @@ class Job:
         if self.scene.layout is not None:
             found["view"] = view.number
         surroundings, given = view.scene.surroundings, view.scene.given
+        grids = {file: grid.digest for file, grid in view.scene.grids.items()}
         textures = {file: texture.digest for file, texture in view.scene.textures.items()}
         return {
             **found,
@@ -259,6 +260,7 @@ class Job:
             "grid": given.digest if given is not None else None,
             # Only where there are some: work in progress of older versions stays valid.
             **({"textures": textures} if textures else {}),
+            **({"grids": grids} if grids else {}),
             "version": clfractal.__version__,
             "device": self.device.name,
             "driver": self.device.key,

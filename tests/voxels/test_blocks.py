@@ -9,8 +9,8 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
+from clfractal.renderers.transfer import TRANSFER_SIZE
 from clfractal.renderers.volume import (
-    TRANSFER_SIZE,
     transfer_table,
     unseen_sample,
     value_range,

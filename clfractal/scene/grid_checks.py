@@ -1,0 +1,49 @@
+"""Checks of volumes among a scene's objects that need their grids."""
+
+import numpy as np
+
+from clfractal.errors import SceneError, Where
+from clfractal.scene.base import Vector
+from clfractal.scene.lighting import PlacedLight
+from clfractal.scene.model import Scene
+from clfractal.scene.object_grids import PlacedGrid, placed, used_level, volumes_of
+
+
+def check_grids(scene: Scene) -> None:
+    """Raises FileError or SceneError, with a dotted path, for grids of objects that cannot be read or have no such surface.
+
+    The data are kept in the scene.
+    """
+    for name, each in volumes_of(scene.objects).items():
+        grid = scene.grids[each.file]
+        if not any(bool(np.isfinite(layer).any()) for layer in grid.values):
+            raise SceneError(
+                f"{each.file} holds nothing but NaN, so there is no value to show",
+                Where(path=f"objects.{name}.file"),
+            )
+        if each.is_cloud:
+            continue
+        if each.level is not None and not grid.low < each.level <= grid.high:
+            raise SceneError(
+                f"must be above {grid.low:g} and at most {grid.high:g}, the ends of the grid's values, got {each.level:g}",
+                Where(path=f"objects.{name}.level"),
+            )
+        _check_lights(scene, name, placed(each, grid), used_level(each, grid))
+
+
+def _check_lights(scene: Scene, name: str, body: PlacedGrid, level: float) -> None:
+    """A light within a solid reaches nothing, but where the eye is in it too."""
+
+    def inside(point: Vector) -> bool:
+        value = body.value(point)
+        return value is not None and value >= level
+
+    if inside(scene.camera.position):
+        return
+    for index, light in enumerate(scene.lights):
+        if isinstance(light, PlacedLight) and inside(light.position):
+            shown = ", ".join(f"{x:g}" for x in light.position)
+            raise SceneError(
+                f"must be outside the object {name!r}, where its light reaches something, got [{shown}]",
+                Where(path=f"lights.{index}.position"),
+            )

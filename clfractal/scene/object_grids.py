@@ -1,0 +1,121 @@
+"""The grids of volumes among a scene's objects: found beside the scene, and where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from clfractal.errors import SceneError, Where
+from clfractal.scene.base import Vector
+from clfractal.scene.given import GivenGrid, read_grid
+from clfractal.scene.objects import MAX_VALUES, AnyObject, VolumeObject, turned_axes
+
+
+def volumes_of(objects: Mapping[str, AnyObject]) -> dict[str, VolumeObject]:
+    """Those that are volumes, by name."""
+    return {name: each for name, each in objects.items() if isinstance(each, VolumeObject)}
+
+
+def grid_files(objects: Mapping[str, AnyObject]) -> dict[str, str]:
+    """The files that volumes name, and of each the path of the key that names it first."""
+    found: dict[str, str] = {}
+    for name, each in volumes_of(objects).items():
+        found.setdefault(each.file, f"objects.{name}.file")
+    return found
+
+
+def with_grids(objects: Mapping[str, AnyObject], names: Mapping[str, str]) -> dict[str, AnyObject]:
+    """The objects with other names of their files; those without any are the same."""
+    result = dict(objects)
+    for name, each in volumes_of(objects).items():
+        if names.get(each.file, each.file) != each.file:
+            result[name] = each.model_copy(update={"file": names[each.file]})
+    return result
+
+
+def read_grids(objects: Mapping[str, AnyObject], folder: Path) -> dict[str, GivenGrid]:
+    """The grids of a scene that was loaded from `folder`, by their files, each in the place that the file says.
+
+    Raises:
+        FileError: at the key that names it, for a file out of the folder, or whatever is wrong with it.
+        SceneError: at that key, for more values than all of them may have.
+    """
+    found, count = {}, 0
+    for file, key in grid_files(objects).items():
+        found[file] = read_grid(file, folder, Where(path=key))
+        count += found[file].values.size
+        if count > MAX_VALUES:
+            raise SceneError(
+                f"has too many values: the grids of all objects may have {MAX_VALUES:,}, and these are {count:,}",
+                Where(path=key),
+            )
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedGrid:
+    """A grid where an object has it.
+
+    Attributes:
+        grid: its values.
+        middle: scene units.
+        axes: from its middle to the ends of its own three axes, scene units.
+    """
+
+    grid: GivenGrid
+    middle: Vector
+    axes: tuple[Vector, Vector, Vector]
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Voxels along its own axes."""
+        nz, ny, nx = self.grid.values.shape
+        return nx, ny, nz
+
+    @property
+    def voxel(self) -> float:
+        """The least side of a voxel, scene units: the length over which a cloud has its opacity."""
+        return min(
+            2 * float(np.linalg.norm(axis)) / count
+            for axis, count in zip(self.axes, self.counts, strict=True)
+        )
+
+    def value(self, point: Vector) -> float | None:
+        """The value at a point, interpolated; None out of the box."""
+        own = [
+            sum((p - m) * a for p, m, a in zip(point, self.middle, axis, strict=True))
+            / sum(a * a for a in axis)
+            for axis in self.axes
+        ]
+        if max(abs(x) for x in own) > 1:
+            return None
+        counts = np.array(self.counts)
+        place = np.clip((np.array(own) + 1) * counts / 2 - 0.5, 0, counts - 1)
+        first = np.minimum(place.astype(int), np.maximum(counts - 2, 0))
+        found, values = 0.0, self.grid.values
+        for corner in np.ndindex(2, 2, 2):
+            share = np.prod(np.where(corner, place - first, 1 - (place - first)))
+            x, y, z = np.minimum(first + corner, counts - 1)
+            found += float(share) * float(values[z, y, x]) if share > 0 else 0.0
+        return found
+
+
+def placed(each: VolumeObject, grid: GivenGrid) -> PlacedGrid:
+    """Where an object has its grid: its middle at `position`, and turned and scaled about that."""
+    sides = np.array(grid.spacing) * grid.values.shape[::-1]
+    if each.size is not None:
+        sides = sides * (each.size / sides.max())
+    half = sides / 2 * each.scale
+    x, y, z = (
+        (float(a * h), float(b * h), float(c * h))
+        for (a, b, c), h in zip(turned_axes(each.rotation), half, strict=True)
+    )
+    return PlacedGrid(grid, each.position, (x, y, z))
+
+
+def used_level(each: VolumeObject, grid: GivenGrid) -> float:
+    """The value of its surface."""
+    return (grid.low + grid.high) / 2 if each.level is None else each.level
