@@ -144,6 +144,7 @@ OBJECTS = {
     "box": "BoxObject",
     "cylinder": "CylinderObject",
     "formula": "FormulaObject",
+    "volume": "VolumeObject",
 }
 ANIMATION = {
     "animation": "Animation",

@@ -2,7 +2,7 @@
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, Field, Tag, model_validator
 
@@ -299,6 +299,13 @@ class VolumeObject(ObjectBase):
     def is_cloud(self) -> bool:
         """Whether light goes through it; else it has a surface."""
         return self.transfer.opacity is not None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _is_not_joined(cls, values: Any) -> Any:
+        if isinstance(values, dict) and "join" in values:
+            raise problem("is not for volumes, which stand beside the set; remove it", "join")
+        return values
 
     @model_validator(mode="after")
     def _has_one_color(self) -> Self:

@@ -33,6 +33,11 @@ kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog rend
 kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
 kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/objects.h: render/objects render/objects_light
+kernels/object_grids.h: render/object_grids
+kernels/clouds.h: render/clouds
+kernels/medium_light.h: render/clouds render/volume_paths
+kernels/volume_bounds.h: render/volume_paths
+clfractal/renderers/transfer.py: render/clouds render/volume_paths voxels/blocks
 kernels/emitter*.h: render/emitter_places render/emitters
 kernels/rectangles.h: render/rectangles render/emitter_places render/light_shapes
 kernels/light_asks.h: render/emitters render/light_shapes render/paths

@@ -1,4 +1,4 @@
-"""Surfaces of volumes among the objects: where the interpolated values pass the level, by NumPy; balls, planes, walls, shadows."""
+"""Surfaces of volumes among the objects: where interpolated values pass the level, by NumPy; balls, planes, shadows."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from clfractal.renderers.object_grids import brick_ranges
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
-from tests.render.objects_oracle import NOWHERE, rotation_of
+from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import (
     BALL_ITERATIONS,
     PERSPECTIVE,
@@ -69,7 +69,7 @@ def scene_of(
 
 
 def own_rays(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
-    """Rays in voxels from the corner of the volume's grid, per scene unit of the way; and what turns its own units to the scene's."""
+    """Rays in voxels from the corner of the grid, the way per scene unit; what brings to its own axes; and its sides."""
     (each,) = volumes_of(scene.objects).values()
     place = placed(each, scene.grids[each.file])
     origin, direction, _ = rays(scene)

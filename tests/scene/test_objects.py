@@ -33,7 +33,7 @@ CASES = [
     ("objects: {ball: {radius: §0}}", "objects.ball.radius: must be above 0, got 0"),
     (
         "objects: {ball: {type: §bal}}",
-        "objects.ball.type: unknown type 'bal'; known: box, cylinder, formula, plane, sphere, water",
+        "objects.ball.type: unknown type 'bal'; known: box, cylinder, formula, plane, sphere, volume, water",
     ),
     (
         "objects: {ball: {§size: 3}}",

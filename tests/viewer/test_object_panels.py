@@ -15,9 +15,11 @@ from imgui_bundle import imgui
 
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import load_scene
+from clfractal.scene.objects import VolumeObject
 from clfractal.scene.plane import rotated
-from clfractal.viewer.panels import cut_planes, objects, renderer, scene_dock
+from clfractal.viewer.panels import cut_planes, objects, renderer, scene_dock, transfer
 from clfractal.viewer.panels.ui import Ui
+from tests.render.volumes import keep
 from tests.viewer.panel_harness import Stage, headless, make_ui
 from tests.viewer.test_panels import opened
 
@@ -132,6 +134,44 @@ def test_a_formula_beside_the_set_is_edited() -> None:
     assert ui.studio.edit({f"{path}.formula": {"name": "hast", "iterations": 9}})
     assert renderer.switch(ui, "volume")
     assert list(ui.studio.scene.joined) == ["formula"]
+
+
+def test_a_volume_is_a_surface_or_a_cloud(tmp_path: Path) -> None:
+    """It is added by a file beside the scene; a cloud has no material, and brings light along paths."""
+    keep(tmp_path / "grid.nrrd", np.arange(60, dtype=np.float32).reshape(3, 4, 5), [0, 0, 0], [1, 1, 1])
+    (tmp_path / "below").mkdir()
+    keep(tmp_path / "below" / "other.npy", np.ones((2, 2, 2), np.uint8), [0, 0, 0], [1, 1, 1])
+    (tmp_path / "scene.yaml").write_text(
+        "{version: 1, formula: {name: mandelbulb}, camera: {}, materials: {clay: {}}}"
+    )
+    assert objects.grid_files(tmp_path) == ["below/other.npy", "grid.nrrd"]
+    ui = opened(str(tmp_path / "scene.yaml"))
+    ui.size = (1280, 4000)
+    objects._add(ui, "volume", {"type": "volume", "file": "grid.nrrd", "material": "clay", "size": 2.0})
+    ui.memory["object"] = "volume"
+    before = ui.studio.scene
+    Stage(ui, scene_dock.draw, window=False)
+    assert ui.studio.scene is before
+    grid = before.grids["grid.nrrd"]
+    values = transfer.Values("objects.volume", grid.low, grid.high, lambda: None)
+    transfer._switch_opacity(ui, values, True)
+    scene = ui.studio.scene
+    cloud = scene.objects["volume"]
+    assert isinstance(cloud, VolumeObject)
+    assert cloud.is_cloud
+    assert cloud.material is None
+    assert scene.lighting.mode == "path"
+    assert scene.grids["grid.nrrd"] is grid  # which is not read again
+    Stage(ui, scene_dock.draw, window=False)
+    transfer._switch_color(ui, values, True)
+    Stage(ui, scene_dock.draw, window=False)
+    transfer._switch_opacity(ui, values, False)
+    again = ui.studio.scene.objects["volume"]
+    assert isinstance(again, VolumeObject)
+    assert again.transfer.color is None
+    assert not again.is_cloud
+    assert not ui.studio.edit({"objects.volume.level": 59.5})
+    assert ui.studio.edit({"objects.volume.level": 10.0})
 
 
 def test_the_cut_alone_and_back() -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from imgui_bundle import imgui
 
 from clfractal.scene.object_checks import can_show
-from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined
-from clfractal.viewer.panels import formula, maps, theme
+from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined, VolumeObject
+from clfractal.viewer.panels import formula, maps, theme, transfer
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
@@ -16,6 +17,7 @@ from clfractal.viewer.panels.ui import Ui
 # No name that a material may have.
 PHONG, NEW = "", " "
 _IN_A_ROW = 3
+_GRIDS, _MOST_FILES = (".nrrd", ".nhdr", ".npy"), 50
 _KINDS = {
     "plane": "Plane",
     "water": "Water",
@@ -23,9 +25,14 @@ _KINDS = {
     "box": "Box",
     "cylinder": "Cylinder",
     "formula": "Formula",
+    "volume": "Volume",
 }
 
-_ABOUT = {"water": "Add water with waves", "formula": "Add the set of another formula"}
+_ABOUT = {
+    "water": "Add water with waves",
+    "formula": "Add the set of another formula",
+    "volume": "Add a grid of values from a file, a surface or a cloud",
+}
 
 
 def summary(ui: Ui) -> str:
@@ -91,6 +98,10 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
             "position": [float(f"{x:.4g}") for x in (center[0] + 2 * radius, *center[1:])],
             "formula": {"name": "mandelbulb", "iterations": 8},
         },
+        "volume": {
+            "position": [float(f"{x:.4g}") for x in (center[0] + 2 * radius, *center[1:])],
+            "size": float(f"{2 * radius:.2g}"),
+        },
     }
     for number, (kind, values) in enumerate(first.items()):
         if number % _IN_A_ROW:
@@ -100,7 +111,14 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
         about = _ABOUT.get(kind, f"Add a {kind}")
         possible = room and can_show(ui.studio.scene.renderer.type, kind)
         if w.button(_KINDS[kind], icon=theme.PLUS, enabled=possible, about=about):
-            _add(ui, kind, {"type": kind, **values})
+            if kind == "volume":
+                ui.memory["grid files"] = grid_files(ui.studio.scene.folder)
+                imgui.open_popup("##grids")
+            else:
+                _add(ui, kind, {"type": kind, **values})
+    file = _file_popup(ui)
+    if file is not None:
+        _add(ui, "volume", {"type": "volume", "file": file, **first["volume"]})
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove", enabled=chosen is not None):
         left = {name: plain(each) for name, each in objects.items() if name != chosen}
@@ -117,12 +135,37 @@ def _add(ui: Ui, kind: str, values: dict[str, Any]) -> None:
         ui.memory["object"] = name
 
 
+def grid_files(folder: Path) -> list[str]:
+    """Files of grids beside a scene, or in the folders beside it, by their names from there."""
+    found = [
+        path for pattern in ("*", "*/*") for path in folder.glob(pattern) if path.suffix.lower() in _GRIDS
+    ]
+    return sorted(path.relative_to(folder).as_posix() for path in found if path.is_file())[:_MOST_FILES]
+
+
+def _file_popup(ui: Ui) -> str | None:
+    """The grid that is chosen of those beside the scene, once it is."""
+    chosen = None
+    if imgui.begin_popup("##grids"):
+        files = ui.memory.get("grid files", [])
+        if not files:
+            imgui.text("No .nrrd or .npy file lies beside the scene")
+        for file in files:
+            if imgui.selectable(file, False)[0]:
+                chosen = str(file)
+        imgui.end_popup()
+    return chosen
+
+
 def _object(ui: Ui, name: str) -> None:
     path, each = f"objects.{name}", ui.studio.scene.objects[name]
     if isinstance(each, FormulaObject):
         _formula(ui, name, each)
-    _material(ui, path, each)
-    left = {"type", "material", "waves", "formula"}
+    if isinstance(each, VolumeObject):
+        _volume(ui, path, each)
+    if not (isinstance(each, VolumeObject) and each.is_cloud):
+        _material(ui, path, each)
+    left = {"type", "material", "waves", "formula", "file", "level", "transfer", "anisotropy"}
     if not (isinstance(each, Joined) and each.join == "smooth_union"):
         left.add("smoothness")
     keys = [key for key in type(each).model_fields if key not in left]
@@ -151,6 +194,25 @@ def _formula(ui: Ui, name: str, each: FormulaObject) -> None:
     if len(chain.links) == 1:
         formula.parameters(ui, path, chain.first)
     w.field(ui, f"{path}.iterations")
+
+
+def _volume(ui: Ui, path: str, each: VolumeObject) -> None:
+    """Its file, and what its values show."""
+    grid = ui.studio.scene.grids[each.file]
+    w.field(ui, f"{path}.file", "Grid file")
+    values = transfer.Values(path, grid.low, grid.high, lambda: transfer.of_grid(ui, grid, path))
+    transfer.of_values(ui, values, ("Surface", "Cloud"))
+    if each.is_cloud:
+        w.field(ui, f"{path}.anisotropy")
+        return
+    middle = (grid.low + grid.high) / 2
+    w.field(
+        ui,
+        f"{path}.level",
+        usual=(grid.low, grid.high),
+        start=middle,
+        auto=f"{middle:.4g}, the middle",
+    )
 
 
 def _material(ui: Ui, path: str, each: AnyObject) -> None:

@@ -1,8 +1,12 @@
-"""The transfer function of a volume: opacity and colour of values, edited by dragging points over their histogram."""
+"""The transfer function of a volume or an object: opacity and colour of values, edited by dragging points over their
+histogram.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -10,6 +14,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from clfractal.files.srgb import encode
+from clfractal.scene.given import GivenGrid
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.histogram import Histogram, HistogramTask, histogram_of
@@ -21,115 +26,172 @@ from clfractal.viewer.panels.ui import Ui
 
 Stops = list[dict[str, Any]]
 _HEIGHT, _STRIP, _REACH = 120.0, 16.0, 9.0
-_OPACITY, _COLOR = "renderer.transfer.opacity", "renderer.transfer.color"
-_EMISSION = "renderer.transfer.emission"
 _FAR = 60.0
 _SEGMENTS = 64
 
 
+@dataclass(frozen=True, slots=True)
+class Values:
+    """Values that are shown.
+
+    Attributes:
+        section: the path of what has the transfer function and the level.
+        low, high: the least and the largest value.
+        histogram: how often they occur; None while they are counted.
+        problem: why they cannot be counted, or nothing.
+    """
+
+    section: str
+    low: float
+    high: float
+    histogram: Callable[[], Histogram | None]
+    problem: Callable[[], str] = str
+
+    @property
+    def opacity(self) -> str:
+        """The path of the stops."""
+        return f"{self.section}.transfer.opacity"
+
+    @property
+    def color(self) -> str:
+        """The path of the stops."""
+        return f"{self.section}.transfer.color"
+
+    @property
+    def emission(self) -> str:
+        """The path of the stops."""
+        return f"{self.section}.transfer.emission"
+
+    def state(self, ui: Ui, name: str, **first: Any) -> dict[str, Any]:
+        """What is remembered of the panel from frame to frame."""
+        found: dict[str, Any] = ui.memory.setdefault(f"transfer.{name} {self.section}", first)
+        return found
+
+
 def summary(ui: Ui) -> str:
     """For the heading."""
-    return "surface" if w.value(ui, _OPACITY) is None else "all values"
+    return "surface" if w.value(ui, "renderer.transfer.opacity") is None else "all values"
 
 
 def draw(ui: Ui) -> None:
-    """Draws the panel."""
+    """Draws the panel of a volume renderer."""
     low, high = volume.limits(ui)
-    opacity, color = plain(w.value(ui, _OPACITY)), plain(w.value(ui, _COLOR))
-    width = w.row(ui, "Show", path=_OPACITY, tip="a surface at one value, or all values by their opacity")
+
+    def problem() -> str:
+        task = ui.memory.get("histogram.task")
+        return str(task[1].problem or "") if task is not None else ""
+
+    of_values(ui, Values("renderer", low, high, lambda: histogram(ui), problem))
+
+
+def of_values(ui: Ui, of: Values, words: tuple[str, str] = ("Surface", "All values")) -> None:
+    """Draws what values show: the words are those for a surface at one of them, and for all by their opacity."""
+    low, high = of.low, of.high
+    opacity, color = plain(w.value(ui, of.opacity)), plain(w.value(ui, of.color))
+    width = w.row(ui, "Show", path=of.opacity, tip="a surface at one value, or all values by their opacity")
     if width is not None:
-        found = w.segments("opacity", {False: "Surface", True: "All values"}, opacity is not None, width)
+        found = w.segments(of.opacity, {False: words[0], True: words[1]}, opacity is not None, width)
         if found is not None:
-            _switch_opacity(ui, found, low, high)
+            _switch_opacity(ui, of, found)
             return
-    w.problem(ui, _OPACITY)
+    w.problem(ui, of.opacity)
     if opacity is not None and not w.filtering(ui):
-        _graph(ui, opacity, color, low, high)
+        _graph(ui, of, opacity, color)
     about = "colours by value; else the material's colour"
-    width = w.row(ui, "Own colours", path=_COLOR, tip=about, differs=color is not None)
-    if width is not None and w.toggle(_COLOR, color is not None):
-        _switch_color(ui, color is None, low, high)
-        return
-    w.problem(ui, _COLOR)
-    if color is not None and not w.filtering(ui):
-        _strip(ui, _COLOR, color, low, high)
+    if opacity is not None or of.section == "renderer":
+        width = w.row(ui, "Own colours", path=of.color, tip=about, differs=color is not None)
+        if width is not None and w.toggle(of.color, color is not None):
+            _switch_color(ui, of, color is None)
+            return
+        w.problem(ui, of.color)
+        if color is not None and not w.filtering(ui):
+            _strip(ui, of.color, color, low, high)
     if opacity is not None:
-        _light(ui, low, high)
+        _light(ui, of)
 
 
-def _light(ui: Ui, low: float, high: float) -> None:
+def _light(ui: Ui, of: Values) -> None:
     """Whether values shine by themselves, which of them, and how brightly."""
-    found = plain(w.value(ui, _EMISSION))
+    low, high = of.low, of.high
+    found = plain(w.value(ui, of.emission))
     tip = "light of their own, by value"
-    width = w.row(ui, "Shines", path=_EMISSION, tip=tip, differs=found is not None)
-    if width is not None and w.toggle(_EMISSION, found is not None):
-        kept = ui.memory.setdefault("transfer.kept", {})
+    width = w.row(ui, "Shines", path=of.emission, tip=tip, differs=found is not None)
+    if width is not None and w.toggle(of.emission, found is not None):
+        kept = of.state(ui, "kept")
         if found is not None:
             kept["emission"] = found
-            ui.studio.edit({_EMISSION: None})
+            ui.studio.edit({of.emission: None})
             return
         first = [
             {"at": (low + high) / 2, "emission": [0.0, 0.0, 0.0]},
             {"at": high, "emission": [0.05, 0.015, 0.002]},
         ]
-        ui.studio.edit({_EMISSION: kept.get("emission") or first})
+        ui.studio.edit({of.emission: kept.get("emission") or first})
         return
-    w.problem(ui, _EMISSION)
+    w.problem(ui, of.emission)
     if found is not None and not w.filtering(ui):
-        _strip(ui, _EMISSION, found, low, high)
+        _strip(ui, of.emission, found, low, high)
 
 
-def _switch_opacity(ui: Ui, on: bool, low: float, high: float) -> None:
-    kept = ui.memory.setdefault("transfer.kept", {})
+def _switch_opacity(ui: Ui, of: Values, on: bool) -> None:
+    low, span, kept = of.low, of.high - of.low, of.state(ui, "kept")
+    is_object = of.section != "renderer"
     if not on:
-        kept["opacity"] = plain(w.value(ui, _OPACITY))
-        kept["emission"] = plain(w.value(ui, _EMISSION)) or kept.get("emission")
-        ui.studio.edit({_OPACITY: None, _EMISSION: None})
+        kept["opacity"] = plain(w.value(ui, of.opacity))
+        kept["emission"] = plain(w.value(ui, of.emission)) or kept.get("emission")
+        if is_object:  # whose surface has its material's colour
+            kept["color"] = plain(w.value(ui, of.color)) or kept.get("color")
+        ui.studio.edit({of.opacity: None, of.emission: None, **({of.color: None} if is_object else {})})
         return
-    span = high - low
     first = [
         {"at": low, "opacity": 0.0},
         {"at": low + 0.25 * span, "opacity": 0.0},
-        {"at": high, "opacity": 0.6},
+        {"at": of.high, "opacity": 0.6},
     ]
-    ui.studio.edit({_OPACITY: kept.get("opacity") or first, "renderer.level": None})
+    changes = {of.opacity: kept.get("opacity") or first, f"{of.section}.level": None}
+    if is_object:  # which has no material of its own then, and needs light along paths
+        changes[f"{of.section}.material"] = None
+        if ui.studio.scene.lighting.mode != "path":
+            changes["lighting"] = {"mode": "path", "bounces": 16}
+    ui.studio.edit(changes)
 
 
-def _switch_color(ui: Ui, on: bool, low: float, high: float) -> None:
-    kept = ui.memory.setdefault("transfer.kept", {})
+def _switch_color(ui: Ui, of: Values, on: bool) -> None:
+    low, high, kept = of.low, of.high, of.state(ui, "kept")
     if not on:
-        kept["color"] = plain(w.value(ui, _COLOR))
+        kept["color"] = plain(w.value(ui, of.color))
     first = [
         {"at": low, "color": [0.05, 0.1, 0.35]},
         {"at": (low + high) / 2, "color": [0.85, 0.3, 0.06]},
         {"at": high, "color": [1.0, 0.9, 0.6]},
     ]
-    ui.studio.edit({_COLOR: (kept.get("color") or first) if on else None})
+    ui.studio.edit({of.color: (kept.get("color") or first) if on else None})
 
 
 # Opacity
 
 
-def _graph(ui: Ui, stops: Stops, colors: Stops | None, low: float, high: float) -> None:
+def _graph(ui: Ui, of: Values, stops: Stops, colors: Stops | None) -> None:
     """The graph of opacity over the histogram; its points are dragged, added and removed."""
-    low, high = _range(stops, low, high)
-    state = ui.memory.setdefault("transfer.graph", {"chosen": 0, "held": False})
+    low, high = _range(stops, of.low, of.high)
+    state = of.state(ui, "graph", chosen=0, held=False)
     state["chosen"] = min(state["chosen"], len(stops) - 1)
     indent = 11.0
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
     corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     imgui.invisible_button("##graph", imgui.ImVec2(wide, _HEIGHT))
     area = _Area(corner.x + 6, corner.y + 6, wide - 12, _HEIGHT - 12, low, high)
-    stops = _graph_events(ui, stops, area, state)
-    _draw_graph(ui, area, stops, colors, state["chosen"])
+    stops = _graph_events(ui, of.opacity, stops, area, state)
+    _draw_graph(of, area, stops, colors, state["chosen"])
     if imgui.is_item_hovered() and not imgui.is_item_active():
         w.tip("Drag a point; double click adds one; drag it far off to remove it")
     one = stops[state["chosen"]]
-    _place_row(ui, stops, state, area, _OPACITY)
-    width = w.row(ui, "Opacity", path=f"{_OPACITY}.{state['chosen']}.opacity", tip="over a voxel's side")
+    _place_row(ui, stops, state, area, of.opacity)
+    path = f"{of.opacity}.{state['chosen']}.opacity"
+    width = w.row(ui, "Opacity", path=path, tip="over a voxel's side")
     if width is not None:
-        change = w.number_box(w.boxes(ui), "transfer.opacity", one["opacity"], width, w.Scale(0, 1, (0, 1)))
-        w.apply(ui, f"{_OPACITY}.{state['chosen']}.opacity", change)
+        change = w.number_box(w.boxes(ui), of.opacity, one["opacity"], width, w.Scale(0, 1, (0, 1)))
+        w.apply(ui, path, change)
 
 
 class _Area:
@@ -164,7 +226,7 @@ def inserted(stops: Stops, at: float, **values: Any) -> tuple[Stops, int]:
     return [*stops[:index], {"at": at, **values}, *stops[index:]], index
 
 
-def _graph_events(ui: Ui, stops: Stops, area: _Area, state: dict[str, Any]) -> Stops:
+def _graph_events(ui: Ui, path: str, stops: Stops, area: _Area, state: dict[str, Any]) -> Stops:
     mouse = imgui.get_mouse_pos()
     places = [area.place(stop["at"], stop["opacity"]) for stop in stops]
     if imgui.is_item_activated():
@@ -174,27 +236,27 @@ def _graph_events(ui: Ui, stops: Stops, area: _Area, state: dict[str, Any]) -> S
             state.update(chosen=near, held=True)
         elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
             stops, state["chosen"] = inserted(stops, area.value(mouse.x), opacity=area.opacity(mouse.y))
-            ui.studio.edit({_OPACITY: stops})
+            ui.studio.edit({path: stops})
     held, far = state["held"], not -_FAR < mouse.y - area.y < area.height + _FAR
     if imgui.is_item_active() and held and imgui.is_mouse_dragging(0, 2.0):
         stops = placed(stops, state["chosen"], area.value(mouse.x), opacity=area.opacity(mouse.y))
-        ui.studio.edit({_OPACITY: stops}, gesture=_OPACITY)
+        ui.studio.edit({path: stops}, gesture=path)
     if imgui.is_item_deactivated() and held:
         state["held"] = False
         if far and len(stops) > 1:
             stops = _without(stops, state["chosen"])
-            ui.studio.edit({_OPACITY: stops}, gesture=_OPACITY)
+            ui.studio.edit({path: stops}, gesture=path)
             state["chosen"] = max(state["chosen"] - 1, 0)
         ui.studio.end_gesture()
     return stops
 
 
-def _draw_graph(ui: Ui, area: _Area, stops: Stops, colors: Stops | None, chosen: int) -> None:
+def _draw_graph(of: Values, area: _Area, stops: Stops, colors: Stops | None, chosen: int) -> None:
     draw = imgui.get_window_draw_list()
     low = imgui.ImVec2(area.x - 6, area.y - 6)
     far = imgui.ImVec2(area.x + area.width + 6, area.y + area.height + 6)
     draw.add_rect_filled(low, far, theme.packed(theme.FRAME), 5.0)
-    _draw_histogram(ui, area, draw)
+    _draw_histogram(of, area, draw)
     line = [
         imgui.ImVec2(area.x, area.place(stops[0]["at"], stops[0]["opacity"]).y),
         *(area.place(stop["at"], stop["opacity"]) for stop in stops),
@@ -217,11 +279,10 @@ def _draw_graph(ui: Ui, area: _Area, stops: Stops, colors: Stops | None, chosen:
         draw.add_circle(middle, 5.0, theme.packed(edge), 0, 1.8)
 
 
-def _draw_histogram(ui: Ui, area: _Area, draw: Any) -> None:
-    found = histogram(ui)
+def _draw_histogram(of: Values, area: _Area, draw: Any) -> None:
+    found = of.histogram()
     if found is None:
-        task = ui.memory.get("histogram.task")
-        text = task[1].problem if task is not None and task[1].problem else "counting values…"
+        text = of.problem() or "counting values…"
         draw.add_text(imgui.ImVec2(area.x + 4, area.y + 2), theme.packed(theme.FAINT), text)
         return
     # Most voxels are outside or inside: by magnitudes the few others are seen too.
@@ -247,11 +308,7 @@ def histogram(ui: Ui) -> Histogram | None:
     scene = ui.studio.scene
     given = scene.given
     if given is not None:
-        known = ui.memory.get("histogram.given")
-        if known is None or known[0] is not given:
-            found = histogram_of(given.values, given.low, given.high)
-            known = ui.memory["histogram.given"] = (given, found)
-        return known[1]
+        return of_grid(ui, given, "renderer")
     renderer = scene.renderer
     assert isinstance(renderer, VolumeRenderer)
     parts = {"box", "zoom", "value", "sub_points", "fill"}
@@ -268,6 +325,15 @@ def histogram(ui: Ui) -> Histogram | None:
     return known[1].found
 
 
+def of_grid(ui: Ui, grid: GivenGrid, section: str) -> Histogram:
+    """How often the values of a grid from a file occur; they are counted once."""
+    known = ui.memory.get(f"histogram {section}")
+    if known is None or known[0] is not grid:
+        known = ui.memory[f"histogram {section}"] = (grid, histogram_of(grid.values, grid.low, grid.high))
+    found: Histogram = known[1]
+    return found
+
+
 # Colours
 
 
@@ -275,7 +341,7 @@ def _strip(ui: Ui, path: str, stops: Stops, low: float, high: float) -> None:
     """The colours of values, or the light that they send out, and their stops."""
     key = path.rpartition(".")[2]
     low, high = _range(stops, low, high)
-    state = ui.memory.setdefault(f"transfer.strip.{key}", {"chosen": 0, "held": False})
+    state = ui.memory.setdefault(f"transfer.strip.{path}", {"chosen": 0, "held": False})
     state["chosen"] = min(state["chosen"], len(stops) - 1)
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
     corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
