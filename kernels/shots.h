@@ -67,6 +67,9 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     STATE_RECALL(s, look, STATE_GLANCE);
     const color in_all = seen;
 #endif
+#if CLOUDS_SHINE
+    const color on_the_way = color_pick(mask_of(found.found), color_of(R(0.0), R(0.0), R(0.0)), seen);
+#endif
     shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
 #if HAS_MATTES
     result.thing = pick(result.hit, found.object + R(1.0), R(0.0));
@@ -109,6 +112,10 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
 #if HAS_SHAFTS
     background = color_add(background, air);
+#endif
+#if CLOUDS_SHINE
+    // What clouds have added to a ray that went through all of them.
+    background = color_add(background, on_the_way);
 #endif
 #if HAS_GLOW
     background = color_add(background, glow);
