@@ -15,6 +15,7 @@ from clfractal.scene.load import load_scene
 from clfractal.solids import Body
 from tests.gpu.pairs import covering
 from tests.platforms import programs
+from tests.portability.pictures import FOLDER
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 
@@ -72,6 +73,20 @@ _LAMPS = {
     "box": {"type": "box", "position": [0, 3, 0], "material": "glow"},
     "tube": {"type": "cylinder", "position": [0, 0, 3], "material": "glow"},
 }
+_GRIDS = {
+    "core": {"type": "volume", "file": "ball.npy", "position": [3, 0, 0], "material": "wood"},
+}
+_CLOUDS = {
+    **_GRIDS,
+    "cloud": {
+        "type": "volume",
+        "file": "ball.npy",
+        "transfer": {
+            "opacity": [{"at": 0, "opacity": 0}, {"at": 255, "opacity": 0.5}],
+            "emission": [{"at": 0, "emission": [0.1, 0, 0]}],
+        },
+    },
+}
 _JOINED = {
     "hole": {"type": "sphere", "join": "cut"},
     "drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"},
@@ -103,6 +118,8 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
         "shining": {"objects": _LAMPS, "materials": {"glow": {"emission": {"luminance": 5}}}},
         "joined": {"objects": _JOINED},
+        "grids": {"objects": _GRIDS, "materials": {"wood": {}}},
+        "clouds": {"objects": _CLOUDS, "materials": {"wood": {}}},
     },
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
@@ -158,6 +175,8 @@ _APART = {
     *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass", "maps")),
     frozenset({("objects", "joined"), ("planes", "planes")}),
     frozenset({("objects", "joined"), ("lighting", "glass")}),
+    frozenset({("objects", "clouds"), ("lighting", "")}),
+    frozenset({("objects", "clouds"), ("fog", "shafts")}),
 }
 _OF_MEDIA = {
     frozenset({("lighting", "path"), ("transfer", "level")}),
@@ -234,5 +253,5 @@ def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
     precision: Precision = "float64" if chosen["precision"] == "float64" else "float32"
     values, pools = chosen.get("values", "byte"), 3 if chosen.get("pools") == "three" else 1
     name = " ".join(value for value in chosen.values() if value)
-    for part, text in programs.of_scene(load_scene(scene), 1, precision, values, pools):
+    for part, text in programs.of_scene(load_scene(scene, folder=FOLDER), 1, precision, values, pools):
         yield Listed(f"{part} {name}", precision, text)

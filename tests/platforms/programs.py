@@ -26,7 +26,7 @@ Named = tuple[str, FlatText]
 
 PICTURES = tuple(dict.fromkeys(name for name, _ in cases("full")))
 """The pictures that all implementations render: every renderer with all that it can do, and some formulas."""
-EVERY_KIND = ("still", "steps", "cloud", "plane")
+EVERY_KIND = ("still", "steps", "volumes", "cloud", "plane")
 """Those that differ in more than the formula."""
 
 

@@ -48,6 +48,7 @@ _SCENES: dict[str, str] = {
     "paths": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "steps": "{name: mandelbulb, iterations: 5}",
     "joined": "{name: mandelbulb, iterations: 5}",
+    "volumes": "{name: mandelbulb, iterations: 5}",
     "cloud": "{name: mandelbulb, iterations: 5}",
     "filled": "{name: mandelbulb, iterations: 5}",
     "counted": "{name: hast, iterations: 9}",
@@ -65,6 +66,7 @@ _RENDERERS = {
     "cloud": "{type: volume, resolution: 12, value: iterations, normals: exact,"
     " transfer: {opacity: [{at: 1, opacity: 0}, {at: 5, opacity: 0.1}]}}",
     "joined": "{samples: 2}",
+    "volumes": "{samples: 4}",
     "inside": "{type: volume, resolution: 24, value: inside, normals: least_squares}",
     "coverage": "{type: volume, resolution: 24, value: coverage, shadows: true,"
     " transfer: {opacity: [{at: 0.05, opacity: 0}, {at: 1, opacity: 0.6}]}}",
@@ -101,6 +103,12 @@ _MORE = {
     " other: {type: formula, position: [0.9, -0.3, -0.4], scale: 0.05, formula: {name: mandelbox, iterations: 8}},"
     " slab: {type: plane, position: [0, 0, 0.9], join: intersection}}\n"
     "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true, opacity: 0.6}]\n",
+    "volumes": "lighting: {mode: path, bounces: 3}\n"
+    "objects: {core: {type: volume, file: ball.npy, level: 90, size: 0.9, position: [0.5, -0.9, 0.2]},"
+    " cloud: {type: volume, file: ball.npy, size: 1.2, scale: [1, 0.7, 1.3], rotation: [20, 30, 0],"
+    " position: [-0.6, -0.8, 0.3], anisotropy: 0.4, transfer: {opacity: [{at: 0, opacity: 0}, {at: 255, opacity: 0.8}],"
+    " emission: [{at: 60, emission: [0, 0, 0]}, {at: 255, emission: [0.2, 0.1, 0]}]}},"
+    " floor: {type: plane, position: [0, 0, -1]}}\n",
     "filled": "objects: {hole: {type: sphere, position: [0.3, -0.8, 0.3], radius: 0.4, join: cut},"
     " egg: {type: sphere, position: [-0.8, -0.7, 0.3], radius: 0.3, scale: [1, 0.7, 1.2], rotation: [0, 30, 0]},"
     " other: {type: formula, position: [0.9, -0.3, -0.4], scale: 0.05, formula: {name: mandelbox, iterations: 8}},"
@@ -120,6 +128,7 @@ _BRIEF = (
     "glass",
     "steps",
     "joined",
+    "volumes",
     "cloud",
     "inside",
     "coverage",
@@ -132,6 +141,8 @@ _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)
 _TINY = ("mandelbulb", "hast", "mandelbox", "plane")
 
+FOLDER = Path(__file__).parent
+"""Where the grid is that objects show."""
 SIZE, TINY_SIZE = (96, 72), (12, 8)
 # Processes that share a kind's pictures. The simulator's checker of memory takes a second picture's for the first one's.
 PARTS = {"full": 2, "brief": 2, "tiny": 4}
@@ -168,12 +179,12 @@ def scene_of(name: str, size: tuple[int, int]) -> Scene:
     """The scene of a picture."""
     # The formula's bounds say where the camera has to be for the picture to be filled.
     far = (0.0, -99.0, 0.0)
-    bounds = load_scene(_scene_text(name, far, (0.0, 0.0, 0.0), far, size)).chain
+    bounds = load_scene(_scene_text(name, far, (0.0, 0.0, 0.0), far, size), folder=FOLDER).chain
     x, y, z = (float(value) for value in bounds.center)
     radius = float(bounds.radius)
     position = (x + 0.7 * radius, y - 2.1 * radius, z + 0.7 * radius)
     lamp = (x + radius, y - radius, z + 0.5 * radius)
-    return load_scene(_scene_text(name, position, (x, y, z), lamp, size))
+    return load_scene(_scene_text(name, position, (x, y, z), lamp, size), folder=FOLDER)
 
 
 def _scene_text(
