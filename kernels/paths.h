@@ -28,9 +28,12 @@ STAGE(scatter_paths) {
 #endif
     if (any_lane(lands)) {
 #if !COLORING_PER_POINT
-        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
+        found.tint = tint_of(&found, w);
 #endif
         pbr p = pbr_at(s, &found, w);
+#if HAS_FACES
+        pbr_of_face(&found, &p);
+#endif
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
         real wave, unused;
