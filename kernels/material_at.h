@@ -82,3 +82,12 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
     p->emission_luminance = pick(face, none, p->emission_luminance);
 }
 #endif
+
+// What a path meets at a spot: a thing's material, or the face of a cut.
+INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
+    pbr p = pbr_at(s, here, w);
+#if HAS_FACES
+    pbr_of_face(here, &p);
+#endif
+    return p;
+}

@@ -30,10 +30,7 @@ STAGE(scatter_paths) {
 #if !COLORING_PER_POINT
         found.tint = tint_of(&found, w);
 #endif
-        pbr p = pbr_at(s, &found, w);
-#if HAS_FACES
-        pbr_of_face(&found, &p);
-#endif
+        pbr p = pbr_of_spot(s, &found, w);
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
         real wave, unused;
