@@ -14,14 +14,14 @@ INLINE real spot_material(const spot *here, world w) {
 
 #if HAS_BUMP
 // How far apart these places are: a pixel's footprint, so that details which a pixel cannot show are no noise, or what the material
-// asks for. Below 0 where there is no relief.
+// asks for. Below 0 where there is no relief, as on the faces of cuts.
 INLINE real bump_width(const spot *here, world w) {
     real width = (real)(w.materials->bump_width);
 #if MATERIALS > 1
     const real root = spot_material(here, w);
     for (int i = 1; i < MATERIALS; ++i) width = pick(equal(root, (real)((scalar)i)), (real)(w.materials[i].bump_width), width);
 #endif
-    return pick(less(width, R(0.0)), R(-1.0), fmax(width, here->cone));
+    return pick(less(width, R(0.0)) | on_face(here), R(-1.0), fmax(width, here->cone));
 }
 
 // The way to one of them, length 1: they are the corners of a triangle with equal sides around the spot.

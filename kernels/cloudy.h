@@ -73,7 +73,7 @@ INLINE mask flight_is_free(const path *so_far, const carried *with, mask here, w
     if (!any_lane(here)) return here;
     ray r = {so_far->origin, so_far->direction, R(0.0), with->flight, so_far->footprint, so_far->spread, RAY_NOTHING_KNOWN};
     real number, far = with->flight;
-    here &= less(with->flight, objects_met(&r, w.objects, w.settings->object_count, w.tables, &number));
+    here &= less(with->flight, objects_met(&r, w.objects, w.planes.planes, w.settings->object_count, w.tables, &number));
     here &= ~lamp_met(r.origin, r.direction, 0, &far, w).met;
     return here & ~ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
 #else

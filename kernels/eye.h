@@ -37,7 +37,7 @@ INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     return a;
 }
 
-// Sends a ray for the part of its way that cutting planes and the bounding sphere leave, from `free` on: nothing should be before.
+// Sends a ray for the part of its way that planes which cut the set and the bounding sphere leave, from `free` on: nothing should be before.
 INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world w) {
     real face;
     wanted &= planes_cut(&r, &face, w.planes);
@@ -57,7 +57,7 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask 
     real number = R(0.0), met = (real)(REAL_LARGEST);
     __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
     if (any_lane(wanted)) {
-        const real nearest = objects_met(&r, w.objects, w.settings->object_count, w.tables, &number);
+        const real nearest = objects_met(&r, w.objects, w.planes.planes, w.settings->object_count, w.tables, &number);
         met = pick(wanted, nearest, met);
     }
     lanes_store(met, at + RAY_OBJECT * s.q.stride);
@@ -81,11 +81,6 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     so_far->on_path = wanted;
     so_far->through = color_of(R(1.0), R(1.0), R(1.0));
     so_far->seen = color_of(R(0.0), R(0.0), R(0.0));
-#if PLANES > 0
-    plane_face face;
-    STATE_RECALL(s, face, STATE_FACE);
-    so_far->on_path = pick(mask_of(face.bare), R(0.0), so_far->on_path);
-#endif
     if (s.bounce == 0) return r;
     STATE_RECALL(s, *so_far, STATE_PATH);
     r.origin = so_far->origin;

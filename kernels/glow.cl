@@ -35,11 +35,6 @@ STAGE(add_glow) {
     r.far = pick(mask_of(found.found), vec_dot(vec_sub(found.seen, r.origin), r.direction), r.far);
     real ignored;
     const mask clear = planes_cut(&r, &ignored, w.planes);
-#if PLANES > 0
-    plane_face face;
-    STATE_RECALL(s, face, STATE_FACE);
-    if (bounce == 0) r.far = pick(mask_of(face.bare), fmin(r.far, face.t), r.far);
-#endif
     const mask near = ray_clip(&r, settings->bounds_center, (real)(settings->bounds_radius) + GLOW_BEYOND * (real)(material->glow_width));
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);

@@ -80,7 +80,7 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->point = vec_pick(met, vec_along(origin, far, direction), found->point);
     found->seen = vec_pick(met, found->point, found->seen);
     found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
-#if HAS_MATTES
+#if HAS_MATTES || HAS_FACES
     found->object = pick(met, object, found->object);
 #endif
     spot_keep(found, s.state, 0, s.stride);
@@ -125,7 +125,7 @@ INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);
     so_far->footprint = here->cone;
     so_far->spread = from_eye.spread + (from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone));
-#if HAS_OBJECTS
+#if HAS_OBJECTS || HAS_FACES
     const color left = so_far->through;
     so_far->on_path = number_of(mask_of(so_far->on_path) & less(R(0.0), fmax(fmax(left.r, left.g), left.b)));
 #endif

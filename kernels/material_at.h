@@ -64,3 +64,30 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
 #endif
 }
 #endif
+
+#if HAS_FACES
+// The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut.
+INLINE void pbr_of_face(const spot *here, pbr *p) {
+    const mask face = on_face(here);
+    const real none = R(0.0), one = R(1.0);
+    const color tint = color_of(fmin(here->tint.r, one), fmin(here->tint.g, one), fmin(here->tint.b, one));
+    p->base_color = color_pick(face, tint, p->base_color);
+    p->base_weight = pick(face, one, p->base_weight);
+    p->base_metalness = pick(face, none, p->base_metalness);
+    p->base_diffuse_roughness = pick(face, none, p->base_diffuse_roughness);
+    p->specular_weight = pick(face, none, p->specular_weight);
+    p->coat_weight = pick(face, none, p->coat_weight);
+    p->fuzz_weight = pick(face, none, p->fuzz_weight);
+    p->transmission_weight = pick(face, none, p->transmission_weight);
+    p->emission_luminance = pick(face, none, p->emission_luminance);
+}
+#endif
+
+// What a path meets at a spot: a thing's material, or the face of a cut.
+INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
+    pbr p = pbr_at(s, here, w);
+#if HAS_FACES
+    pbr_of_face(here, &p);
+#endif
+    return p;
+}

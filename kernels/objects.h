@@ -80,13 +80,33 @@ INLINE int is_met_by_span(__global const struct Object *o) {
     return o->kind != OBJECT_WATER && o->kind != OBJECT_JOINED && o->kind != OBJECT_VOLUME && o->kind != OBJECT_CLOUD;
 }
 
+// Where a ray meets the object with index `i`, of which planes may leave a part only. `face`: the plane whose cut it meets there, or -1.
+INLINE real object_met(int i, vec origin, vec direction, __global const struct Object *objects, __global const struct CutPlane *planes,
+                       real *face) {
+    span s = object_span(objects + i, origin, direction);
+    *face = R(-1.0);
+#if HAS_CUT_OBJECTS
+    real begins = R(-1.0), ends = R(-1.0);
+    for (int plane = 0; plane < PLANES; ++plane) {
+        if (!plane_cuts(planes + plane, i)) continue;
+        const real exit = s.exit;
+        plane_cut(planes + plane, plane, origin, direction, &s.entry, &s.exit, &begins);
+        ends = pick(less(s.exit, exit), (real)((scalar)plane), ends);
+    }
+    *face = pick(less(R(0.0), s.entry), begins, ends);
+#endif
+    return span_first(s);
+}
+
 // The nearest object that a ray meets before its `far`: how far it is, or the largest number; and its number from 1, or 0.
-CALLED real objects_met(const ray *r, __global const struct Object *objects, int count, __global const float *tables, real *number) {
+CALLED real objects_met(const ray *r, __global const struct Object *objects, __global const struct CutPlane *planes, int count,
+                        __global const float *tables, real *number) {
     real nearest = (real)(REAL_LARGEST);
     *number = R(0.0);
     for (int i = 0; i < count; ++i) {
         if (!is_met_by_span(objects + i)) continue;
-        const real t = span_first(object_span(objects + i, r->origin, r->direction));
+        real face;
+        const real t = object_met(i, r->origin, r->direction, objects, planes, &face);
         const mask here = less(t, nearest) & less(t, r->far);
         nearest = pick(here, t, nearest);
         *number = pick(here, (real)((scalar)(i + 1)), *number);
@@ -145,7 +165,7 @@ INLINE vec object_normal(__global const struct Object *o, vec point, __global co
     return vec_normalize(vec_add(vec_add(x, y), vec_scale(vec_splat(o->own_z), n.z)));
 }
 
-#if HAS_GLASS
+#if HAS_GLASS || HAS_CUT_OBJECTS
 // Whether a place is inside an object, or below a plane.
 INLINE mask object_holds(__global const struct Object *o, vec point) {
     const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
@@ -159,6 +179,28 @@ INLINE mask object_holds(__global const struct Object *o, vec point) {
     if (o->kind == OBJECT_WATER) return less(own.z, water_height(o, own.x, own.y, own, &unused));
 #endif
     return less(own.z, R(0.0));
+}
+#endif
+
+#if HAS_CUT_OBJECTS
+// What a ray has met of the objects with these numbers: where that is the face of a cut its number and normal.
+INLINE real objects_faced(vec origin, vec direction, real number, __global const struct Object *objects, __global const struct CutPlane *planes,
+                          int count, vec *normal) {
+    real thing = number;
+    for (int i = 0; i < count; ++i) {
+        const mask here = equal(number, (real)((scalar)(i + 1)));
+        if (!any_lane(here)) continue;
+        real face;
+        object_met(i, origin, direction, objects, planes, &face);
+        for (int plane = 0; plane < PLANES; ++plane) {
+            const mask faced = here & equal(face, (real)((scalar)plane));
+            const vec front = vec_splat(planes[plane].normal);
+            const real side = pick(less(R(0.0), vec_dot(front, direction)), R(-1.0), R(1.0));
+            thing = pick(faced, face_number(face, number), thing);
+            *normal = vec_pick(faced, vec_scale(front, side), *normal);
+        }
+    }
+    return thing;
 }
 #endif
 

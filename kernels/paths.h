@@ -29,9 +29,9 @@ STAGE(scatter_paths) {
 #endif
     if (any_lane(lands)) {
 #if !COLORING_PER_POINT
-        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
+        found.tint = tint_of(&found, w);
 #endif
-        pbr p = pbr_at(s, &found, w);
+        pbr p = pbr_of_spot(s, &found, w);
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
         real wave, unused;

@@ -145,11 +145,14 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     here.smooth = p->smooth;
 #if HAS_OBJECTS
     here.object = p->object;
-#elif HAS_MATTES
+#elif HAS_MATTES || HAS_FACES
     here.object = R(0.0);
 #endif
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);
+#if HAS_CUT_OBJECTS && !COLORING_PER_POINT
+    here.tint = spot_color(p->normal, p->smooth, p->object, w);
+#endif
     here.normal = p->normal;
     here.residual = R(0.0);
     here.quantity = R(0.0);

@@ -4,12 +4,20 @@ INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
     return vec_along(vec_splat(plane->zoom_origin), (real)(plane->zoom), point);
 }
 
+// What a plane shows at a point of it: the formula, and the inside of what it cuts beside the set.
 INLINE escaped plane_look(vec point, mask active, int i, plane_set set) {
-    return plane_escape(plane_place(point, set.planes + i), active, set.planes[i].smooth, 1, set.planes[i].iterations,
-                        set.orbits, set.k);
+    escaped e = plane_escape(plane_place(point, set.planes + i), active, set.planes[i].smooth, 1, set.planes[i].iterations,
+                             set.orbits, set.k);
+#if HAS_CUT_OBJECTS
+    for (int object = 0; object < MOST_OBJECTS; ++object) {
+        if (plane_cuts(set.planes + i, object)) e.inside |= active & object_holds(set.objects + object, point);
+    }
+    e.count = pick(e.inside, (real)((scalar)set.planes[i].iterations), e.count);
+#endif
+    return e;
 }
 
-// Whether the rays that begin at a cutting plane begin inside the set: faces, with their colours.
+// Whether the rays that begin at a plane which cuts the set begin inside it: faces, with their colours.
 INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tint, vec *normal, real *count) {
     mask found = active & ~active;
     active &= less(R(-0.5), face);
@@ -101,7 +109,8 @@ INLINE plane_hit planes_next(const plane_hits *hits, real before, real after, pl
 }
 
 // The quads along a ray of the picture, in front of and behind distance `object` (the largest number where nothing was hit).
-INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) {
+// `hidden`: the plane whose quad is behind it though it is at this very distance, or -1.
+INLINE plane_layers planes_seen(ray r, real object, real hidden, mask active, plane_set set) {
     const plane_hits hits = planes_met(r, active, set);
     plane_layers layers;
     layers.front = color_of(R(0.0), R(0.0), R(0.0));
@@ -117,7 +126,7 @@ INLINE plane_layers planes_seen(ray r, real object, mask active, plane_set set) 
         if (!any_lane(less(next.distance, (real)(REAL_LARGEST)))) break;
         before = next.distance;
         after = next.index;
-        const mask in_front = less(next.distance, object);
+        const mask in_front = less(next.distance, object) & ~equal(next.index, hidden);
         const real front = pick(in_front, next.alpha * layers.front_through, R(0.0));
         const real behind = pick(in_front, R(0.0), next.alpha * layers.behind_through);
         layers.front = color_add(layers.front, color_scale(next.tint, front));

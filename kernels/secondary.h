@@ -105,9 +105,9 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn
     return 1;
 }
 
-// Sends all rays that leave a spot for its light.
+// Sends all rays that leave a spot for its light. (Faces of cuts have none in this light.)
 INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, int turns, world w) {
-    const mask found = mask_of(here->found);
+    const mask found = mask_of(here->found) & ~on_face(here);
     for (int turn = 0; turn < turns; ++turn) {
         incidence in;
         mask wanted = found;

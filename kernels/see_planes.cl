@@ -14,51 +14,53 @@
 #include "escape.h"
 #include "escape_colors.h"
 #include "planes.h"
-#include "planes_seen.h"
 #include "stage.h"
 #include "state.h"
 #include "eye.h"
+#include "planes_seen.h"
 
-// Finds where a cutting plane opens the set: there its face is visible, and no ray goes on.
+#if HAS_FACES
+// Finds where a plane opens the set on the ray that was sent for the next spot: there its face is met, and no ray goes on. (Of objects
+// beside the set stages know that by themselves, see `surface_met`.)
 STAGE(find_faces) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
     const aim a = aim_kept(s.state, s.stride);
-    ray r = eye_ray(&a, view);
+    path so_far;
+    const ray whole = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
+    ray r = whole;
     real from;
     plane_face face;
-    const mask left = planes_cut(&r, &from, w.planes) & mask_of(a.wanted);
+    const mask left = planes_cut(&r, &from, w.planes) & mask_of(so_far.on_path);
     face.t = r.near;
     face.count = R(0.0);
     face.tint = color_of(R(0.0), R(0.0), R(0.0));
     face.normal = vec_of(R(0.0), R(0.0), R(0.0));
     mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
 #if HAS_OBJECTS
-    const ray whole = eye_ray(&a, view);
     real number;
-    bare &= less(face.t, objects_met(&whole, w.objects, settings->object_count, w.tables, &number));
+    if (any_lane(bare)) bare &= less(face.t, objects_met(&whole, w.objects, w.planes.planes, settings->object_count, w.tables, &number));
 #endif
-    face.bare = number_of(bare);
+    face.number = pick(bare, face_number(from, R(0.0)), R(0.0));
     STATE_KEEP(s, face, STATE_FACE);
     __global scalar *far = s.q.rays + RAY_FAR * s.q.stride + s.slot;
     lanes_store(pick(bare, R(-1.0), lanes_load(far)), far);
 }
+#endif
 
-// Finds the planes in front of and behind the first spots.
+// Finds the planes in front of and behind the first spots. Along paths faces have light, and quads have none: there a face hides the
+// part of its own quad that is at the same place.
 STAGE(find_planes) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
     const aim a = aim_kept(s.state, s.stride);
     const spot found = spot_kept(s.state, 0, s.stride);
-    plane_face face;
-    STATE_RECALL(s, face, STATE_FACE);
     const ray r = eye_ray(&a, view);
-    const mask bare = mask_of(face.bare);
-    const vec point = vec_pick(bare, vec_along(r.origin, face.t, r.direction), found.seen);
-    const real way = vec_dot(vec_sub(point, r.origin), r.direction);
-    const real object = pick(bare | mask_of(found.found), way, (real)(REAL_LARGEST));
-    const plane_layers layers = planes_seen(r, object, mask_of(a.wanted), w.planes);
+    const real way = vec_dot(vec_sub(found.seen, r.origin), r.direction);
+    const real object = pick(mask_of(found.found), way, (real)(REAL_LARGEST));
+    const real hidden = HAS_PATHS ? plane_of_face(OBJECT_OF(found)) : R(-1.0);
+    const plane_layers layers = planes_seen(r, object, hidden, mask_of(a.wanted), w.planes);
     STATE_KEEP(s, layers, STATE_LAYERS);
 }

@@ -41,21 +41,6 @@ INLINE void glance_once(stage s, color seen) {
 }
 #endif
 
-#if PLANES > 0
-// Where a plane's face is seen, it is what the shot has found: a part of the set.
-INLINE void face_into(shot *result, plane_face face, ray from_eye) {
-    const mask bare = mask_of(face.bare);
-    result->hit |= bare;
-    result->coverage = pick(bare, R(1.0), result->coverage);
-    result->point = vec_pick(bare, vec_along(from_eye.origin, face.t, from_eye.direction), result->point);
-    result->normal = vec_pick(bare, face.normal, result->normal);
-    result->smooth = pick(bare, face.count, result->smooth);
-#if HAS_MATTES
-    result->thing = pick(bare, R(1.0), result->thing);
-#endif
-}
-#endif
-
 // The shot at its end: what its path has seen, over the background; and what it has found first.
 INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, world w) {
     sighting first;
@@ -72,19 +57,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #endif
     shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
 #if HAS_MATTES
-    result.thing = pick(result.hit, found.object + R(1.0), R(0.0));
-#endif
-#if PLANES > 0
-    plane_face face;
-    STATE_RECALL(s, face, STATE_FACE);
-    const mask bare = mask_of(face.bare);
-#if HAS_PARTS
-    look.albedo = color_pick(bare, face.tint, look.albedo);
-#endif
-    seen = color_pick(bare, face.tint, seen);
-    face_into(&result, face, from_eye);
-#endif
-#if HAS_MATTES
+    result.thing = pick(result.hit, thing_cut(found.object) + R(1.0), R(0.0));
     result.covers = result.coverage;
 #endif
     result.depth = depth_of(result.point, a.time, w.view);

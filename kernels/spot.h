@@ -19,9 +19,14 @@ INLINE mask faces(stage s, const spot *here, vec direction) {
     return any_normal;
 }
 
-// The colour of a spot: the set's, or that of the object with this number.
+// The colour of a thing: the set's, or that of the object with this number. The face of an object's cut shows the plane's colour of
+// insides; what that of the set's shows only the formula knows.
 INLINE color spot_color(vec normal, real quantity, real object, world w) {
     color found = surface_color(normal, quantity, w.material, w.palette);
+#if HAS_CUT_OBJECTS
+    const real plane = plane_of_face(object);
+    for (int i = 0; i < PLANES; ++i) found = color_pick(equal(plane, (real)((scalar)i)), color_splat(w.planes.planes[i].inside), found);
+#endif
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask here = equal(object, (real)((scalar)(i + 1)));
@@ -31,7 +36,24 @@ INLINE color spot_color(vec normal, real quantity, real object, world w) {
     return found;
 }
 
-// What a ray for a spot has met: the set, or the object with this number.
+// The same of a spot. Faces have theirs already.
+INLINE color tint_of(const spot *here, world w) {
+    return color_pick(on_face(here), here->tint, spot_color(here->normal, here->quantity, OBJECT_OF(*here), w));
+}
+
+#if HAS_OBJECTS
+// The count on the face of an object's cut: all that the plane takes. Of other things that are no formulas it is 0.
+INLINE real face_count(real thing, world w) {
+    real count = R(0.0);
+#if HAS_CUT_OBJECTS
+    const real plane = plane_of_face(thing);
+    for (int i = 0; i < PLANES; ++i) count = pick(equal(plane, (real)((scalar)i)), (real)((scalar)w.planes.planes[i].iterations), count);
+#endif
+    return count;
+}
+#endif
+
+// What a ray for a spot has met: the set, or the object with this number, or the face of an object's cut.
 INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
     encounter met = queue_met(s.q, turn, s.slot);
     *object = R(0.0);
@@ -40,10 +62,13 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
     const mask here = less(R(0.0), *object);
     if (any_lane(here)) {
         const vec point = vec_along(r.origin, met.t, r.direction);
-        const vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count, w.tables);
+        vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count, w.tables);
+#if HAS_CUT_OBJECTS
+        *object = objects_faced(r.origin, r.direction, *object, w.objects, w.planes.planes, w.settings->object_count, &normal);
+#endif
         met.normal = vec_pick(here, normal, met.normal);
         met.touch = pick(here, met.t, met.touch);
-        met.smooth = pick(here, R(0.0), met.smooth);
+        met.smooth = pick(here, face_count(*object, w), met.smooth);
         met.more_steps = pick(here, R(0.0), met.more_steps);
         met.more_count = pick(here, R(0.0), met.more_count);
     }
@@ -54,10 +79,11 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
     return met;
 }
 
-// How far over a spot rays leave it: far enough from the set not to meet the very bump that they start from. An object has none.
+// How far over a spot rays leave it: far enough from the set not to meet the very bump that they start from. An object has none, nor
+// has a face.
 INLINE real lift_of(const spot *here, world w) {
     const real over_set = here->cone * (real)(w.settings->shadow_lift);
-#if HAS_OBJECTS
+#if HAS_OBJECTS || HAS_FACES
     const real far_out = fmax(fmax(fabs(here->point.x), fabs(here->point.y)), fabs(here->point.z));
     const real over_object = R(0.05) * here->cone + R(64.0) * (real)(REAL_EPSILON) * far_out;
     return pick(of_the_set(here->object, w), over_set, over_object);
@@ -78,11 +104,30 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
     here.residual = R(0.0);
     here.quantity = R(0.0);
     here.tint = spot_color(met.normal, met.smooth, object, w);
-#if HAS_OBJECTS || HAS_MATTES
+#if HAS_OBJECTS || HAS_MATTES || HAS_FACES
     here.object = object;
 #endif
     return here;
 }
+
+#if HAS_FACES
+// Where the ray for a spot meets a face of the set before all else, that is the spot: such lanes are the result.
+INLINE mask spot_on_face(stage s, ray r, spot *here) {
+    plane_face face;
+    STATE_RECALL(s, face, STATE_FACE);
+    const mask bare = less(R(0.0), face.number);
+    if (!any_lane(bare)) return bare;
+    here->found = pick(bare, R(1.0), here->found);
+    here->seen = vec_pick(bare, vec_along(r.origin, face.t, r.direction), here->seen);
+    here->point = vec_pick(bare, here->seen, here->point);
+    here->normal = vec_pick(bare, face.normal, here->normal);
+    here->cone = pick(bare, r.footprint + r.spread * face.t, here->cone);
+    here->smooth = pick(bare, face.count, here->smooth);
+    here->tint = color_pick(bare, face.tint, here->tint);
+    here->object = pick(bare, face.number, here->object);
+    return bare;
+}
+#endif
 
 #if HAS_GLASS_SET
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.

@@ -21,7 +21,12 @@ typedef struct {
     __global const scalar *set_lights;
     __global const struct Object *objects;
 } world;
-#define WORLD {view, settings, material, lights, palette, environment, {planes, orbit, k, plane_palettes}, materials, albedos, maps, tables, set_lights, objects}
+#if HAS_CUT_OBJECTS
+#define PLANE_SET {planes, orbit, k, plane_palettes, objects}
+#else
+#define PLANE_SET {planes, orbit, k, plane_palettes}
+#endif
+#define WORLD {view, settings, material, lights, palette, environment, PLANE_SET, materials, albedos, maps, tables, set_lights, objects}
 
 // A work-item's packet.
 typedef struct {

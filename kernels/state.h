@@ -33,18 +33,26 @@ typedef struct {
     real cone;               // the pixel's footprint there
     real smooth;             // escape count
     color tint;
-#if HAS_OBJECTS || HAS_MATTES
-    real object;             // the number of the object, from 1; 0: the set; -1: a light, where it is seen first
+#if HAS_OBJECTS || HAS_MATTES || HAS_FACES
+    real object;             // the number of the object, from 1; 0: the set; -1: a light, where it is seen first; or a face's, see planes.h
 #endif
     real quantity;           // what chooses the colour, where that is not known at once
     real residual;           // distance of the pixel's points from their plane, in footprints
 } spot;
 
-#if HAS_OBJECTS || HAS_MATTES
+#if HAS_OBJECTS || HAS_MATTES || HAS_FACES
 #define OBJECT_OF(here) ((here).object)
 #else
 #define OBJECT_OF(here) R(0.0)
 #endif
+
+INLINE mask on_face(const spot *here) {
+#if HAS_FACES
+    return is_face(here->object);
+#else
+    return less(R(1.0), R(0.0));
+#endif
+}
 
 // One of the normals over which shading is averaged.
 typedef struct {
@@ -79,9 +87,9 @@ typedef struct {
 #endif
 } carried;
 
-// Where a cutting plane opens the set, and its face is visible.
+// Where a plane opens the set on the way to the next spot; its number as a thing, or 0.
 typedef struct {
-    real bare, t, count;
+    real number, t, count;
     color tint;
     vec normal;
 } plane_face;

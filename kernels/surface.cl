@@ -152,6 +152,9 @@ STAGE(find_spots) {
         at_first.steps = met.steps;
         found = spot_of_ray(r, met, object, w);
     }
+#if HAS_FACES
+    at_first.coverage = pick(spot_on_face(s, r, &found), R(1.0), at_first.coverage);
+#endif
     if (bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
     STATE_KEEP(s, cost, STATE_TALLY);
     found.found = pick(mask_of(so_far.on_path), found.found, R(0.0));
@@ -184,15 +187,16 @@ STAGE(light_spots) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT
-        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
+        found.tint = tint_of(&found, w);
 #endif
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
+        gathered = color_pick(on_face(&found), found.tint, gathered);
     }
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
 #endif
     const int last = bounce == settings->bounces;
-    const color mirrored = mirrored_at(&found, direction, w);
+    const color mirrored = color_pick(on_face(&found), color_of(R(0.0), R(0.0), R(0.0)), mirrored_at(&found, direction, w));
     path_add(s, &so_far, direction, a.y, &found, gathered, mirrored, last, w);
     if (!last) {
         STATE_KEEP(s, cost, STATE_TALLY);

@@ -58,7 +58,7 @@ INLINE shot take_shot(real x, real y, real lens_x, real lens_y, real time, mask 
     *steps += looked;
 #if PLANES > 0 && SURFACE
     const real distance = pick(s.hit, e.t, (real)(REAL_LARGEST));
-    s = planes_into(s, e.light, background, planes_seen(r, distance, wanted, w.planes), time, w.view);
+    s = planes_into(s, e.light, background, planes_seen(r, distance, R(-1.0), wanted, w.planes), time, w.view);
 #endif
     return s;
 }

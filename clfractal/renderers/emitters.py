@@ -16,14 +16,16 @@ def asked_radiance(scene: Scene) -> list[Vector | None]:
     """Of each object the radiance, linear Rec. 709, with which paths ask for it; None where they do not.
 
     Spheres, boxes and cylinders that stand beside the set are asked for where they shine the same everywhere. What differs
-    from place to place, blends, glass, which shines inside too, and what is joined to the set are found by chance alone.
+    from place to place, blends, glass, which shines inside too, what planes cut, and what is joined to the set are found
+    by chance alone.
     """
     if not isinstance(scene.lighting, PathLighting):
         return [None] * len(scene.objects)
     found: list[Vector | None] = []
+    cut = {name for plane in scene.cut_planes for name in plane.cut_objects}
     materials, glass = used_materials(scene)[1:], glass_bodies(scene)[1:]
     for (name, each), material, through in zip(scene.objects.items(), materials, glass, strict=True):
-        beside = isinstance(each, Solid) and name not in scene.joined
+        beside = isinstance(each, Solid) and name not in scene.joined and name not in cut
         found.append(even_radiance(material) if beside and not through else None)
     return found
 

@@ -33,7 +33,8 @@ CUT_PLANE = Struct(
         Field("inside_opacity", "real", 0, "of the quad in the set"),
         Field("zoom", "real", 0, "the formula is evaluated at zoom_origin + zoom * point"),
         Field("zoom_origin", "real", 3, "scene units"),
-        Field("cut", "int", 0, "1: the object in front is removed"),
+        Field("cut", "int", 0, "1: the part of the set in front is removed"),
+        Field("objects", "int", 2, "a bit for each object: that of one beside the set is removed likewise"),
         Field("smooth", "int", 0, "1: smooth counts"),
         Field("iterations", "int", 0, "most applications of the formula"),
         *ESCAPE_COLORS.fields,
@@ -57,8 +58,22 @@ def plane_defines(scene: Scene) -> dict[str, object]:
     """What the text of `kernels/planes.h` depends on."""
     return {
         "PLANES": plane_count(scene),
+        **face_defines(scene),
         "ESCAPE_COLORS": "__global const struct CutPlane",
     }
+
+
+def face_defines(scene: Scene) -> dict[str, object]:
+    """The defines of all programs that send rays, or read what is kept between stages."""
+    return {
+        "HAS_FACES": int(has_faces(scene)),
+        "HAS_CUT_OBJECTS": int(any(any(_cut_objects(scene, plane)) for plane in scene.cut_planes)),
+    }
+
+
+def has_faces(scene: Scene) -> bool:
+    """Whether any plane cuts something, of which faces may be seen."""
+    return any(plane.cut for plane in scene.cut_planes)
 
 
 def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
@@ -76,7 +91,8 @@ def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
             "inside_opacity": plane.opacity if plane.inside_opacity is None else plane.inside_opacity,
             "zoom": zoom,
             "zoom_origin": origin,
-            "cut": int(plane.cut),
+            "cut": int(plane.cuts_set),
+            "objects": _cut_objects(scene, plane),
             "smooth": int(plane.colors.mode == "smooth"),
             "iterations": _iterations(scene, plane),
             **escape_colors_values(plane.colors, _iterations(scene, plane)),
@@ -89,6 +105,16 @@ def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
 def plane_palettes(scene: Scene) -> npt.NDArray[np.float32]:
     """The palettes of all planes, shape (planes, 256, 3), linear Rec. 709."""
     return np.stack([escape_palette(plane.colors) for plane, _ in all_planes(scene)])
+
+
+def _cut_objects(scene: Scene, plane: CutPlane) -> tuple[int, int]:
+    """The objects beside the set that a plane cuts, 32 bits in each number."""
+    words = [0, 0]
+    for index, name in enumerate(scene.objects):
+        if name in plane.cut_objects and name not in scene.joined:
+            words[index // 32] |= 1 << index % 32
+    low, high = (word - (word >> 31 << 32) for word in words)
+    return low, high
 
 
 def _iterations(scene: Scene, plane: CutPlane) -> int:

@@ -43,6 +43,8 @@ from clfractal.renderers.passes import has_mattes, has_parts, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
+    face_defines,
+    has_faces,
     plane_count,
     plane_defines,
     plane_palettes,
@@ -164,6 +166,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_NUMBERS": state_numbers(scene, plan),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
+        **face_defines(scene),
         **object_defines(scene),
         **Body.of(scene).defines,
         "HAS_SHAFTS": int(air_turns(scene) > 0),
@@ -199,7 +202,7 @@ def normal_count(scene: Scene) -> int:
 
 def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * bool(scene.objects)
+    more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * (bool(scene.objects) or has_faces(scene))
     if has_parts(plan):
         more += _PARTS_NUMBERS + 3 * has_bump(scene)
     more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
@@ -351,5 +354,6 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         texts.append(text("glow", "glow.cl", glow_defines(scene, plan, scene.glow), "add_glow"))
     if scene.cut_planes:
         planes = {**state_defines(scene, plan), **coloring_defines(Coloring()), **plane_defines(scene)}
-        texts.append(text("planes", "see_planes.cl", planes, "find_faces", "find_planes"))
+        faces = ("find_faces",) if has_faces(scene) else ()
+        texts.append(text("planes", "see_planes.cl", planes, *faces, "find_planes"))
     return texts

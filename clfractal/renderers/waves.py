@@ -6,7 +6,8 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
 
-with `[find_planes]` and `[add_glow]` after `[color_spots]`; each mirror adds what follows `begin_shots` but for the points.
+with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look for a spot; each
+mirror adds what follows `begin_shots` but for the points.
 With `lighting.mode: path` in the place of the last two
 
     scatter_paths  march  gather_paths
@@ -22,6 +23,7 @@ from collections.abc import Iterator
 from clfractal.renderers.kernel import Stage
 from clfractal.renderers.maps import asked_maps, bump_numbers, has_glass_set
 from clfractal.renderers.plan import Plan
+from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.renderers.set_lights import single_lights
 from clfractal.scene.light_paths import PathLighting
@@ -117,10 +119,10 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
 
     yield stage("begin_shots", int(cones))
-    if scene.cut_planes:
-        yield stage("find_faces")
     for bounce in range(bounces(scene) + 1):
         turns = 1
+        if has_faces(scene):
+            yield stage("find_faces", bounce=bounce)
         if points > 1 and bounce == 0:
             yield from _marched(marching, 1, GOAL_TOUCH)
             turns = points
@@ -133,13 +135,16 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
         if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)
-        if scene.cut_planes and bounce == 0:
+        paths = isinstance(scene.lighting, PathLighting)
+        if scene.cut_planes and bounce == 0 and not paths:
             yield stage("find_planes")
         if scene.glow is not None:
             yield stage("add_glow", bounce=bounce)
         air = air_turns(scene) if bounce == 0 else 0
-        if isinstance(scene.lighting, PathLighting):
+        if paths:
             yield stage("scatter_paths", 1, bounce=bounce)
+            if scene.cut_planes and bounce == 0:
+                yield stage("find_planes")
             yield from _marched(marching, 1 + air, GOAL_SHADOW)
             yield stage("gather_paths", 1 + air, bounce=bounce)
             continue

@@ -262,8 +262,6 @@ def _check_paths(scene: Scene, renderer: SurfaceRenderer) -> None:
             "cannot be combined with lighting.mode path, whose samples find spots of their own; use renderer.samples",
             Where(path=f"renderer.{key}"),
         )
-    if scene.cut_planes:
-        raise SceneError("cannot be combined with lighting.mode path yet", Where(path="cut_planes"))
 
 
 def _check_medium(scene: Scene, renderer: VolumeRenderer) -> None:
@@ -287,7 +285,9 @@ def _check_lights(scene: Scene) -> None:
     candidates = [
         (index, light.position)
         for index, light in enumerate(scene.lights)
-        if isinstance(light, PlacedLight) and dist(light.position, center) <= radius
+        if isinstance(light, PlacedLight)
+        and dist(light.position, center) <= radius
+        and not any(plane.cuts_set and plane.in_front(light.position) for plane in scene.cut_planes)
     ]
     if not candidates:
         return

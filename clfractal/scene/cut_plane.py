@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Color, Coordinate, Fraction, Section
+from clfractal.scene.base import Color, Coordinate, Fraction, Section, Vector
 from clfractal.scene.coloring import Palette, check_order
 from clfractal.scene.objects import MAX_OBJECTS, ObjectName
 from clfractal.scene.plane import Plane
@@ -63,8 +63,12 @@ class CutPlane(Section):
         None, description="opacity where the rectangle is in the set; null: as `opacity`"
     )
     cut: bool = Field(False, description="whether the object in front of the plane is removed")
+    set: bool = Field(
+        True,
+        description="with `cut`, whether the set is cut, with all that is joined to it; false: only what `objects` names",
+    )
     objects: Annotated[tuple[ObjectName, ...], Field(strict=False, max_length=MAX_OBJECTS)] = Field(
-        (), description="with `cut`, what stands beside the set and is cut too: names of `objects`"
+        (), description="with `cut`, what stands beside the set and this plane cuts too: names of `objects`"
     )
     iterations: Iterations | None = Field(
         None, description="maximum number of iterations on the plane; null: formula.iterations"
@@ -73,6 +77,22 @@ class CutPlane(Section):
     spacing: Coordinate = Field(
         0.1, description="distance between neighbouring planes along the normal, scene units"
     )
+
+    @property
+    def cuts_set(self) -> bool:
+        """Whether it removes a part of the set."""
+        return self.cut and self.set
+
+    @property
+    def cut_objects(self) -> tuple[str, ...]:
+        """What it removes parts of beside the set, by name."""
+        return self.objects if self.cut else ()
+
+    def in_front(self, point: Vector) -> bool:
+        """Whether a point is in front of the plane, or of one of its stack: of what is removed if it cuts."""
+        placed = self.plane.placed
+        height = sum((p - c) * n for p, c, n in zip(point, placed.center, placed.normal, strict=True))
+        return height > min(0.0, (self.count - 1) * self.spacing)
 
 
 CutPlanes = Annotated[tuple[CutPlane, ...], Field(strict=False, max_length=64)]

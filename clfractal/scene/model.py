@@ -162,16 +162,15 @@ class Scene(Section):
     def joined(self) -> "Mapping[str, Joined]":
         """The objects that are parts of the set, in their order.
 
-        Surfaces have those here that their rays march to: formulas, what is not only beside the set, and what cutting
-        planes name. In volumes and on planes all are parts of it.
+        Surfaces have those here that their rays march to: formulas, and what is not only beside the set. In volumes and
+        on planes all are parts of it.
         """
         filled = not isinstance(self.renderer, SurfaceRenderer)
-        named = {name for plane in self.cut_planes if plane.cut for name in plane.objects}
         return {
             name: each
             for name, each in self.objects.items()
             if isinstance(each, Joined)
-            and (filled or name in named or each.join != "union" or isinstance(each, FormulaObject))
+            and (filled or each.join != "union" or isinstance(each, FormulaObject))
         }
 
     def solid_mapping(self) -> dict[str, Any]:

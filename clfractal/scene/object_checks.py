@@ -24,6 +24,7 @@ from clfractal.scene.volume import VolumeRenderer
 def check_objects(scene: Scene) -> None:
     """Raises SceneError, with a dotted path, for objects that cannot be shown."""
     _check_named(scene)
+    _check_opened(scene)
     if not scene.objects:
         return
     if not isinstance(scene.renderer, SurfaceRenderer):
@@ -32,6 +33,7 @@ def check_objects(scene: Scene) -> None:
     _check_volumes(scene)
     for name, each in scene.objects.items():
         _check_material(scene, name, each.material)
+        _check_cut(scene, name, each.material)
         if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
             _check_lights(scene, name, each)
 
@@ -42,8 +44,13 @@ def can_show(renderer: str, kind: str) -> bool:
 
 
 def _check_named(scene: Scene) -> None:
-    """What planes name can be cut as parts of the set."""
+    """What planes name can be cut, each for itself or with the set."""
     for number, plane in enumerate(scene.cut_planes):
+        if not plane.set and not isinstance(scene.renderer, SurfaceRenderer):
+            raise SceneError(
+                "is for surface renderers: in a volume all that there is belongs to the set; remove it",
+                Where(path=f"cut_planes.{number}.set"),
+            )
         for place, name in enumerate(plane.objects):
             where = Where(path=f"cut_planes.{number}.objects.{place}")
             if name not in scene.objects:
@@ -55,6 +62,37 @@ def _check_named(scene: Scene) -> None:
                 )
             if isinstance(each, VolumeObject):
                 raise SceneError(f"{name!r} cannot be cut: it is a volume, which no plane opens", where)
+            if not plane.set and name in scene.joined:
+                raise SceneError(
+                    f"{name!r} is a part of the set, which is cut as a whole; set: true cuts it", where
+                )
+
+
+def _check_opened(scene: Scene) -> None:
+    """Along paths a set of glass has no faces."""
+    used = scene.material.name
+    if not isinstance(scene.renderer, SurfaceRenderer) or not _lets_through(scene, used):
+        return
+    for number, plane in enumerate(scene.cut_planes):
+        if plane.cuts_set:
+            raise SceneError(
+                f"cannot open a set of glass, {used!r}, along paths", Where(path=f"cut_planes.{number}.cut")
+            )
+
+
+def _check_cut(scene: Scene, name: str, material: str | None) -> None:
+    """Nor has an object of glass that stands beside it."""
+    if not isinstance(scene.renderer, SurfaceRenderer) or not _lets_through(
+        scene, material or scene.material.name
+    ):
+        return
+    for number, plane in enumerate(scene.cut_planes):
+        if name in plane.cut_objects:
+            place = plane.objects.index(name)
+            raise SceneError(
+                f"{name!r} is glass, which cannot be cut along paths",
+                Where(path=f"cut_planes.{number}.objects.{place}"),
+            )
 
 
 def _check_filled(scene: Scene, renderer: VolumeRenderer | CutPlaneRenderer) -> None:
@@ -167,10 +205,13 @@ def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
     if solid.holds(scene.camera.position):
         return
     glass = _lets_through(scene, solid.material or scene.material.name)
+    opened = [plane for plane in scene.cut_planes if name in plane.cut_objects]
     for index, light in enumerate(scene.lights):
         if glass and isinstance(light, (SphereLight, RectangleLight)):
             continue  # paths find it, since it has a size
         if isinstance(light, PlacedLight) and solid.holds(light.position):
+            if any(plane.in_front(light.position) for plane in opened):
+                continue
             shown = ", ".join(f"{x:g}" for x in light.position)
             raise SceneError(
                 f"must be outside the object {name!r}, where its light reaches something, got [{shown}]",

@@ -290,13 +290,11 @@ def _of_solid(seen: _Seen) -> list[str]:
         return []
     for view in seen.views:
         eye = view.camera.origin
-        if any(
-            plane.cut and float((eye - plane.plane.placed.center) @ np.array(plane.plane.placed.normal)) > 0
-            for plane in scene.cut_planes
-        ):
+        x, y, z = (float(each) for each in eye)
+        if any(plane.cuts_set and plane.in_front((x, y, z)) for plane in scene.cut_planes):
             continue
-        point = _in_zoom(scene, volume, eye) if volume is not None else eye
-        x, y, z = (float(each) for each in point)
+        if volume is not None:
+            x, y, z = (float(each) for each in _in_zoom(scene, volume, eye))
         if inside_solid(scene, [(x, y, z)])[0]:
             return ["the camera is inside the set; move camera.position out of it"]
     return []

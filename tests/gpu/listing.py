@@ -32,10 +32,12 @@ _FORMULAS = (
     "kaliset",
     "riemann_sphere",
 )
+_TILTED = {"normal": [1, -1, 0.2], "width": 2, "height": 2}
 _OFTEN: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "planes": {
         "": {},
-        "planes": {"cut_planes": [{"plane": {"normal": [1, -1, 0.2], "width": 2, "height": 2}, "count": 2}]},
+        "planes": {"cut_planes": [{"plane": _TILTED, "count": 2}]},
+        "cut": {"cut_planes": [{"plane": _TILTED, "cut": True}]},
     },
     "lens": {"": {}, "lens": {"camera": {"f_number": 0.5}}},
     "noise": {"": {}, "noise": {"renderer": {"noise": 0.01, "samples": 64}}},
@@ -120,6 +122,11 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "joined": {"objects": _JOINED},
         "grids": {"objects": _GRIDS, "materials": {"wood": {}}},
         "clouds": {"objects": _CLOUDS, "materials": {"wood": {}}},
+        "opened": {
+            "objects": _OBJECTS,
+            "materials": {"wood": {}},
+            "cut_planes": [{"plane": _TILTED, "cut": True, "set": False, "objects": ["ball"]}],
+        },
     },
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
@@ -172,15 +179,17 @@ _APART = {
         if name
     ),
     *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass", "maps")),
-    *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass", "maps")),
-    frozenset({("objects", "joined"), ("planes", "planes")}),
+    frozenset({("lighting", "glass"), ("planes", "cut")}),
+    # These have planes of their own.
+    *(frozenset({("objects", "opened"), ("planes", name)}) for name in ("planes", "cut")),
+    *(frozenset({("objects", "joined"), ("planes", name)}) for name in ("planes", "cut")),
     frozenset({("objects", "joined"), ("lighting", "glass")}),
     frozenset({("objects", "clouds"), ("lighting", "")}),
     frozenset({("objects", "clouds"), ("fog", "shafts")}),
 }
 _OF_MEDIA = {
     frozenset({("lighting", "path"), ("transfer", "level")}),
-    frozenset({("lighting", "path"), ("planes", "planes")}),
+    *(frozenset({("lighting", "path"), ("planes", name)}) for name in ("planes", "cut")),
 }
 _FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
 

@@ -88,7 +88,9 @@ _MORE = {
     "objects: {sea: {type: water, position: [0, 0, -0.7], material: clay}, floor: {type: plane, position: [0, 0, -1]},"
     " ball: {position: [0.6, -0.9, 0.2], radius: 0.3, scale: [1, 1, 2], material: clay},"
     " box: {type: box, position: [-0.6, -0.9, 0.5], size: [0.3, 0.2, 0.4], rotation: [20, 30, 0], material: clay},"
-    " tube: {type: cylinder, position: [0, -1, -0.4], radius: 0.1, height: 0.8, rotation: [0, 70, 0], material: clay}}\n",
+    " tube: {type: cylinder, position: [0, -1, -0.4], radius: 0.1, height: 0.8, rotation: [0, 70, 0], material: clay}}\n"
+    "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true, objects: [ball, tube], opacity: 0.3,"
+    " iterations: 20}]\n",
     "glass": "lighting: {mode: path, bounces: 6}\nenvironment: {name: studio}\n"
     "materials: {glass: {specular: {roughness: 0.2}, coat: {weight: 0.2},"
     " transmission: {weight: 0.9, color: [0.6, 0.9, 0.8], depth: 1, dispersion_scale: 0.5},"

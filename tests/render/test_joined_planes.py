@@ -1,4 +1,4 @@
-"""Cut planes through several solids that are joined, against NumPy."""
+"""Cut planes through several solids that are joined, and through those beside them that they name, against NumPy."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 import clfractal
 from clfractal.formulas import reference
 from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests.voxels.joined import EVERY_JOIN, belongs, held_by, own_places
 
@@ -49,8 +50,9 @@ def points_of_pixels() -> np.ndarray[Any, np.dtype[np.float64]]:
     return np.stack([x, np.full_like(x, 0.1), z], axis=-1)
 
 
-def counts_of(scene: Any, at: Any, limit: int | None) -> Any:
-    """Whole counts: the largest of what is beside each other; the limit inside, 0 where something is cut out."""
+def counts_of(scene: Scene, at: Any, limit: int | None) -> Any:
+    """Whole counts: the largest of what is beside each other; the limit inside, also of what the plane names; 0 where
+    something is cut out of the set."""
     most = limit or scene.formula.iterations
     found = reference.escape(scene.chain, at.reshape(-1, 3), most)[0].reshape(at.shape[:-1])
     for name, each in scene.joined.items():
@@ -61,7 +63,13 @@ def counts_of(scene: Any, at: Any, limit: int | None) -> Any:
         else:
             more = np.where(held_by(each, at), most, 0)
         found = np.minimum(found, most - more) if each.join == "cut" else np.maximum(found, more)
-    return found
+    return np.where(held_beside(scene, at), most, found)
+
+
+def held_beside(scene: Scene, at: Any) -> Any:
+    """Which points are in what a plane names."""
+    named = [scene.objects[name] for plane in scene.cut_planes for name in plane.cut_objects]
+    return np.any([np.zeros(at.shape[:-1], bool), *(held_by(each, at) for each in named)], axis=0)
 
 
 @pytest.mark.parametrize("limit", [None, 12])
@@ -81,12 +89,13 @@ def test_counts_on_the_plane(renderer: str, limit: int | None) -> None:
 
 
 def test_its_face_is_all_of_the_set() -> None:
-    """With a rectangle that is not seen, the faces alone are: what belongs to any of the solids, but not to the hole."""
+    """With a rectangle that is not seen, the faces alone are: what belongs to the set, but not to the hole, and what the plane
+    names beside it, which is whole there."""
     inside = [0.25, 0.5, 0.75]
     scene = scene_of({"type": "surface"}, opacity=0, colors={"inside": inside, "mode": "stepped"})
     film = clfractal.render(scene, channels=["R", "G", "B", "P.Y"])
     face = np.abs(film["P.Y"] - 0.1) < 1e-4
-    expected = belongs(scene, points_of_pixels())
+    expected = belongs(scene, points_of_pixels()) | held_beside(scene, points_of_pixels())
     assert 0.08 < expected.mean() < 0.6
     assert (face != expected).mean() < 4e-3
     np.testing.assert_allclose(
@@ -96,7 +105,7 @@ def test_its_face_is_all_of_the_set() -> None:
 
 def test_what_is_not_named_stands_whole() -> None:
     named = scene_of({"type": "surface"}, objects=["box"])
-    assert list(named.joined) == ["hole", "julia", "box"]
+    assert list(named.joined) == ["hole", "julia"]
     film = clfractal.render(named, channels=["P.X", "P.Y", "P.Z", "A"])
     x, z = np.moveaxis(points_of_pixels()[..., [0, 2]], -1, 0)
     at = np.stack([x, np.full_like(x, -0.2), z], axis=-1)

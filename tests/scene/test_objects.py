@@ -114,6 +114,25 @@ CASES = [
         "cut_planes.0.objects.0: 'sea' cannot be cut: a water surface has no end; a flat box can",
     ),
     (
+        f"objects: {{b: {{{OTHER}}}}}\ncut_planes: [{{cut: true, set: false, objects: [§b]}}]",
+        "cut_planes.0.objects.0: 'b' is a part of the set, which is cut as a whole; set: true cuts it",
+    ),
+    (
+        "renderer: {type: volume}\ncut_planes: [{}, {cut: true, set: §false}]",
+        "cut_planes.1.set: is for surface renderers: in a volume all that there is belongs to the set; remove it",
+    ),
+    (
+        "materials: {ice: {transmission: {weight: 1}}}\nlighting: {mode: path}\nmaterial: {name: ice}\n"
+        "cut_planes: [{cut: true, set: false}, {cut: §true}]",
+        "cut_planes.1.cut: cannot open a set of glass, 'ice', along paths",
+    ),
+    (
+        "materials: {ice: {transmission: {weight: 1}}}\nlighting: {mode: path}\n"
+        "objects: {a: {}, b: {material: ice}}\ncut_planes: [{cut: true, objects: [a, §b]}]",
+        "cut_planes.0.objects.1: 'b' is glass, which cannot be cut along paths",
+    ),
+    ("cut_planes: [{set: §1}]", "cut_planes.0.set: must be true or false, got 1"),
+    (
         "renderer: {type: volume}\nobjects: {sea: {type: §water}}",
         "objects.sea.type: cannot be water with renderer volume: its waves have no end; {type: plane} can",
     ),

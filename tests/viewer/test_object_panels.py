@@ -111,10 +111,12 @@ def test_a_plane_names_the_objects_that_it_cuts() -> None:
     assert ui.studio.edit({"cut_planes": [{"cut": True}]})
     ui.memory["open.cut_planes"] = True
     Stage(ui, scene_dock.draw, window=False)
-    assert not ui.studio.scene.joined
     assert ui.studio.edit({"cut_planes.0.objects": ["box"]})
-    assert list(ui.studio.scene.joined) == ["box"]
     Stage(ui, scene_dock.draw, window=False)
+    assert ui.studio.edit({"cut_planes.0.set": False})
+    Stage(ui, scene_dock.draw, window=False)
+    (plane,) = ui.studio.scene.cut_planes
+    assert (plane.cuts_set, plane.cut_objects) == (False, ("box",))
     assert not ui.studio.edit({"cut_planes.0.objects": ["water"]})
 
 

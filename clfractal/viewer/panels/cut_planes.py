@@ -11,6 +11,7 @@ from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.objects import Solid
 from clfractal.scene.plane import Plane, scaled
+from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer import plane_moves
 from clfractal.viewer.panels import palette_editor, renderer, theme
 from clfractal.viewer.panels import widgets as w
@@ -127,6 +128,8 @@ def _cut_plane(ui: Ui, index: int) -> None:
     plane = ui.studio.scene.cut_planes[index]
     w.field(ui, f"{path}.cut", "Cut open")
     if plane.cut:
+        if isinstance(ui.studio.scene.renderer, SurfaceRenderer):
+            w.field(ui, f"{path}.set", "Cut the set")
         _named(ui, f"{path}.objects", plane.objects)
     w.field(ui, f"{path}.opacity")
     w.field(ui, f"{path}.inside_opacity", start=plane.opacity, auto="as opacity")
