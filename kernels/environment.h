@@ -10,8 +10,11 @@
 //   by_column[rows][columns + 1] the same along each row,
 //   density[rows][columns]       probability per steradian, constant in a cell,
 //   pixels[height][width][3]     linear Rec. 709.
-// clfractal/renderers/environment.py fills it. Needs lanes.h, numbers/real.h, vectors.h, structs.h, shade.h.
+// clfractal/renderers/environment.py fills it. Needs lanes.h, numbers/real.h, vectors.h, structs.h, shade.h; with HAS_SUN sampling.h.
 #define ENVIRONMENT_TURN S(6.283185307179586)
+#if HAS_SUN
+#include "sun.h"
+#endif
 
 // Where in the picture a direction lies: parts of its width and height, both 0 to 1.
 INLINE void environment_place(vec direction, __constant const struct Material *m, real *across, real *below) {
@@ -49,6 +52,10 @@ CALLED color environment_color(vec direction, __constant const struct Material *
                          mix(lower[3 * first + 2], lower[3 * second + 2], right), low);
     }
     const real intensity = (real)(m->environment_intensity);
+#if HAS_SUN
+    const color sun = sun_light(direction, m, sun_numbers(m, map));
+    return color_of(intensity * (lanes_load(red) + sun.r), intensity * (lanes_load(green) + sun.g), intensity * (lanes_load(blue) + sun.b));
+#endif
     return color_of(intensity * lanes_load(red), intensity * lanes_load(green), intensity * lanes_load(blue));
 }
 
@@ -63,8 +70,8 @@ INLINE int environment_find(__global const float *cumulative, int count, scalar 
     return first;
 }
 
-// A direction chosen by brightness from two numbers in [0, 1), and its probability per steradian, which is above 0.
-INLINE vec environment_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+// A direction chosen by the map's brightness from two numbers in [0, 1), and its probability per steradian, which is above 0.
+INLINE vec map_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
     const int rows = m->environment_rows, columns = m->environment_columns;
     __global const float *by_row = map + rows + 1, *by_column = by_row + rows + 1;
     __global const float *densities = by_column + rows * (columns + 1);
@@ -91,8 +98,8 @@ INLINE vec environment_sample(real u, real v, __constant const struct Material *
     return vec_of(c * x - s * y, s * x + c * y, height);
 }
 
-// Probability per steradian with which `environment_sample` chooses a direction; 0 only where no light comes from.
-INLINE real environment_density(vec direction, __constant const struct Material *m, __global const float *map) {
+// Probability per steradian with which `map_sample` chooses a direction; 0 only where no light comes from.
+INLINE real map_density(vec direction, __constant const struct Material *m, __global const float *map) {
     const int rows = m->environment_rows, columns = m->environment_columns;
     __global const float *densities = map + 2 * (rows + 1) + rows * (columns + 1);
     real across, below;
@@ -104,3 +111,33 @@ INLINE real environment_density(vec direction, __constant const struct Material 
         found[lane] = (scalar)densities[min((int)y[lane], rows - 1) * columns + min((int)x[lane], columns - 1)];
     return lanes_load(found);
 }
+
+#if HAS_SUN
+// A direction towards the map or the sun's disc, and its probability by both ways together.
+INLINE vec environment_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+    __global const float *sun = sun_numbers(m, map);
+    const real share = sun_share(sun), rest = R(1.0) - share;
+    const mask of_sun = less(v, share);
+    const real place = pick(of_sun, v / fmax(share, (real)(REAL_SMALLEST)), (v - share) / rest);
+    real by_map;
+    const vec in_map = map_sample(u, place, m, map, &by_map);
+    const vec in_sun = cone_direction(sun_toward(m, sun), sun_spread(sun), u, place);
+    const vec found = vec_pick(of_sun, in_sun, in_map);
+    by_map = pick(of_sun, map_density(in_sun, m, map), by_map);
+    *density = rest * by_map + pick(of_sun, share / (ENVIRONMENT_TURN * sun_spread(sun)), sun_density(in_map, m, sun));
+    return found;
+}
+
+INLINE real environment_density(vec direction, __constant const struct Material *m, __global const float *map) {
+    __global const float *sun = sun_numbers(m, map);
+    return (R(1.0) - sun_share(sun)) * map_density(direction, m, map) + sun_density(direction, m, sun);
+}
+#else
+INLINE vec environment_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+    return map_sample(u, v, m, map, density);
+}
+
+INLINE real environment_density(vec direction, __constant const struct Material *m, __global const float *map) {
+    return map_density(direction, m, map);
+}
+#endif

@@ -25,6 +25,7 @@ from clfractal.scene.lighting import Environment
 
 if TYPE_CHECKING:
     from clfractal.scene.environment import EnvironmentMap
+    from clfractal.scene.sun import Sun
 
 COLUMNS, ROWS = 1024, 512
 """Largest grid of the tables: 4 MB, and cells smaller than the sun."""
@@ -51,7 +52,7 @@ class PackedEnvironment:
 
 def packed_map(found: EnvironmentMap) -> PackedEnvironment:
     """A map as the kernel reads it; of one that comes with the program it is made once for a process."""
-    return _packed_once(found) if found.is_shipped else pack_environment(found.pixels)
+    return _packed_once(found) if found.is_shipped else pack_environment(found.pixels, found.sun)
 
 
 @cache
@@ -61,11 +62,12 @@ def _packed_once(found: EnvironmentMap) -> PackedEnvironment:
     return packed
 
 
-def pack_environment(pixels: Floats) -> PackedEnvironment:
-    """Puts tables and pixels into one buffer.
+def pack_environment(pixels: Floats, sun: Sun | None = None) -> PackedEnvironment:
+    """Puts tables, pixels and the sun's numbers into one buffer.
 
     Args:
         pixels: shape (height, width, 3), linear Rec. 709, finite and not negative; width at least height.
+        sun: the disc before them.
     """
     height, width, _ = pixels.shape
     columns, rows = min(width, COLUMNS), min(height, ROWS)
@@ -82,11 +84,24 @@ def pack_environment(pixels: Floats) -> PackedEnvironment:
     by_column = np.stack([_cumulative(row) for row in shares])
     by_row = _cumulative(shares.sum(axis=1))
     parts = [borders, by_row, by_column, density, pixels]
-    data = np.concatenate([np.asarray(part, np.float32).reshape(-1) for part in parts])
     around = np.cos(np.linspace(0.0, math.pi, height + 1))
     of_rows = (pixels @ _LUMINANCE).mean(axis=1, dtype=np.float64)
     mean = float(of_rows @ (around[:-1] - around[1:]) / 2)
+    if sun is not None:
+        of_sun = float(_LUMINANCE @ sun.irradiance) / (4 * math.pi)
+        parts.append(_sun_numbers(sun, of_sun / max(mean + of_sun, 1e-30)))
+        mean += of_sun
+    data = np.concatenate([np.asarray(part, np.float32).reshape(-1) for part in parts])
     return PackedEnvironment(data, width, height, columns, rows, mean)
+
+
+def _sun_numbers(sun: Sun, share: float) -> Doubles:
+    """See the head of kernels/sun.h; `share`: the part of directions that are chosen in its disc."""
+    # Here, because only skies need it.
+    from clfractal.scene.sun import LIMB, SPREAD
+
+    parts = (*sun.toward, *sun.light, *sun.fade, *sun.bend, *LIMB, sun.horizon, SPREAD, share)
+    return np.array(parts)
 
 
 def material_fields(environment: Environment | None, packed: PackedEnvironment | None) -> Mapping[str, Any]:

@@ -143,6 +143,7 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "GEOMETRIC": int(uses_positions(scene)),
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
+        "HAS_SUN": int(scene.environment is not None and scene.environment.has_sun),
         "HAS_SOFT_LIGHT": int(
             any(light.has_size for light in single_lights(scene))
             and not isinstance(scene.lighting, PathLighting)

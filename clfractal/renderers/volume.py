@@ -113,6 +113,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         ),
         "HAS_PATHS": int(has_paths(scene)),
         "HAS_ENVIRONMENT": int(has_paths(scene) and scene.environment is not None),
+        "HAS_SUN": int(has_paths(scene) and scene.environment is not None and scene.environment.has_sun),
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
         "ADAPTIVE": int(settings.noise is not None),

@@ -14,6 +14,7 @@ band of 300 Dobson units of ozone as one Gaussian, within about a third of what 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -26,8 +27,8 @@ WAVELENGTHS: Doubles = np.arange(395.0, 720.0, 20.0)
 
 EARTH, TOP = 6360.0, 6460.0
 """Radii of the ground and of the air's end, kilometres."""
-SUN_RADIUS = np.radians(0.53 / 2)
-"""Of its disc, radians."""
+SUN_RADIUS = float(np.radians(0.2665))
+"""Of its disc at the mean distance, radians."""
 
 _MOLECULES, _AEROSOL = 8.0, 1.2  # heights in which the density falls to 1/e
 _OZONE_HEIGHT, _OZONE_REACH = 25.0, 15.0  # its density is a tent
@@ -124,7 +125,11 @@ class Atmosphere:
         self.scattering = self.depths[:2] * np.array([[1.0], [_ALBEDO]])
         self._heights: Doubles = (TOP - EARTH - 1) * np.linspace(0, 1, _LEVELS) ** 2
         self._mus: Doubles = np.sin(pi / 2 * np.linspace(-0.5, 1, _SUNS))
-        self._many = np.stack([self._many_at(EARTH + height) for height in self._heights])
+
+    @cached_property
+    def _many(self) -> Doubles:
+        """The light of many scatterings at heights and for suns."""
+        return np.stack([self._many_at(EARTH + height) for height in self._heights])
 
     def transmittance(self, radius: Doubles, mu: Doubles) -> Doubles:
         """The part of light from outside the air that arrives, without regard to the ground: Beer and Lambert's law."""

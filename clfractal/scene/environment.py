@@ -17,6 +17,7 @@ from clfractal.errors import FileError, SceneError, Where, unknown_name
 
 if TYPE_CHECKING:
     from clfractal.scene.lighting import Environment
+    from clfractal.scene.sun import Sun
 
 Floats = npt.NDArray[np.float32]
 
@@ -25,16 +26,20 @@ Floats = npt.NDArray[np.float32]
 class EnvironmentMap:
     """`pixels` has the shape (height, 2 height, 3): linear Rec. 709, finite, none below 0.
 
-    `is_shipped`: it comes with the program, and stays in memory once it was read.
+    `is_shipped`: it comes with the program, and stays in memory once it was read. `sun`: the disc before a sky.
     """
 
     pixels: Floats
     is_shipped: bool = False
+    sun: Sun | None = None
 
     @cached_property
     def digest(self) -> str:
-        """A text that differs for different pixels."""
-        return hashlib.sha256(np.ascontiguousarray(self.pixels).data).hexdigest()
+        """A text that differs for different light."""
+        found = hashlib.sha256(np.ascontiguousarray(self.pixels).data)
+        if self.sun is not None:
+            found.update(repr(self.sun).encode())
+        return found.hexdigest()
 
 
 @cache
@@ -62,9 +67,10 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
     if environment.sky is not None:
         # Loaded for skies only.
         from clfractal.scene.sky import bake
+        from clfractal.scene.sun import sun_of
 
         with doing("making the sky"):
-            return EnvironmentMap(bake(environment.sky))
+            return EnvironmentMap(bake(environment.sky), sun=sun_of(environment.sky))
     if environment.file is None:
         return _shipped(environment.name or "")
     from clfractal.files.environment import read_environment

@@ -265,6 +265,11 @@ class Environment(Section):
         8, ge=0, le=1024, description="rays per sample for the environment's light; 0: it lights nothing"
     )
 
+    @property
+    def has_sun(self) -> bool:
+        """Whether the sun's disc stands before the map."""
+        return self.sky is not None and self.sky.sun
+
     @model_validator(mode="after")
     def _one_source(self) -> Self:
         given = [key for key in ("name", "file", "sky") if getattr(self, key) is not None]

@@ -1,4 +1,4 @@
-"""A physical sky as a latitude-longitude map: the light of the air, the sun's disc, and the ground below.
+"""A physical sky as a latitude-longitude map: the light of the air, and the ground below; and the sun's disc before it.
 
 `atmosphere.py` gives light by wavelength. It becomes CIE XYZ by the fits of Wyman, Sloan and Shirley (Simple
 Analytic Approximations to the CIE XYZ Color Matching Functions, JCGT 2 (2), 2013), the sun being a black body of
@@ -19,7 +19,6 @@ import numpy.typing as npt
 
 from clfractal.scene.atmosphere import (
     EARTH,
-    SUN_RADIUS,
     WAVELENGTHS,
     Atmosphere,
     Doubles,
@@ -32,13 +31,13 @@ if TYPE_CHECKING:
     from clfractal.scene.lighting import Sky
 
 WIDTH, HEIGHT = 2048, 1024
-"""Of the map: the sun is three pixels wide."""
+"""Of the map, which shows no sun."""
 SUNLIGHT = 4.973
 """Luminance times pi that a white surface facing the sun would have above the air: see the scale."""
 
-_EYE = EARTH + 0.05  # 50 m above the ground: the horizon lies 0.2 degrees below the level
+EYE = EARTH + 0.05
+"""Where the sky is seen from: 50 m above the ground, so that the horizon lies 0.2 degrees below the level."""
 _ROWS, _AZIMUTHS = 96, 49
-_FINER = 16  # points across a pixel where the sun's disc is drawn
 
 Floats = npt.NDArray[np.float32]
 _Parts = tuple[Doubles, Doubles, Doubles]
@@ -50,7 +49,7 @@ def bake(sky: Sky) -> Floats:
     air = Atmosphere(sky.turbidity)
     elevation = np.radians(sky.sun_elevation)
     sun = np.array(np.sin(elevation))
-    dip = -np.arccos(EARTH / _EYE)
+    dip = -np.arccos(EARTH / EYE)
     rows: Doubles = pi / 2 - (np.arange(HEIGHT, dtype=np.float64) + 0.5) * (pi / HEIGHT)
     above = int((rows > dip).sum())
     azimuth: Doubles = np.radians(((np.arange(WIDTH) + 0.5) / WIDTH - 0.5) * 360 - sky.sun_azimuth)
@@ -61,13 +60,11 @@ def bake(sky: Sky) -> Floats:
     direct = to_rgb(air.transmittance(radius, sun)) * sun_visible(radius, sun) * max(float(sun), 0.0)
     irradiance = np.maximum(direct + _irradiance(pixels[:above], rows[:above]), 0)
     end = np.linspace(0, 1, _ROWS) ** 2 * (-pi / 2 - dip) + dip - 1e-6
-    through = to_rgb(air.scattered(_EYE, np.sin(end), np.zeros(1), sun).through) / to_rgb(
+    through = to_rgb(air.scattered(EYE, np.sin(end), np.zeros(1), sun).through) / to_rgb(
         np.ones_like(WAVELENGTHS)
     )
     seen = _between(through, np.sqrt((rows[above:] - dip) / (-pi / 2 - dip)) * (_ROWS - 1))
     pixels[above:] += (seen * irradiance * sky.ground_color / pi)[:, None]
-    if sky.sun:
-        _draw_sun(pixels, air, rows, azimuth, float(elevation), float(dip))
     np.maximum(pixels, 0.0, out=pixels)
     found = pixels.astype(np.float32)
     found.flags.writeable = False
@@ -117,7 +114,7 @@ def _light(
     """
     around = np.linspace(0, pi, _AZIMUTHS)
     grid = ends[0] + np.linspace(0, 1, _ROWS) ** 2 * (ends[1] - ends[0])
-    found = [air.scattered(_EYE, np.sin(row)[None], around, sun) for row in grid]
+    found = [air.scattered(EYE, np.sin(row)[None], around, sun) for row in grid]
     parts: _Parts = (
         to_rgb(np.stack([row.molecules for row in found])),
         to_rgb(np.stack([row.aerosol for row in found])),
@@ -147,32 +144,3 @@ def _irradiance(pixels: Doubles, rows: Doubles) -> Doubles:
     weights = pixel_areas()[: len(rows)] * np.maximum(np.sin(rows), 0)
     found: Doubles = np.einsum("r,rck->k", weights, np.maximum(pixels, 0))
     return found
-
-
-def _draw_sun(
-    pixels: Doubles, air: Atmosphere, rows: Doubles, azimuth: Doubles, elevation: float, dip: float
-) -> None:
-    """Adds the disc: each pixel gets its part of it, all parts together are the disc's solid angle."""
-    reach = SUN_RADIUS + pi / HEIGHT
-    near = np.flatnonzero(np.abs(rows - elevation) < reach)
-    if not len(near):
-        return
-    inner = (np.arange(_FINER) + 0.5) / _FINER - 0.5
-    fine = rows[near][:, None] - inner * (pi / HEIGHT)
-    around = azimuth[:, None] + inner * (2 * pi / WIDTH)
-    toward = np.cos(around).reshape(-1)
-    covered = np.zeros((len(near), _FINER, WIDTH))
-    for row, elevations in enumerate(fine):
-        for line, height in enumerate(elevations):
-            # By chords: the cosine of so small an angle has lost its digits.
-            square = (np.sin(height) - np.sin(elevation)) ** 2 + np.cos(height) ** 2 + np.cos(elevation) ** 2
-            square = square - 2 * np.cos(height) * np.cos(elevation) * toward
-            inside = square < 4 * np.sin(SUN_RADIUS / 2) ** 2
-            covered[row, line] = inside.reshape(WIDTH, _FINER).mean(axis=1)
-    weights = np.cos(fine) * (2 * pi / WIDTH) * (pi / HEIGHT / _FINER)
-    covered *= 2 * pi * (1 - np.cos(SUN_RADIUS)) / np.einsum("rlc,rl->", covered, weights)
-    mu = np.sin(fine)
-    light = to_rgb(air.transmittance(np.full_like(mu, _EYE), mu)) * (fine > dip)[..., None]
-    light /= 2 * pi * (1 - np.cos(SUN_RADIUS))
-    energy = np.einsum("rlc,rl,rlk->rck", covered, weights, np.maximum(light, 0))
-    pixels[near] += energy / pixel_areas()[near][:, None, None]

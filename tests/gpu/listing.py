@@ -130,7 +130,11 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     },
     "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
-    "environment": {"": {}, "map": {"environment": {"name": "studio", "rays": 2}}},
+    "environment": {
+        "": {},
+        "map": {"environment": {"name": "studio", "rays": 2}},
+        "sky": {"environment": {"sky": {}, "rays": 2}},
+    },
     "light": {
         "": {},
         "soft": {"lights": [{"type": "directional", "direction": [1, 1, -1], "angular_size": 5}]},

@@ -18,6 +18,7 @@ kernels/cut_plane.cl: render/cut_plane render/cut_plane_periods
 kernels/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods
 kernels/*planes*: render/planes_in_picture render/planes_in_fog
 kernels/environment.h: render/environment_kernel render/surface_rays
+kernels/sun.h: render/sun
 kernels/normals.h: render/normals render/normals_properties render/pixel_points
 kernels/pixel_points.h: render/pixel_points render/normals render/normals_properties
 kernels/sampling.h: render/sampling render/filters render/surface_rays render/lens_and_fog

@@ -79,6 +79,7 @@ _MORE = {
     "still": "material: {reflection: 0.3}\nenvironment: {name: studio, rays: 2}\n"
     "fog: {density: 0.05, height: 3, scattering: {anisotropy: 0.3}}\nglow: {by: trap, color: [1, 0.6, 0.3]}\n",
     "steps": "coloring: {by: trap, scale: 1, palette: opal}\nbackground: transparent\n"
+    "environment: {sky: {sun_elevation: 20}, rays: 2}\n"
     "materials: {steel: {base: {metalness: 1}, specular: {roughness: 0.2}}}\n"
     "objects: {post: {type: cylinder, position: [0.4, -0.9, 0], rotation: [30, 10, 0], material: steel},"
     " box: {type: box, position: [-0.8, -0.8, 0.2], size: [0.4, 0.3, 0.5], rotation: [0, 0, 25]}}\n",

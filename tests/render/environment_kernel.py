@@ -27,6 +27,7 @@ _TEXT = """\
 #include "vectors.h"
 #include "structs.h"
 #include "shade.h"
+#include "sampling.h"
 #include "environment.h"
 
 INLINE real load(__global const scalar *from) {
@@ -70,8 +71,9 @@ def settings_of(**values: Any) -> Environment:
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int) -> Any:
+def _program(device: Device, precision: Precision, lanes: int, has_sun: bool) -> Any:
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "COLORING": 0, **_DEFINES}
+    defines["HAS_SUN"] = int(has_sun)
     generated = {"environment.cl": _TEXT, "structs.h": records.struct_text()}
     flat = flatten("environment.cl", generated=generated, defines=defines)
     return compiler.compile_source(device, flat.text, program.math_flags(precision))
@@ -95,6 +97,7 @@ def ask(
     settings: Environment | None = None,
     precision: Precision = "float32",
     lanes: int = 1,
+    has_sun: bool = False,
 ) -> Answers:
     """Runs the kernel on directions, shape (n, 3), and pairs of numbers in [0, 1), shape (n, 2)."""
     given = len(directions if directions is not None else numbers if numbers is not None else [])
@@ -113,7 +116,7 @@ def ask(
         cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
         for array in (planes, result, packed.data, material.reshape(1))
     ]
-    kernel = cl.Kernel(_program(device, precision, lanes), "environment")
+    kernel = cl.Kernel(_program(device, precision, lanes, has_sun), "environment")
     kernel.set_args(*buffers, np.int32(count))
     cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
     cl.enqueue_copy(device.queue, result, buffers[1])
