@@ -67,7 +67,12 @@ class Body:
     @property
     def defines(self) -> dict[str, object]:
         """The defines of all programs that ask it, or read what marches have found."""
-        return {"SOLIDS": 1 if self.scene is None else 1 + len(self.scene.joined)}
+        joined = {} if self.scene is None else self.scene.joined
+        return {
+            "SOLIDS": 1 + len(joined),
+            "JOINS_SMOOTHLY": int(any(each.join == "smooth_union" for each in joined.values())),
+            "HOLLOWS": int(any(is_hollow(each) for each in joined.values())),
+        }
 
     def texts(
         self, *, files: Sequence[str] = (), defines: Callable[[Chain], Mapping[str, object]] | None = None
@@ -97,6 +102,11 @@ class Body:
         return np.array(constants.values, precision)
 
 
+def is_hollow(each: Joined) -> bool:
+    """Whether an object leaves a hollow in which no distance is known."""
+    return isinstance(each, FormulaObject) and each.join == "cut"
+
+
 def _lines_of(defines: Callable[[Chain], Mapping[str, object]] | None) -> Callable[[Chain], str]:
     """Defines of a formula as text."""
     if defines is None:
@@ -110,7 +120,6 @@ def _joined_texts(scene: Scene, names: tuple[str, ...], lines: Callable[[Chain],
     head = [
         *(f"#define SOLID_{kind.upper()} {number}" for kind, number in SOLID_KINDS.items()),
         *(f"#define JOIN_{join.split('_')[0].upper()} {number}" for join, number in JOINS.items()),
-        f"#define JOINS_SMOOTHLY {int(any(each.join == 'smooth_union' for each in scene.joined.values()))}",
         *(f'#include "{header}"' for name in names for header in _HEADERS.get(name, ())),
     ]
     body = [

@@ -76,10 +76,6 @@ def _check_joined(scene: Scene) -> None:
         )
     for name, each in scene.joined.items():
         where = Where(path=f"objects.{name}.join")
-        if isinstance(each, FormulaObject) and each.join == "cut":
-            raise SceneError(
-                "cannot be cut for a formula: how deep places are in its set is not known", where
-            )
         if isinstance(each, PlaneObject) and each.join == "smooth_union":
             raise SceneError("cannot be smooth_union for a plane, which has no end; a flat box can", where)
 
