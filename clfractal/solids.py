@@ -148,7 +148,7 @@ def numbered(text: str, after: tuple[str, ...], number: int) -> str:
 def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
     """The scene's own formula, and what is joined to it."""
     iterations = scene.formula.iterations
-    radius = scene.bounds[1]
+    radius = min(scene.bounds[1], scene.formula_bounds[1])
     texts = list(_texts(scene))
     constants = _Constants()
 
@@ -164,7 +164,7 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             "step_scale": safe,
             "ball": ball[0],
             "ball_radius": ball[1],
-            "potential_share": ball[1] / radius,
+            "potential_share": min(ball[1], scale * chain.radius) / radius,
         }
 
     found = [orbit_record(scene.chain, iterations, precision, joined=formula(scene.chain, 1.0, _ball(scene)))]

@@ -17,6 +17,8 @@
 #define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
 #define GRAZING_MOST R(2.0)      // ... at most so much of the cone
 #define MOST_GROWTH R(0.5)       // of an unscaled distance for the way: where a surface is smooth it is half of the true one
+#define BALL_NEAR R(1.005)       // of its radius: so near to the middle of a formula's ball its estimates count ...
+#define BALL_BEYOND R(1.01)      // ... and beyond this they may be too large
 #define CREEP R(0.25)            // of the cone: the least step by the Jacobian
 #define CONE_LEAST R(0.25)       // of a cone of many rays: the least step that is worth another look
 #define BACK_STEPS R(4.5)        // a point's evaluations inside, before it counts as hit where it begins
@@ -64,6 +66,20 @@ INLINE void march_blind(const march *m, sight *s, __constant const struct March 
     s->blind = unknown & less(free, most);
     s->sure = pick(unknown & ~s->blind, free, s->radius);
     s->radius = pick(unknown, free, s->radius);
+}
+#endif
+
+#if FAR_BOUNDS
+// Estimates are made for the inside of the formula's ball. Farther out they may be too large: there no step leads into it. How far the
+// ball is along the ray, and in `around` in any direction; beyond all where the ray does not meet it.
+INLINE real march_to_ball(const march *m, const sight *s, real *around, __constant const struct March *settings) {
+    const vec arm = vec_sub(s->on_ray, vec_splat(settings->ball_center));
+    const real radius = (real)(settings->ball_radius), away = sqrt(vec_dot(arm, arm)), ahead = -vec_dot(arm, m->r.direction);
+    const vec nearest = vec_along(arm, ahead, m->r.direction);
+    const real square = BALL_NEAR * BALL_NEAR * radius * radius - vec_dot(nearest, nearest);
+    const mask far = less(BALL_BEYOND * radius, away);
+    *around = pick(far, away - radius, (real)(REAL_LARGEST));
+    return pick(far & less(R(0.0), ahead) & less(R(0.0), square), ahead - sqrt(fmax(square, R(0.0))), (real)(REAL_LARGEST));
 }
 #endif
 
@@ -118,6 +134,10 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
 #if HOLLOWS
     step = pick(s->blind, s->radius, step);
 #endif
+#if FAR_BOUNDS
+    real around;
+    step = fmin(step, march_to_ball(m, s, &around, settings));
+#endif
     step = fmin(step, m->limit - m->t);
     const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
@@ -134,7 +154,13 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
 // leaves its ray's part ends beyond everything.
 INLINE void march_cone(march *m, const sight *s, __constant const struct March *settings) {
     const real widens = (real)(settings->detail) * m->r.spread, all = R(1.0) + widens * widens;
-    const real free = (real)(settings->cone_share) * s->radius, square = free * free - s->cone * s->cone;
+    real radius = s->radius;
+#if FAR_BOUNDS
+    real around;
+    march_to_ball(m, s, &around, settings);
+    radius = fmin(radius, around);
+#endif
+    const real free = (real)(settings->cone_share) * radius, square = free * free - s->cone * s->cone;
     const real along = (sqrt(fmax(s->cone * s->cone * widens * widens + all * square, R(0.0))) - s->cone * widens) / all;
     const mask known = less(s->here.step, (real)(REAL_LARGEST)) & ~is_blind(s->here);
     const mask onward = m->active & known & less(CONE_LEAST * s->cone, along) &

@@ -99,6 +99,7 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "SEARCH_DISTANCE": 0,
         "SEARCH_STEPS": 1,
         "SEARCH": int(renderer.search == "steps"),
+        "FAR_BOUNDS": int(searches_far(scene)),
         "POINTS": several_points(scene),
         # A binary search ends where the surface is; a march, somewhere within the point's footprint.
         "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
@@ -108,6 +109,13 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_OBJECTS": 0,
         **Body.of(scene).defines,
     }
+
+
+def searches_far(scene: Scene) -> bool:
+    """Whether rays look for the set farther out than its formula says that it is, and estimates are made for."""
+    center, radius = scene.bounds
+    apart = math.dist(center, scene.chain.center)
+    return scene.surface.bounds is not None and apart + radius > scene.chain.radius
 
 
 def several_points(scene: Scene) -> int:
