@@ -70,7 +70,7 @@ class Body:
         joined = {} if self.scene is None else self.scene.joined
         return {
             "SOLIDS": 1 + len(joined),
-            "JOINS_SMOOTHLY": int(any(each.join == "smooth_union" for each in joined.values())),
+            "JOINS_SMOOTHLY": int(self.scene is not None and joins_smoothly(self.scene)),
             "HOLLOWS": int(any(is_hollow(each) for each in joined.values())),
         }
 
@@ -100,6 +100,11 @@ class Body:
         for chain in [self.chain] if self.scene is None else _chains(self.scene):
             constants.place(write_formula(chain))
         return np.array(constants.values, precision)
+
+
+def joins_smoothly(scene: Scene) -> bool:
+    """Whether anything flows into the set."""
+    return any(each.join == "smooth_union" for each in scene.joined.values())
 
 
 def is_hollow(each: Joined) -> bool:

@@ -64,3 +64,24 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
 #endif
 }
 #endif
+
+// The material of a spot where two solids flow together: a blend of theirs.
+INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
+#if JOINS_SMOOTHLY
+    if (!any_lane(less(R(0.0), here->share))) return pbr_at(s, here, w);
+    spot one = *here, other = one;
+    const real quantity = COLORING_PER_POINT ? here->smooth : here->quantity;
+    other.object = here->other;
+    one.share = other.share = R(0.0);
+    one.tint = object_color(here->normal, quantity, one.object, w);
+    other.tint = object_color(here->normal, quantity, other.object, w);
+    pbr blended = pbr_at(s, &one, w);
+    const pbr more = pbr_at(s, &other, w);
+    for (int i = 0; i < NUMBERS_OF(pbr); ++i) {
+        ((real *)&blended)[i] += here->share * (((const real *)&more)[i] - ((real *)&blended)[i]);
+    }
+    return blended;
+#else
+    return pbr_at(s, here, w);
+#endif
+}

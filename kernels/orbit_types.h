@@ -49,6 +49,10 @@ typedef struct {
     real of;             // ... its number ...
     real solid;           // ... and that of what the surface belongs to: the same, or what has cut it
 #endif
+#if JOINS_SMOOTHLY
+    real share;           // where two solids flow together: the other one's part of the colour ...
+    real other_square, other_square_before, other_count, other_of, other_solid;  // ... and the same of that one
+#endif
 } surface_point;
 
 // Whether the work was cancelled. Long orbits test this now and then, or a launch could take arbitrarily long. The host writes

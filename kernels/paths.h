@@ -28,9 +28,9 @@ STAGE(scatter_paths) {
 #endif
     if (any_lane(lands)) {
 #if !COLORING_PER_POINT
-        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
+        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), OTHER_OF(found), SHARE_OF(found), w);
 #endif
-        pbr p = pbr_at(s, &found, w);
+        pbr p = pbr_of_spot(s, &found, w);
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
         real wave, unused;

@@ -11,6 +11,44 @@ INLINE surface_point surface_pick(mask m, surface_point yes, surface_point no) {
     return s;
 }
 
+#if JOINS_SMOOTHLY
+// What is known of a surface as that of the other one.
+INLINE void surface_beside(surface_point *surface, surface_point other) {
+    surface->other_square = other.square;
+    surface->other_square_before = other.square_before;
+    surface->other_count = other.count;
+    surface->other_of = other.of;
+    surface->other_solid = other.solid;
+}
+
+INLINE surface_point surface_of_other(surface_point surface) {
+    surface.square = surface.other_square;
+    surface.square_before = surface.other_square_before;
+    surface.count = surface.other_count;
+    surface.of = surface.other_of;
+    surface.solid = surface.other_solid;
+    return surface;
+}
+
+// A number between those of both, as far as each has one.
+INLINE real shared(real own, real other, mask own_told, mask other_told, real share) {
+    return pick(own_told & other_told, own + share * (other - own), pick(other_told, other, own));
+}
+
+// The surface where `more` flows into all before it, whose part is `of_more`. Of three that meet in one place the two count which
+// have the largest parts.
+INLINE surface_point surface_flowing(surface_point all, surface_point more, mask closer, real of_more) {
+    const real of_all = R(1.0) - of_more, first = of_all * (R(1.0) - all.share), second = of_all * all.share;
+    const mask stays = ~closer & less(of_more, second);
+    surface_point found = surface_pick(closer, more, all), beside = all;
+    surface_beside(&beside, more);
+    surface_beside(&found, all);
+    found = surface_pick(closer, found, surface_pick(stays, all, beside));
+    found.share = pick(stays, all.share, pick(closer, first, of_more) / (first + of_more));
+    return found;
+}
+#endif
+
 #if HOLLOWS
 // In a hollow what is joined to it later counts as the nearest this near: a part of the radius of its ball.
 #define HOLLOW_NEAR R(0.1)
@@ -62,6 +100,12 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
             more.surface.square_before = all->surface.square_before;
             more.surface.count = all->surface.count;
             more.surface.of = all->surface.of;
+#if JOINS_SMOOTHLY
+            // It has a colour of its own, but the counts of both that flow together there.
+            more.surface.share = all->surface.share;
+            surface_beside(&more.surface, surface_of_other(all->surface));
+            more.surface.other_solid = more.surface.solid;
+#endif
         }
         all->surface = surface_pick(counts, more.surface, all->surface);
         all->scale = pick(counts, more.scale, all->scale);
@@ -84,8 +128,8 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         const real others = R(0.5) * share, of_more = pick(closer, R(1.0) - others, others);
         const vec gradient = vec_along(vec_scale(all->surface.gradient, R(1.0) - of_more), of_more, more.surface.gradient);
         const real lower = fmin(a, b) - R(0.25) * width * share * share, scale = fmin(all->scale, more.scale);
-        const mask other = (flows & closer) | (~flows & nearer);
-        all->surface = surface_pick(other, more.surface, all->surface);
+        const surface_point flowing = surface_flowing(all->surface, more.surface, closer, of_more);
+        all->surface = surface_pick(flows, flowing, surface_pick(nearer, more.surface, all->surface));
         all->surface.gradient = vec_pick(flows, gradient, all->surface.gradient);
         all->far = pick(flows, lower * scale, fmin(all->far, more.far));
         all->most = pick(flows, all->far, fmin(all->most, more.far));

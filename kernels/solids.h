@@ -31,6 +31,10 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     const real none = R(0.0);
     found.surface.square = found.surface.square_before = found.surface.count = none;
     found.surface.of = found.surface.solid = none;
+#if JOINS_SMOOTHLY
+    found.surface.share = none;
+    surface_beside(&found.surface, found.surface);
+#endif
     found.surface.gradient = vec_of(none, none, none);
     const vec own = solid_own(o, point);
     if (o->kind != SOLID_FORMULA) {
@@ -185,10 +189,11 @@ INLINE mask orbit_inside(vec point, mask active, int limit, __constant const str
     return orbit_solid(point, active, limit, orbit, k).inside;
 }
 
-// The smooth escape count of the formula that is nearest.
-INLINE real smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+// The smooth escape count of one formula; 0 of a simple solid. `told`: of which lanes there is one.
+INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, __constant const struct Orbit *orbit) {
     real smooth = R(0.0);
     end.count = surface.count;
+    *told = end.inside & ~end.inside;
     for (int i = 0; i < SOLIDS; ++i) {
         __constant const struct Orbit *o = orbit + i;
         const mask here = equal(surface.of, (real)((scalar)i));
@@ -197,8 +202,24 @@ INLINE real smooth_count(orbit_end end, surface_point surface, __constant const 
 #define SMOOTH_TEXT(i) case i: found = smooth_count_##i(end, surface, o); break;
         switch (o->text) { EACH_TEXT(SMOOTH_TEXT) }
         smooth = pick(here, found, smooth);
+        *told |= here;
     }
     return smooth;
+}
+
+// The smooth escape count of the formula that is nearest; where two flow together, between theirs.
+INLINE real smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+    mask told;
+    const real own = smooth_of_one(end, surface, &told, orbit);
+#if JOINS_SMOOTHLY
+    const mask flows = less(R(0.0), surface.share);
+    if (!any_lane(flows)) return own;
+    mask other_told;
+    const real other = smooth_of_one(end, surface_of_other(surface), &other_told, orbit);
+    return shared(own, other, flows & told, flows & other_told, surface.share);
+#else
+    return own;
+#endif
 }
 
 // The potential of the formula that is nearest, as if its ball were as large as the whole scene's; 0 on walls.

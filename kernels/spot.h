@@ -19,8 +19,8 @@ INLINE mask faces(stage s, const spot *here, vec direction) {
     return any_normal;
 }
 
-// The colour of a spot: the set's, or that of the object with this number.
-INLINE color spot_color(vec normal, real quantity, real object, world w) {
+// The colour of a surface: the set's, or that of the object with this number.
+INLINE color object_color(vec normal, real quantity, real object, world w) {
     color found = surface_color(normal, quantity, w.material, w.palette);
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
@@ -29,6 +29,15 @@ INLINE color spot_color(vec normal, real quantity, real object, world w) {
     }
 #endif
     return found;
+}
+
+// The colour of a spot: where two solids flow together, a blend of theirs.
+INLINE color spot_color(vec normal, real quantity, real object, real other, real share, world w) {
+    const color own = object_color(normal, quantity, object, w);
+#if JOINS_SMOOTHLY
+    if (any_lane(less(R(0.0), share))) return color_mix(own, object_color(normal, quantity, other, w), share);
+#endif
+    return own;
 }
 
 // What a ray for a spot has met: the set, or the object with this number.
@@ -46,6 +55,9 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
         met.smooth = pick(here, R(0.0), met.smooth);
         met.more_steps = pick(here, R(0.0), met.more_steps);
         met.more_count = pick(here, R(0.0), met.more_count);
+#if JOINS_SMOOTHLY
+        met.share = pick(here, R(0.0), met.share);
+#endif
     }
 #if SOLIDS > 1
     *object = pick(mask_of(met.hit) & ~here, met.solid, *object);
@@ -77,9 +89,13 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
     here.smooth = met.smooth;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-    here.tint = spot_color(met.normal, met.smooth, object, w);
+    here.tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
 #if HAS_OBJECTS || HAS_MATTES
     here.object = object;
+#endif
+#if JOINS_SMOOTHLY
+    here.other = met.other;
+    here.share = met.share;
 #endif
     return here;
 }

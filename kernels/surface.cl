@@ -184,7 +184,7 @@ STAGE(light_spots) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
 #if !COLORING_PER_POINT
-        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), w);
+        found.tint = spot_color(found.normal, found.quantity, OBJECT_OF(found), OTHER_OF(found), SHARE_OF(found), w);
 #endif
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
     }

@@ -137,6 +137,10 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
 #if SOLIDS > 1
     met->solid = surface.solid;
 #endif
+#if JOINS_SMOOTHLY
+    met->other = surface.other_solid;
+    met->share = surface.share;
+#endif
 }
 
 // Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and with POLISH where

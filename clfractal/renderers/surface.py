@@ -64,7 +64,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
-from clfractal.solids import Body
+from clfractal.solids import Body, joins_smoothly
 
 PALETTE_SIZE = 256
 COLORINGS = {
@@ -207,6 +207,7 @@ def normal_count(scene: Scene) -> int:
 def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
     more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * bool(scene.objects)
+    more += 4 * joins_smoothly(scene)
     if has_parts(plan):
         more += _PARTS_NUMBERS + 3 * has_bump(scene)
     more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
@@ -242,7 +243,7 @@ class SurfaceKernel(TileKernel):
 
     def wave_needs(self) -> WaveNeeds:
         ray = RAY_NUMBERS + OBJECT_NUMBERS * bool(self.scene.objects)
-        met = MET_NUMBERS + bool(self.scene.joined)
+        met = MET_NUMBERS + bool(self.scene.joined) + 2 * joins_smoothly(self.scene)
         return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray, met)
 
     @property
