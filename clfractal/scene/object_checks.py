@@ -67,13 +67,6 @@ def _check_joined(scene: Scene) -> None:
             f"at most {MAX_FORMULAS} objects can be formulas, and this is one more",
             Where(path=f"objects.{names[MAX_FORMULAS]}.type"),
         )
-    first = next(iter(scene.joined))
-    used = scene.material.name if isinstance(scene.renderer, SurfaceRenderer) else None
-    if used in scene.materials and _lets_through(scene, used):
-        raise SceneError(
-            f"is glass, {used!r}, which cannot be joined with the object {first!r}",
-            Where(path="material.name"),
-        )
     for name, each in scene.joined.items():
         where = Where(path=f"objects.{name}.join")
         if isinstance(each, PlaneObject) and each.join == "smooth_union":
@@ -98,16 +91,22 @@ def _check_material(scene: Scene, name: str, material: str | None) -> None:
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
-    """What is joined is no glass, and what differs from place to place is for paths; only surfaces have materials."""
+    """What is joined is glass as a whole or not, and what differs from place to place is for paths; only surfaces have materials."""
     if not isinstance(scene.renderer, SurfaceRenderer):
         return
     used = material if material is not None else scene.material.name
     if used is None:
         return
-    if name in scene.joined and _lets_through(scene, used):
-        raise SceneError(
-            f"{used!r} is glass, which formulas beside the set and what is joined cannot be", where
-        )
+    own = scene.material.name
+    if name in scene.joined and used != own:
+        if _lets_through(scene, used):
+            raise SceneError(
+                f"{used!r} is glass, which formulas and what is joined can be only with all of the set:"
+                " by material.name",
+                where,
+            )
+        if own in scene.materials and _lets_through(scene, own):
+            raise SceneError(f"{used!r} is not the glass of the set, {own!r}, to which it is joined", where)
     if isinstance(scene.lighting, PathLighting) or material is None:
         return
     if scene.materials[used].blend is not None or any(maps_of(scene.materials[used])):

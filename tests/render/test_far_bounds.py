@@ -42,7 +42,16 @@ def scene_of(formula: dict[str, Any], far: float, bounds: float | None) -> Scene
         "fov": float(np.degrees(2 * np.arctan(0.8 / far))),
     }
     image = {"width": 160, "height": 160}
-    return load_scene({"version": 1, "formula": formula, "camera": camera, "image": image, "renderer": renderer, "lights": []})
+    return load_scene(
+        {
+            "version": 1,
+            "formula": formula,
+            "camera": camera,
+            "image": image,
+            "renderer": renderer,
+            "lights": [],
+        }
+    )
 
 
 def check(device: Device, formula: dict[str, Any]) -> None:

@@ -21,8 +21,16 @@ DULL: dict[str, Any] = {"base": {"weight": 0}, "specular": {"weight": 0}}
 
 
 def flowing(drop: dict[str, Any], **sections: Any) -> Scene:
-    each = {"type": "sphere", "position": PLACE, "radius": RADIUS, "join": "smooth_union", "smoothness": WIDTH}
-    return scene_of({"inline": SOLIDS, "iterations": 3}, CAMERA, (96, 80), objects={"drop": {**each, **drop}}, **sections)
+    each = {
+        "type": "sphere",
+        "position": PLACE,
+        "radius": RADIUS,
+        "join": "smooth_union",
+        "smoothness": WIDTH,
+    }
+    return scene_of(
+        {"inline": SOLIDS, "iterations": 3}, CAMERA, (96, 80), objects={"drop": {**each, **drop}}, **sections
+    )
 
 
 def share_of_drop(points: Floats) -> Floats:

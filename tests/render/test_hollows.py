@@ -13,8 +13,6 @@ from clfractal.device.structs import Precision
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.joined_oracle import (
-    BALL_RADIUS,
-    Distance,
     Floats,
     a_sphere,
     agree,
@@ -22,7 +20,7 @@ from tests.render.joined_oracle import (
     marched,
     normal_at,
 )
-from tests.render.shots import BALL, QUICK_BALL, normals_of, points_of, rays, scene_of, shoot
+from tests.render.shots import BALL, BALL_RADIUS, QUICK_BALL, normals_of, points_of, rays, scene_of, shoot
 from tests.voxels.joined import belongs
 
 # The scene's own formula is a large ball; balls are cut out of it, and one floats in the hollow.
@@ -34,10 +32,18 @@ WITHIN = {"position": HOLE, "target": [-0.1, 0.5, 0.1], "fov": 80}
 
 def ball_object(formula: dict[str, Any], place: list[float], scale: float, **values: Any) -> dict[str, Any]:
     """A ball that is a formula's set: how deep places are in it nobody knows."""
-    return {"type": "formula", "formula": {"inline": formula, "iterations": 8}, "position": place, "scale": scale, **values}
+    return {
+        "type": "formula",
+        "formula": {"inline": formula, "iterations": 8},
+        "position": place,
+        "scale": scale,
+        **values,
+    }
 
 
-def hollow_scene(formula: dict[str, Any], camera: dict[str, Any], size: tuple[int, int], **sections: Any) -> Scene:
+def hollow_scene(
+    formula: dict[str, Any], camera: dict[str, Any], size: tuple[int, int], **sections: Any
+) -> Scene:
     objects = {
         "hole": ball_object(formula, HOLE, SIZE, join="cut", rotation=[10, 20, 30]),
         "other": ball_object(formula, OTHER_HOLE, 0.4, join="cut"),
@@ -48,7 +54,9 @@ def hollow_scene(formula: dict[str, Any], camera: dict[str, Any], size: tuple[in
 
 def hollowed(points: Floats) -> Floats:
     """The distance to what is left, or less."""
-    holes = [a_sphere(place, scale * BALL_RADIUS)(points) for place, scale in ((HOLE, SIZE), (OTHER_HOLE, 0.4))]
+    holes = [
+        a_sphere(place, scale * BALL_RADIUS)(points) for place, scale in ((HOLE, SIZE), (OTHER_HOLE, 0.4))
+    ]
     left = np.maximum(a_sphere([0, 0, 0], BALL_RADIUS)(points), -np.minimum(*holes))
     found: Floats = np.minimum(left, a_sphere(PEARL, 0.15 * BALL_RADIUS)(points))
     return found

@@ -124,8 +124,8 @@ CASES = [
     ),
     (
         "materials: {ice: {transmission: {weight: 1}}, clay: {}}\nlighting: {mode: path}\n"
-        "material: {name: §ice}\nobjects: {b: {join: cut, material: clay}}",
-        "material.name: is glass, 'ice', which cannot be joined with the object 'b'",
+        "material: {name: ice}\nobjects: {b: {join: cut, material: §clay}}",
+        "objects.b.material: 'clay' is not the glass of the set, 'ice', to which it is joined",
     ),
     (
         f"objects: {{b: {{{OTHER}}}}}\nanimation: {{frames: 9, tracks: {{"
