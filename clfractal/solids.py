@@ -67,7 +67,12 @@ class Body:
     @property
     def defines(self) -> dict[str, object]:
         """The defines of all programs that ask it, or read what marches have found."""
-        return {"SOLIDS": 1 if self.scene is None else 1 + len(self.scene.joined)}
+        joined = {} if self.scene is None else self.scene.joined
+        return {
+            "SOLIDS": 1 + len(joined),
+            "JOINS_SMOOTHLY": int(self.scene is not None and joins_smoothly(self.scene)),
+            "HOLLOWS": int(any(is_hollow(each) for each in joined.values())),
+        }
 
     def texts(
         self, *, files: Sequence[str] = (), defines: Callable[[Chain], Mapping[str, object]] | None = None
@@ -97,6 +102,16 @@ class Body:
         return np.array(constants.values, precision)
 
 
+def joins_smoothly(scene: Scene) -> bool:
+    """Whether anything flows into the set."""
+    return any(each.join == "smooth_union" for each in scene.joined.values())
+
+
+def is_hollow(each: Joined) -> bool:
+    """Whether an object leaves a hollow in which no distance is known."""
+    return isinstance(each, FormulaObject) and each.join == "cut"
+
+
 def _lines_of(defines: Callable[[Chain], Mapping[str, object]] | None) -> Callable[[Chain], str]:
     """Defines of a formula as text."""
     if defines is None:
@@ -110,7 +125,6 @@ def _joined_texts(scene: Scene, names: tuple[str, ...], lines: Callable[[Chain],
     head = [
         *(f"#define SOLID_{kind.upper()} {number}" for kind, number in SOLID_KINDS.items()),
         *(f"#define JOIN_{join.split('_')[0].upper()} {number}" for join, number in JOINS.items()),
-        f"#define JOINS_SMOOTHLY {int(any(each.join == 'smooth_union' for each in scene.joined.values()))}",
         *(f'#include "{header}"' for name in names for header in _HEADERS.get(name, ())),
     ]
     body = [
@@ -139,7 +153,7 @@ def numbered(text: str, after: tuple[str, ...], number: int) -> str:
 def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
     """The scene's own formula, and what is joined to it."""
     iterations = scene.formula.iterations
-    radius = scene.bounds[1]
+    radius = min(scene.bounds[1], scene.formula_bounds[1])
     texts = list(_texts(scene))
     constants = _Constants()
 
@@ -155,7 +169,7 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             "step_scale": safe,
             "ball": ball[0],
             "ball_radius": ball[1],
-            "potential_share": ball[1] / radius,
+            "potential_share": min(ball[1], scale * chain.radius) / radius,
         }
 
     found = [orbit_record(scene.chain, iterations, precision, joined=formula(scene.chain, 1.0, _ball(scene)))]

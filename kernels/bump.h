@@ -9,8 +9,7 @@ INLINE real height_at(stage s, const spot *there, int place, world w) {
 #else
     // As `pbr_at` mixes the parts of blends.
     real shares[MATERIALS], height = R(0.0);
-    const real root = spot_material(there, w);
-    for (int i = 0; i < MATERIALS; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
+    for (int i = 0; i < MATERIALS; ++i) shares[i] = material_share(there, i, w);
     for (int i = 0; i < MATERIALS; ++i) {
         if (!any_lane(less(R(0.0), shares[i]))) continue;
         __constant const struct Pbr *material = w.materials + i;

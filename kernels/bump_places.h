@@ -1,15 +1,29 @@
 // Which material a spot has, and places around it where the heights of that material's relief are compared.
 
-// The number of a spot's material.
-INLINE real spot_material(const spot *here, world w) {
+// The number of an object's material, or the set's.
+INLINE real object_material(real object, world w) {
     real number = (real)((scalar)SET_MATERIAL);
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
-        const mask there = equal(here->object, (real)((scalar)(i + 1)));
+        const mask there = equal(object, (real)((scalar)(i + 1)));
         number = pick(there, (real)((scalar)w.objects[i].material), number);
     }
 #endif
     return number;
+}
+
+INLINE real spot_material(const spot *here, world w) { return object_material(OBJECT_OF(*here), w); }
+
+// The part of each material in a spot's, before blends are told apart.
+INLINE real material_share(const spot *here, int number, world w) {
+    const real found = (real)((scalar)number);
+    const real own = pick(equal(spot_material(here, w), found), R(1.0), R(0.0));
+#if JOINS_SMOOTHLY
+    const real other = pick(equal(object_material(here->other, w), found), R(1.0), R(0.0));
+    return own + here->share * (other - own);
+#else
+    return own;
+#endif
 }
 
 #if HAS_BUMP
@@ -20,6 +34,13 @@ INLINE real bump_width(const spot *here, world w) {
 #if MATERIALS > 1
     const real root = spot_material(here, w);
     for (int i = 1; i < MATERIALS; ++i) width = pick(equal(root, (real)((scalar)i)), (real)(w.materials[i].bump_width), width);
+#if JOINS_SMOOTHLY
+    // Where two flow together, as either of them has.
+    for (int i = 0; i < MATERIALS; ++i) {
+        const mask has = less(R(0.0), material_share(here, i, w));
+        width = pick(has, fmax(width, (real)(w.materials[i].bump_width)), width);
+    }
+#endif
 #endif
     return pick(less(width, R(0.0)) | on_face(here), R(-1.0), fmax(width, here->cone));
 }

@@ -1,5 +1,6 @@
 // Counts of several solids that are joined, in the place of `solid_count.h`: the largest of those that are beside each other, the
-// smaller of both where only what they have in common is left. A simple solid has the iteration limit inside, and 0 outside.
+// smaller of both where only what they have in common is left. A simple solid has the iteration limit inside, and 0 outside. What is
+// cut out has counts of 0, and does not change others.
 INLINE real solid_count(vec point, mask *within, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const real most = (real)((scalar)orbit->iterations);
     real all = R(0.0);
@@ -18,7 +19,7 @@ INLINE real solid_count(vec point, mask *within, __constant const struct Orbit *
         }
         // Each formula has a limit of its own.
         count = pick(inside, most, fmin(count, most));
-        if (o->join == JOIN_CUT) all = fmin(all, most - count);
+        if (o->join == JOIN_CUT) all = pick(inside, R(0.0), all);
         else if (o->join == JOIN_INTERSECTION) all = fmin(all, count);
         else all = fmax(all, count);
     }

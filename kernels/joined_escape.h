@@ -29,7 +29,7 @@ CALLED escaped solids_escape(const vec *point, mask active, int smooth, int peri
         all.applications += one.applications;
         if (o->join == JOIN_CUT) {
             all.inside &= ~one.inside;
-            all.count = fmin(all.count, limit - count);
+            all.count = pick(one.inside, R(0.0), all.count);
         } else if (o->join == JOIN_INTERSECTION) {
             all.inside &= one.inside;
             all.count = fmin(all.count, count);

@@ -34,7 +34,7 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
     return all;
 }
 
-// Which nodes lie in one solid as a whole; `outside`: which beside it.
+// Which nodes lie in one solid as a whole; `outside`: which beside it, of what is cut out.
 INLINE mask one_holds(vec middle, vec half_side, mask candidates, mask *outside, __constant const struct Orbit *o,
                       __constant const scalar *k) {
     const vec own = solid_own(o, middle);
@@ -52,6 +52,7 @@ INLINE mask one_holds(vec middle, vec half_side, mask candidates, mask *outside,
     const vec arm = vec_sub(middle, vec_splat(o->ball));
     mask held = candidates & less(sqrt(vec_dot(arm, arm)) + reach, (real)(o->ball_radius));
     *outside = candidates & ~candidates;
+    if (o->join == JOIN_CUT) *outside = candidates & less(reach, one_distance(middle, reach, o, k));
     if (!any_lane(held)) return held;
 #define HOLDS_TEXT(i) case i: held = node_inside_##i(own, own_half, held, o, k + o->first); break;
     switch (o->text) { EACH_TEXT(HOLDS_TEXT) }

@@ -82,6 +82,9 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
 #if HAS_MATTES || HAS_FACES
     found->object = pick(met, object, found->object);
+#if JOINS_SMOOTHLY
+    found->share = pick(met, R(0.0), found->share);
+#endif
 #endif
     spot_keep(found, s.state, 0, s.stride);
 }

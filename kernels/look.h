@@ -5,14 +5,14 @@ typedef struct {
     color specular, mirror, mirror_edge, emission;
 } look;
 
-INLINE look look_of(const spot *here, world w) {
+INLINE look look_of_object(real object, world w) {
     __constant const struct Material *m = w.material;
     const color none = color_of(R(0.0), R(0.0), R(0.0));
     const real specular = (real)(m->specular), mirror = (real)(m->reflection);
     look found = {(real)(m->ambient), (real)(m->diffuse), (real)(m->diffuse), (real)(m->shininess), R(0.0),
                   color_of(specular, specular, specular), color_of(mirror, mirror, mirror), none, none};
     for (int i = 0; i < w.settings->object_count; ++i) {
-        const mask there = equal(here->object, (real)((scalar)(i + 1)));
+        const mask there = equal(object, (real)((scalar)(i + 1)));
         if (!any_lane(there)) continue;
         __global const struct Object *o = w.objects + i;
         found.ambient = pick(there, (real)(o->ambient), found.ambient);
@@ -25,6 +25,18 @@ INLINE look look_of(const spot *here, world w) {
         found.mirror_edge = color_pick(there, color_splat(o->mirror_edge), found.mirror_edge);
         found.emission = color_pick(there, color_splat(o->emission), found.emission);
     }
+    return found;
+}
+
+INLINE look look_of(const spot *here, world w) {
+    look found = look_of_object(here->object, w);
+#if JOINS_SMOOTHLY
+    if (!any_lane(less(R(0.0), here->share))) return found;
+    const look other = look_of_object(here->other, w);
+    for (int i = 0; i < NUMBERS_OF(look); ++i) {
+        ((real *)&found)[i] += here->share * (((const real *)&other)[i] - ((real *)&found)[i]);
+    }
+#endif
     return found;
 }
 

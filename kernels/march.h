@@ -12,14 +12,20 @@
 #define LANDED_LEAST R(0.03)     // a ray past the solid hits at this part of the cone: a smooth rim stays where it is
 #define POINT_REACH R(1.5)       // a pixel's points hit at that much more
 #define PASSED_SLOPE R(-0.1)     // what a sheet is approached with at the least
-#define BRACKETED R(0.1)         // of the cone: a bracket this narrow is the surface
+#define BRACKETED (HOLLOWS && POLISH ? R(0.005) : R(0.1))  // of the cone: a bracket this narrow is the surface
 #define LEAST_SLOPE R(0.1)       // no landing step is longer than ten distances ...
 #define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
 #define GRAZING_MOST R(2.0)      // ... at most so much of the cone
 #define MOST_GROWTH R(0.5)       // of an unscaled distance for the way: where a surface is smooth it is half of the true one
+#define BALL_NEAR R(1.005)       // of its radius: so near to the middle of a formula's ball its estimates count ...
+#define BALL_BEYOND R(1.01)      // ... and beyond this they may be too large
 #define CREEP R(0.25)            // of the cone: the least step by the Jacobian
 #define CONE_LEAST R(0.25)       // of a cone of many rays: the least step that is worth another look
 #define BACK_STEPS R(4.5)        // a point's evaluations inside, before it counts as hit where it begins
+// In hollows, where no distance is known, rays go as in the search by steps; steps grow as those of its shadows do.
+#define BLIND_FIRST R(2.0)       // of the cone: the first step ...
+#define BLIND_LEAST R(0.015625)  // ... but at least this part of the full step
+#define BLIND_GROWTH R(1.5)
 
 INLINE sight march_place(const march *m) {
     sight s;
@@ -50,6 +56,33 @@ INLINE real near_of(clearance here, __constant const struct March *settings) {
 #endif
 }
 
+#if HOLLOWS
+// The step in a hollow: nothing counts as near there, but for what is joined to it.
+INLINE void march_blind(const march *m, sight *s, __constant const struct March *settings) {
+    const real step = (real)(settings->step), first = fmax(BLIND_FIRST * s->cone, BLIND_LEAST * step);
+    const real pace = fmin(fmax(BLIND_GROWTH * m->step_before, first), step);
+    const real most = s->here.most * step_scale_of(s->here, settings), free = fmin(fmax(fmax(pace, s->cone), s->radius), most);
+    const mask unknown = is_blind(s->here);
+    s->blind = unknown & less(free, most);
+    s->sure = pick(unknown & ~s->blind, free, s->radius);
+    s->radius = pick(unknown, free, s->radius);
+}
+#endif
+
+#if FAR_BOUNDS
+// Estimates are made for the inside of the formula's ball. Farther out they may be too large: there no step leads into it. How far the
+// ball is along the ray, and in `around` in any direction; beyond all where the ray does not meet it.
+INLINE real march_to_ball(const march *m, const sight *s, real *around, __constant const struct March *settings) {
+    const vec arm = vec_sub(s->on_ray, vec_splat(settings->ball_center));
+    const real radius = (real)(settings->ball_radius), away = sqrt(vec_dot(arm, arm)), ahead = -vec_dot(arm, m->r.direction);
+    const vec nearest = vec_along(arm, ahead, m->r.direction);
+    const real square = BALL_NEAR * BALL_NEAR * radius * radius - vec_dot(nearest, nearest);
+    const mask far = less(BALL_BEYOND * radius, away);
+    *around = pick(far, away - radius, (real)(REAL_LARGEST));
+    return pick(far & less(R(0.0), ahead) & less(R(0.0), square), ahead - sqrt(fmax(square, R(0.0))), (real)(REAL_LARGEST));
+}
+#endif
+
 // What the distance found at that place means for the march.
 INLINE void march_measure(march *m, sight *s, __constant const struct March *settings) {
     mask free = less_equal((real)(REAL_LARGEST), m->high);
@@ -63,6 +96,9 @@ INLINE void march_measure(march *m, sight *s, __constant const struct March *set
     // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
     s->radius = pick(less(s->radius, (real)(REAL_LARGEST)), s->radius, (real)(settings->step));
     s->radius = pick(free, fmin(s->radius, m->radius_before + MOST_GROWTH * scale * m->step_before), s->radius);
+#if HOLLOWS
+    march_blind(m, s, settings);
+#endif
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));
 }
@@ -70,7 +106,7 @@ INLINE void march_measure(march *m, sight *s, __constant const struct March *set
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
 INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __constant const struct March *settings) {
     const real height = s->cone * near_of(s->here, settings);
-    const mask beside = outside & less(s->radius, height);
+    const mask beside = outside & less(s->radius, height) & ~BLIND(s);
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
     const mask between = beside & less(height, m->radius_before) & less(m->radius_before, (real)(REAL_LARGEST));
     const real back = pick(between, (height - s->radius) / (m->radius_before - s->radius), R(0.0));
@@ -95,13 +131,22 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     step = fmax(step, CREEP * s->cone);
 #endif
     m->limit = pick(overshot & s->here.end.inside, m->t, m->limit);
+#if HOLLOWS
+    step = pick(s->blind, s->radius, step);
+#endif
+#if FAR_BOUNDS
+    real around;
+    step = fmin(step, march_to_ball(m, s, &around, settings));
+#endif
     step = fmin(step, m->limit - m->t);
     const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
-    m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside, s->radius, m->radius_before);
+    const real known = pick(BLIND(s), (real)(REAL_LARGEST), s->radius);
+    m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside, known, m->radius_before);
     const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
-    const real narrower = fmax(R(0.5) * (m->low + m->high), fmin(m->low + s->radius, m->high - BRACKETED * s->cone));
+    const real free = pick(is_blind(s->here), R(0.0), s->radius);
+    const real narrower = fmax(R(0.5) * (m->low + m->high), fmin(m->low + free, m->high - BRACKETED * s->cone));
     m->t = pick(bracketed, narrower, pick(early, m->low, pick(marching, onward, m->t)));
 }
 
@@ -109,9 +154,15 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
 // leaves its ray's part ends beyond everything.
 INLINE void march_cone(march *m, const sight *s, __constant const struct March *settings) {
     const real widens = (real)(settings->detail) * m->r.spread, all = R(1.0) + widens * widens;
-    const real free = (real)(settings->cone_share) * s->radius, square = free * free - s->cone * s->cone;
+    real radius = s->radius;
+#if FAR_BOUNDS
+    real around;
+    march_to_ball(m, s, &around, settings);
+    radius = fmin(radius, around);
+#endif
+    const real free = (real)(settings->cone_share) * radius, square = free * free - s->cone * s->cone;
     const real along = (sqrt(fmax(s->cone * s->cone * widens * widens + all * square, R(0.0))) - s->cone * widens) / all;
-    const mask known = less(s->here.step, (real)(REAL_LARGEST));
+    const mask known = less(s->here.step, (real)(REAL_LARGEST)) & ~is_blind(s->here);
     const mask onward = m->active & known & less(CONE_LEAST * s->cone, along) &
                         less(m->found.steps, (real)((scalar)settings->max_steps));
     m->radius_before = s->radius;
@@ -133,7 +184,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     // If this sphere does not touch the one before, something may lie between them, so go back to the end of the one
     // before (Keinert et al. 2014, sec. 3.1).
     const mask free = marching & less_equal((real)(REAL_LARGEST), m->high);
-    const mask overshot = free & ~m->landing & less((radius + m->radius_before) * R(1.0001), m->step_before);
+    const mask overshot = free & ~m->landing & less((SURE(&s) + m->radius_before) * R(1.0001), m->step_before);
     mask inside = marching & ~overshot & s.here.end.inside;
     mask early = inside & ~inside;
 #if POINTS > 1
@@ -145,11 +196,13 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
 #endif
     const mask outside = marching & ~overshot & ~s.here.end.inside;
     // (Not where it has only just begun.)
-    m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps), R(1.0), R(0.0));
-    const mask measured = outside & free & less(R(0.0), m->step_before) & less(m->radius_before, (real)(REAL_LARGEST));
+    const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
+    m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
+    const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~BLIND(&s);
     const mask steep = less(m->slope, PASSED_SLOPE);
     const real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
+    m->slope = pick(BLIND(&s), R(0.0), m->slope);
     march_keep(m, &s, outside, inside, settings);
 
     // The cone touches the solid, or the surface is bracketed. A hit at first sight waits for a landing, unless it is as near as

@@ -31,10 +31,22 @@ typedef struct {
     vec point, on_ray;
     clearance here;
     real radius, cone;
+#if HOLLOWS
+    mask blind;   // nobody knows how far the solid is ...
+    real sure;    // ... but for what is free at least; else the radius
+#endif
 #if !HAS_DERIVATIVE
     surface_point surface;
 #endif
 } sight;
+
+#if HOLLOWS
+#define SURE(s) ((s)->sure)
+#define BLIND(s) ((s)->blind)
+#else
+#define SURE(s) ((s)->radius)
+#define BLIND(s) less(R(1.0), R(0.0))
+#endif
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {

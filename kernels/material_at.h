@@ -83,9 +83,24 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
 }
 #endif
 
-// What a path meets at a spot: a thing's material, or the face of a cut.
+// What a path meets at a spot: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
 INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
     pbr p = pbr_at(s, here, w);
+#if JOINS_SMOOTHLY
+    if (any_lane(less(R(0.0), here->share))) {
+        spot one = *here, other = one;
+        const real quantity = COLORING_PER_POINT ? here->smooth : here->quantity;
+        other.object = here->other;
+        one.share = other.share = R(0.0);
+        one.tint = object_color(here->normal, quantity, one.object, w);
+        other.tint = object_color(here->normal, quantity, other.object, w);
+        p = pbr_at(s, &one, w);
+        const pbr more = pbr_at(s, &other, w);
+        for (int i = 0; i < NUMBERS_OF(pbr); ++i) {
+            ((real *)&p)[i] += here->share * (((const real *)&more)[i] - ((real *)&p)[i]);
+        }
+    }
+#endif
 #if HAS_FACES
     pbr_of_face(here, &p);
 #endif

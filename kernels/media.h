@@ -131,7 +131,8 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
     found.body = set_body(w);
     found.leaving = equal(with->medium, found.body) | equal(with->under, found.body);
 #if HAS_OBJECTS
-    const mask beside = less(R(0.0), here->object);
+    // What is joined to the set is one body with it.
+    const mask beside = less(R(0.0), here->object) & ~of_the_set(here->object, w);
     found.body = pick(beside, here->object, found.body);
     glass &= ~beside;
     found.leaving &= ~beside;

@@ -2,6 +2,8 @@
 #include "numbers/quick.h"
 #ifndef SOLIDS
 #define SOLIDS 1  // solids that are joined, see solids.h
+#define JOINS_SMOOTHLY 0
+#define HOLLOWS 0
 #endif
 
 // How an orbit ended.
@@ -23,7 +25,19 @@ typedef struct {
 #if SOLIDS > 1
     real scale; // of several solids: the step scale of the nearest one
 #endif
+#if HOLLOWS
+    real most;  // where a formula was cut out the distance is not known: it is `step` at least, and this at most
+#endif
 } clearance;
+
+// Where a distance is not known.
+INLINE mask is_blind(clearance here) {
+#if HOLLOWS
+    return less(here.step, here.most);
+#else
+    return less(R(1.0), R(0.0));
+#endif
+}
 
 // What is known of a point on the surface, from one orbit over dual numbers.
 typedef struct {
@@ -34,6 +48,10 @@ typedef struct {
     real count;          // of several solids: the count of the nearest one ...
     real of;             // ... its number ...
     real solid;           // ... and that of what the surface belongs to: the same, or what has cut it
+#endif
+#if JOINS_SMOOTHLY
+    real share;           // where two solids flow together: the other one's part of the colour ...
+    real other_square, other_square_before, other_count, other_of, other_solid;  // ... and the same of that one
 #endif
 } surface_point;
 

@@ -11,6 +11,9 @@ typedef struct {
     real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
     vec point, base, normal;    // base: where it is shaded
     real smooth, object;
+#if JOINS_SMOOTHLY
+    real other, share;
+#endif
     color tint;                 // sum over the points
 #if GEOMETRIC
     vec reference, right, up, toward;
@@ -37,6 +40,9 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
     p.base = pixel_ray.origin;
     p.normal = pixel_ray.direction;
     p.smooth = p.object = R(0.0);
+#if JOINS_SMOOTHLY
+    p.other = p.share = R(0.0);
+#endif
     p.tint = color_of(R(0.0), R(0.0), R(0.0));
 #if GEOMETRIC
     p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
@@ -98,8 +104,12 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
     p->normal = vec_pick(nearer, met.normal, p->normal);
     p->smooth = pick(nearer, met.smooth, p->smooth);
     p->object = pick(nearer, object, p->object);
+#if JOINS_SMOOTHLY
+    p->other = pick(nearer, met.other, p->other);
+    p->share = pick(nearer, met.share, p->share);
+#endif
 #if COLORING_PER_POINT
-    const color tint = spot_color(met.normal, met.smooth, object, w);
+    const color tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
     p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
 #endif
 #if GEOMETRIC
@@ -148,10 +158,14 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
 #elif HAS_MATTES || HAS_FACES
     here.object = R(0.0);
 #endif
+#if JOINS_SMOOTHLY
+    here.other = p->other;
+    here.share = p->share;
+#endif
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);
 #if HAS_CUT_OBJECTS && !COLORING_PER_POINT
-    here.tint = spot_color(p->normal, p->smooth, p->object, w);
+    here.tint = spot_color(p->normal, p->smooth, p->object, OTHER_OF(*p), SHARE_OF(*p), w);
 #endif
     here.normal = p->normal;
     here.residual = R(0.0);

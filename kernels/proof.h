@@ -34,7 +34,7 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
     if (!any_lane(m->proving)) return m->active;
     const real cone = s->cone;
     const vec offset = vec_sub(s->point, s->on_ray);
-    const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->bounds_radius), PROOF_LOW * cone);
+    const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->set_radius), PROOF_LOW * cone);
     const real arrival = pick(close, PROOF_ARRIVED * cone, PROOF_LANDED * cone);
     const real along = vec_dot(offset, m->r.direction);
     const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);

@@ -16,6 +16,9 @@ typedef struct {
 #if SOLIDS > 1
     real solid;                     // the number of the object that the surface belongs to, or 0
 #endif
+#if JOINS_SMOOTHLY
+    real other, share;              // where two flow together: likewise of the other one, and its part of the colour
+#endif
 } encounter;
 
 // Places of numbers in these structs; only points of a pixel have something that is known.

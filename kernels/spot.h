@@ -21,7 +21,7 @@ INLINE mask faces(stage s, const spot *here, vec direction) {
 
 // The colour of a thing: the set's, or that of the object with this number. The face of an object's cut shows the plane's colour of
 // insides; what that of the set's shows only the formula knows.
-INLINE color spot_color(vec normal, real quantity, real object, world w) {
+INLINE color object_color(vec normal, real quantity, real object, world w) {
     color found = surface_color(normal, quantity, w.material, w.palette);
 #if HAS_CUT_OBJECTS
     const real plane = plane_of_face(object);
@@ -36,9 +36,19 @@ INLINE color spot_color(vec normal, real quantity, real object, world w) {
     return found;
 }
 
-// The same of a spot. Faces have theirs already.
+// The colour of a spot: where two solids flow together, a blend of theirs.
+INLINE color spot_color(vec normal, real quantity, real object, real other, real share, world w) {
+    const color own = object_color(normal, quantity, object, w);
+#if JOINS_SMOOTHLY
+    if (any_lane(less(R(0.0), share))) return color_mix(own, object_color(normal, quantity, other, w), share);
+#endif
+    return own;
+}
+
+// The same once its quantity is known. Faces have their colour already.
 INLINE color tint_of(const spot *here, world w) {
-    return color_pick(on_face(here), here->tint, spot_color(here->normal, here->quantity, OBJECT_OF(*here), w));
+    const color found = spot_color(here->normal, here->quantity, OBJECT_OF(*here), OTHER_OF(*here), SHARE_OF(*here), w);
+    return color_pick(on_face(here), here->tint, found);
 }
 
 #if HAS_OBJECTS
@@ -71,6 +81,9 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
         met.smooth = pick(here, face_count(*object, w), met.smooth);
         met.more_steps = pick(here, R(0.0), met.more_steps);
         met.more_count = pick(here, R(0.0), met.more_count);
+#if JOINS_SMOOTHLY
+        met.share = pick(here, R(0.0), met.share);
+#endif
     }
 #if SOLIDS > 1
     *object = pick(mask_of(met.hit) & ~here, met.solid, *object);
@@ -103,9 +116,13 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
     here.smooth = met.smooth;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-    here.tint = spot_color(met.normal, met.smooth, object, w);
+    here.tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
 #if HAS_OBJECTS || HAS_MATTES || HAS_FACES
     here.object = object;
+#endif
+#if JOINS_SMOOTHLY
+    here.other = met.other;
+    here.share = met.share;
 #endif
     return here;
 }
@@ -125,6 +142,9 @@ INLINE mask spot_on_face(stage s, ray r, spot *here) {
     here->smooth = pick(bare, face.count, here->smooth);
     here->tint = color_pick(bare, face.tint, here->tint);
     here->object = pick(bare, face.number, here->object);
+#if JOINS_SMOOTHLY
+    here->share = pick(bare, R(0.0), here->share);
+#endif
     return bare;
 }
 #endif

@@ -36,6 +36,9 @@ typedef struct {
 #if HAS_OBJECTS || HAS_MATTES || HAS_FACES
     real object;             // the number of the object, from 1; 0: the set; -1: a light, where it is seen first; or a face's, see planes.h
 #endif
+#if JOINS_SMOOTHLY
+    real other, share;       // where two solids flow together: the number of the other object, and its part of the colour
+#endif
     real quantity;           // what chooses the colour, where that is not known at once
     real residual;           // distance of the pixel's points from their plane, in footprints
 } spot;
@@ -53,6 +56,14 @@ INLINE mask on_face(const spot *here) {
     return less(R(1.0), R(0.0));
 #endif
 }
+
+#if JOINS_SMOOTHLY
+#define OTHER_OF(here) ((here).other)
+#define SHARE_OF(here) ((here).share)
+#else
+#define OTHER_OF(here) R(0.0)
+#define SHARE_OF(here) R(0.0)
+#endif
 
 // One of the normals over which shading is averaged.
 typedef struct {

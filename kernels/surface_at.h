@@ -13,6 +13,36 @@ INLINE real share_below(vec a, real most, real none) {
     return clamp((none - sqrt(vec_dot(a, a))) / (none - most), R(0.0), R(1.0));
 }
 
+#if HOLLOWS
+#define BEHIND_NEARER R(0.25)   // part of the height behind a wall at which the place is looked for next
+
+// A wall of a hollow is seen from where no distance is known. It has the gradient and the counts of a place behind it, as far as light is
+// computed before other surfaces, or nearer where the solid ends before. Where the gradient straight behind it is like that on it, it
+// is smooth, and has its own. What is met of anything else keeps what it has.
+INLINE void surface_of_walls(ray r, encounter *met, mask walls, __constant const struct March *settings,
+                             __constant const struct Orbit *orbit, __constant const scalar *k, surface_point *surface, vec *normal) {
+    const vec on_wall = *normal, hit = vec_along(r.origin, met->t, r.direction);
+    real height = (real)(settings->near) * (real)(settings->detail) * (r.footprint + r.spread * met->t);
+    mask found = walls & ~walls;
+    for (int i = 0; i < TURNS(4); ++i) {
+        const mask straight = found, asked = i == 3 ? found : walls & ~found;
+        if (!any_lane(asked)) continue;
+        surface_point behind;
+        const vec way = vec_pick(straight, vec_scale(on_wall, R(-1.0)), r.direction);
+        const clearance there = orbit_behind(vec_along(hit, height, way), asked, orbit, k, &behind);
+        met->more_count += pick(asked, there.end.count, R(0.0));
+        const vec gradient = vec_normalize(behind.gradient);
+        const mask usable = asked & there.end.inside & less(R(0.5), vec_dot(gradient, gradient));
+        const real share = pick(straight & usable, share_below(vec_sub(gradient, on_wall), LIKE, UNLIKE), R(0.0));
+        *surface = surface_pick(usable & ~straight, behind, *surface);
+        *normal = vec_pick(usable & ~straight, gradient, vec_along(*normal, share, vec_sub(on_wall, *normal)));
+        found |= usable;
+        height *= pick(found, R(1.0), BEHIND_NEARER);
+    }
+    *normal = vec_pick(walls, vec_normalize(*normal), *normal);
+}
+#endif
+
 // The surface where a march has ended: how far it is before it, at `touch`, and its normal, which may be that at the hit.
 INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant const struct March *settings,
                                  __constant const struct Orbit *orbit, __constant const scalar *k, clearance *there, vec *normal) {
@@ -29,6 +59,7 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant 
             *there = here;
             surface = found;
             wide = *normal = gradient;
+            asked &= ~is_blind(here);
             // The search by steps has no place before the hit.
             asked &= less(met->touch, met->last) | less(met->touch, met->t);
             place = vec_along(r.origin, met->last, r.direction);
@@ -64,7 +95,8 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
         met->more_count += pick(active, there->end.count, R(0.0));
         met->more_steps += pick(active, R(1.0), R(0.0));
         if (i == POLISH - 1) break;
-        const real height = there->step * step_scale_of(*there, settings) - wanted;
+        // A wall of a hollow is where its bracket is.
+        const real height = pick(is_blind(*there), R(0.0), there->step * step_scale_of(*there, settings) - wanted);
         const real slope = (height - height_before) / (t - before);
         const mask usable = less(slope, R(0.0)) & less(R(-1e6), slope);
         const real move = i == 0 ? height : pick(usable, -height / slope, height);
@@ -86,10 +118,13 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     vec normal;
     met->more_steps = met->more_count = R(0.0);
 #if POLISH
-    const surface_point surface = surface_polished(r, met, active, settings, orbit, k, &there);
+    surface_point surface = surface_polished(r, met, active, settings, orbit, k, &there);
     normal = vec_normalize(surface.gradient);
 #else
-    const surface_point surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
+    surface_point surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
+#endif
+#if HOLLOWS
+    surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
 #endif
     // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.end.inside;
@@ -101,6 +136,10 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     met->smooth = smooth_count(there.end, surface, orbit);
 #if SOLIDS > 1
     met->solid = surface.solid;
+#endif
+#if JOINS_SMOOTHLY
+    met->other = surface.other_solid;
+    met->share = surface.share;
 #endif
 }
 

@@ -116,8 +116,8 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
         )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
-        if name in scene.joined:  # the march finds it
-            row["kind"] = OBJECT_KINDS["joined"]
+        if name in scene.joined:  # the march finds it, and one body of glass is all of the set
+            row |= {"kind": OBJECT_KINDS["joined"], "glass": 0}
     return OBJECT.array(precision, rows) if rows else np.zeros(1, OBJECT.dtype(precision))
 
 

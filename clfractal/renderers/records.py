@@ -66,6 +66,9 @@ MARCH = Struct(
     [
         Field("bounds_center", "real", 3, "centre of the sphere that holds the set, scene units"),
         Field("bounds_radius", "real", 0, "its radius, scene units"),
+        Field("set_radius", "real", 0, "of the ball that holds the set, if that is smaller, scene units"),
+        Field("ball_center", "real", 3, "centre of the ball of the scene's own formula, scene units"),
+        Field("ball_radius", "real", 0, "its radius, scene units"),
         Field("step_scale", "real", 0, "part of a distance that is safe to step"),
         Field("relaxation", "real", 0, "factor on steps, taken back where spheres do not touch"),
         Field("detail", "real", 0, "distance that counts as a hit, in pixel footprints"),
@@ -291,6 +294,9 @@ def march_record(
     values = {
         "bounds_center": center,
         "bounds_radius": radius,
+        "set_radius": min(radius, scene.formula_bounds[1]),
+        "ball_center": scene.chain.center,
+        "ball_radius": scene.chain.radius,
         "step_scale": step_scale(scene),
         "relaxation": renderer.over_relaxation,
         "detail": renderer.detail,

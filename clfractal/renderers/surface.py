@@ -67,7 +67,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
-from clfractal.solids import Body
+from clfractal.solids import Body, joins_smoothly
 
 PALETTE_SIZE = 256
 COLORINGS = {
@@ -102,6 +102,7 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "SEARCH_DISTANCE": 0,
         "SEARCH_STEPS": 1,
         "SEARCH": int(renderer.search == "steps"),
+        "FAR_BOUNDS": int(searches_far(scene)),
         "POINTS": several_points(scene),
         # A binary search ends where the surface is; a march, somewhere within the point's footprint.
         "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
@@ -111,6 +112,13 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_OBJECTS": 0,
         **Body.of(scene).defines,
     }
+
+
+def searches_far(scene: Scene) -> bool:
+    """Whether rays look for the set farther out than its formula says that it is, and estimates are made for."""
+    center, radius = scene.bounds
+    apart = math.dist(center, scene.chain.center)
+    return scene.surface.bounds is not None and apart + radius > scene.chain.radius
 
 
 def several_points(scene: Scene) -> int:
@@ -204,6 +212,7 @@ def normal_count(scene: Scene) -> int:
 def state_numbers(scene: Scene, plan: Plan) -> int:
     """Numbers of a pixel that are kept between stages, at least; kernels check it."""
     more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * (bool(scene.objects) or has_faces(scene))
+    more += 4 * joins_smoothly(scene)
     if has_parts(plan):
         more += _PARTS_NUMBERS + 3 * has_bump(scene)
     more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
@@ -239,7 +248,7 @@ class SurfaceKernel(TileKernel):
 
     def wave_needs(self) -> WaveNeeds:
         ray = RAY_NUMBERS + OBJECT_NUMBERS * bool(self.scene.objects)
-        met = MET_NUMBERS + bool(self.scene.joined)
+        met = MET_NUMBERS + bool(self.scene.joined) + 2 * joins_smoothly(self.scene)
         return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray, met)
 
     @property

@@ -103,6 +103,7 @@ def program_text(formula: FormulaText, lanes: int, precision: Precision) -> Flat
         "SEARCH": 0,
         "POINTS": 1,
         "POLISH": 0,
+        "FAR_BOUNDS": 0,
         "HAS_LENS": 0,
     }
     generated = {"structs.h": struct_text(), "formula.h": formula.text}
@@ -209,6 +210,7 @@ def _settings(chain: Chain, precision: Precision) -> npt.NDArray[np.void]:
     values: dict[str, object] = {
         "bounds_center": chain.center,
         "bounds_radius": chain.radius,
+        "set_radius": chain.radius,
         "step_scale": chain.step_scale,
         "relaxation": usual.over_relaxation,
         "detail": usual.detail,

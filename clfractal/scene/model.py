@@ -146,8 +146,11 @@ class Scene(Section):
     def bounds(self) -> tuple[Vector, float]:
         """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
         own = self.renderer.bounds if isinstance(self.renderer, SurfaceRenderer) else None
-        if own is not None:
-            return own.center, own.radius
+        return (own.center, own.radius) if own is not None else self.formula_bounds
+
+    @property
+    def formula_bounds(self) -> tuple[Vector, float]:
+        """Centre and radius of the ball that holds the set, as formulas and objects say, scene units."""
         found = self.chain.center, self.chain.radius
         for name, part in self.joined.items():
             if isinstance(part, FormulaObject) and part.join in ("union", "smooth_union"):

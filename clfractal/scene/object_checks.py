@@ -146,19 +146,8 @@ def _check_joined(scene: Scene) -> None:
             f"at most {MAX_FORMULAS} objects can be formulas, and this is one more",
             Where(path=f"objects.{names[MAX_FORMULAS]}.type"),
         )
-    first = next(iter(scene.joined))
-    used = scene.material.name if isinstance(scene.renderer, SurfaceRenderer) else None
-    if used in scene.materials and _lets_through(scene, used):
-        raise SceneError(
-            f"is glass, {used!r}, which cannot be joined with the object {first!r}",
-            Where(path="material.name"),
-        )
     for name, each in scene.joined.items():
         where = Where(path=f"objects.{name}.join")
-        if isinstance(each, FormulaObject) and each.join == "cut":
-            raise SceneError(
-                "cannot be cut for a formula: how deep places are in its set is not known", where
-            )
         if isinstance(each, PlaneObject) and each.join == "smooth_union":
             raise SceneError("cannot be smooth_union for a plane, which has no end; a flat box can", where)
 
@@ -181,19 +170,25 @@ def _check_material(scene: Scene, name: str, material: str | None) -> None:
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
-    """What is joined is no glass, and what differs from place to place is for paths; only surfaces have materials."""
+    """What is joined is glass as a whole or not, and what differs from place to place is for paths; only surfaces have materials."""
     if not isinstance(scene.renderer, SurfaceRenderer):
         return
     used = material if material is not None else scene.material.name
     each = scene.objects[name]
     if used is None or (isinstance(each, VolumeObject) and each.is_cloud):
         return
-    if name in scene.joined and _lets_through(scene, used):
-        raise SceneError(
-            f"{used!r} is glass, which formulas beside the set and what is joined cannot be", where
-        )
     if isinstance(each, VolumeObject) and _lets_through(scene, used):
         raise SceneError(f"{used!r} is glass, which volumes cannot be; name another material", where)
+    own = scene.material.name
+    if name in scene.joined and used != own:
+        if _lets_through(scene, used):
+            raise SceneError(
+                f"{used!r} is glass, which formulas and what is joined can be only with all of the set:"
+                " by material.name",
+                where,
+            )
+        if own in scene.materials and _lets_through(scene, own):
+            raise SceneError(f"{used!r} is not the glass of the set, {own!r}, to which it is joined", where)
     if isinstance(scene.lighting, PathLighting) or material is None:
         return
     if scene.materials[used].blend is not None or any(maps_of(scene.materials[used])):

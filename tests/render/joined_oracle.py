@@ -8,8 +8,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
 from clfractal.scene.objects import turned_axes
-from tests.render.shots import BALL_RADIUS, SPHERE_CENTER, SPHERE_RADIUS
+from tests.render.shots import (
+    BALL_RADIUS,
+    SPHERE_CENTER,
+    SPHERE_RADIUS,
+    normals_of,
+    points_of,
+    rays,
+    shoot,
+)
 
 Floats = npt.NDArray[np.float64]
 Distance = Callable[[Floats], Floats]
@@ -94,3 +104,43 @@ SIMPLE: dict[str, tuple[dict[str, Any], Distance]] = {
     ),
     "plane": ({"type": "plane", "position": [0, 0, 0.2], "normal": [0.3, -0.2, 2]}, a_plane),
 }
+
+
+def beside_a_rim(met: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Pixels with one of the other kind at most two pixels away."""
+    edged = np.pad(met, 2, mode="edge")
+    rows, columns = met.shape
+    around = [edged[i : i + rows, j : j + columns] for i in range(5) for j in range(5)]
+    found: npt.NDArray[np.bool_] = np.any(around, axis=0) != np.all(around, axis=0)
+    return found
+
+
+def agree(
+    device: Device,
+    scene: Any,
+    distance: Distance,
+    *,
+    precision: Precision = "float32",
+    lanes: int | None = None,
+    degrees: float = 1.0,
+) -> npt.NDArray[np.bool_]:
+    """A picture and the distance have the same places and, at most places, normals that are `degrees` apart at most."""
+    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    origin, direction, footprint = rays(scene)
+    t = marched(distance, origin, direction)
+    met, hit = np.isfinite(t), film["A"] == 1
+    assert ((met == hit) | beside_a_rim(met)).all()
+    assert (met != hit).mean() < 0.04
+    points = origin + np.where(met, t, 0)[..., None] * direction
+    normals = normal_at(distance, points)
+    # At rims a pixel's cone meets what its ray does not.
+    front = met & hit & ((normals * direction).sum(-1) < -0.4)
+    assert front.mean() > 0.1
+    width = footprint * (t if scene.camera.projection == "perspective" else 1)
+    off = (np.linalg.norm(points_of(film) - points, axis=-1) / width)[front]
+    assert np.median(off) < 0.25
+    assert (off > 0.8).mean() < 0.04, np.percentile(off, [50, 80, 90, 95, 99])
+    angle = np.degrees(np.arccos(np.clip((normals_of(film) * normals).sum(-1), -1, 1)))[front]
+    assert np.percentile(angle, 80) < degrees
+    seen: npt.NDArray[np.bool_] = front
+    return seen

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
@@ -15,12 +14,11 @@ from tests.render.joined_oracle import (
     PLACED,
     SCALE,
     SIMPLE,
-    Distance,
     Floats,
     a_sphere,
+    agree,
     ball,
     marched,
-    normal_at,
     placed,
     smooth,
     solids,
@@ -42,46 +40,6 @@ from tests.render.shots import (
 )
 
 WAYS: dict[str, dict[str, Any]] = {"distance": {}, "steps": {"search": "steps", "step": 0.01}}
-
-
-def beside_a_rim(met: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """Pixels with one of the other kind at most two pixels away."""
-    edged = np.pad(met, 2, mode="edge")
-    rows, columns = met.shape
-    around = [edged[i : i + rows, j : j + columns] for i in range(5) for j in range(5)]
-    found: npt.NDArray[np.bool_] = np.any(around, axis=0) != np.all(around, axis=0)
-    return found
-
-
-def agree(
-    device: Device,
-    scene: Any,
-    distance: Distance,
-    *,
-    precision: Precision = "float32",
-    lanes: int | None = None,
-    degrees: float = 1.0,
-) -> npt.NDArray[np.bool_]:
-    """A picture and the distance have the same places and, at most places, normals that are `degrees` apart at most."""
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
-    origin, direction, footprint = rays(scene)
-    t = marched(distance, origin, direction)
-    met, hit = np.isfinite(t), film["A"] == 1
-    assert ((met == hit) | beside_a_rim(met)).all()
-    assert (met != hit).mean() < 0.04
-    points = origin + np.where(met, t, 0)[..., None] * direction
-    normals = normal_at(distance, points)
-    # At rims a pixel's cone meets what its ray does not.
-    front = met & hit & ((normals * direction).sum(-1) < -0.4)
-    assert front.mean() > 0.1
-    width = footprint * (t if scene.camera.projection == "perspective" else 1)
-    off = (np.linalg.norm(points_of(film) - points, axis=-1) / width)[front]
-    assert np.median(off) < 0.25
-    assert (off > 0.8).mean() < 0.04, np.percentile(off, [50, 80, 90, 95, 99])
-    angle = np.degrees(np.arccos(np.clip((normals_of(film) * normals).sum(-1), -1, 1)))[front]
-    assert np.percentile(angle, 80) < degrees
-    seen: npt.NDArray[np.bool_] = front
-    return seen
 
 
 @pytest.mark.parametrize("join", ["cut", "intersection"])

@@ -62,7 +62,7 @@ def counts_of(scene: Scene, at: Any, limit: int | None) -> Any:
             more = np.where(within, most, np.minimum(more, most)).reshape(at.shape[:-1])
         else:
             more = np.where(held_by(each, at), most, 0)
-        found = np.minimum(found, most - more) if each.join == "cut" else np.maximum(found, more)
+        found = np.where(more < most, found, 0) if each.join == "cut" else np.maximum(found, more)
     return np.where(held_beside(scene, at), most, found)
 
 

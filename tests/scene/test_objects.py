@@ -94,10 +94,6 @@ CASES = [
         "objects.b.formula.file: none.yaml cannot be read: No such file or directory",
     ),
     (
-        f"objects: {{b: {{{OTHER}, join: §cut}}}}",
-        "objects.b.join: cannot be cut for a formula: how deep places are in its set is not known",
-    ),
-    (
         "objects: {b: {type: plane, join: §smooth_union}}",
         "objects.b.join: cannot be smooth_union for a plane, which has no end; a flat box can",
     ),
@@ -147,8 +143,8 @@ CASES = [
     ),
     (
         "materials: {ice: {transmission: {weight: 1}}, clay: {}}\nlighting: {mode: path}\n"
-        "material: {name: §ice}\nobjects: {b: {join: cut, material: clay}}",
-        "material.name: is glass, 'ice', which cannot be joined with the object 'b'",
+        "material: {name: ice}\nobjects: {b: {join: cut, material: §clay}}",
+        "objects.b.material: 'clay' is not the glass of the set, 'ice', to which it is joined",
     ),
     (
         f"objects: {{b: {{{OTHER}}}}}\nanimation: {{frames: 9, tracks: {{"
@@ -259,6 +255,7 @@ def test_what_is_inside_of_what_is_joined() -> None:
         "  hole: {join: cut, position: [4, 0, 0], radius: 0.5}\n"
         "  below: {type: plane, join: intersection, position: [0, 0, 1], normal: [0, 0, 2]}\n"
         "  drop: {join: smooth_union, position: [5, 0, 1.5]}\n"
+        f"  hollow: {{type: formula, formula: {{inline: {ball}}}, position: [6, 0, 0], scale: 0.5, join: cut}}\n"
     )
     scene = load_scene(HEAD + text)
     places = [
@@ -270,10 +267,13 @@ def test_what_is_inside_of_what_is_joined() -> None:
         (5, 0.3, 1.4),
         (0, 0, 0),
         (0, 0, -1.3),
+        (5.6, 0, 0.1),
+        (5.4, 0, 0.1),
     ]
     found = inside_solid(scene, places)
-    assert found == [True, False, False, True, False, True, True, False]
+    assert found == [True, False, False, True, False, True, True, False, False, True]
     lamp = "lights: [{type: point, position: [4, 0, 0.4]}]\n"
     assert load_scene(HEAD + lamp + text).lights
+    assert load_scene(HEAD + lamp.replace("[4, 0, 0.4]", "[5.6, 0, 0.1]") + text).lights
     with pytest.raises(ClfractalError, match="outside the object"):
         load_scene(HEAD + lamp.replace("0.4]", "0.6]") + text)

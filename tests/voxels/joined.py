@@ -41,6 +41,7 @@ EVERY_JOIN: dict[str, Any] = {
     "floor": {"type": "plane", "position": [0, 0, -1.5], "normal": [0.1, 0, 1]},
     "sponge": SPONGE,
     "julia": JULIA,
+    "mould": {**JULIA, "scale": 0.5, "position": [-0.5, -0.6, 0.5], "join": "cut"},
 }
 
 

@@ -1,0 +1,146 @@
+// How solids are joined: one more to all before it. From the build: JOINS_SMOOTHLY; HOLLOWS, whether a formula is cut out.
+//
+// A cut is the larger of the one distance and of the other's negative, an intersection the larger of both (Hart 1996, "Sphere
+// tracing").
+//
+// How deep a place is in a formula's set is not known. Where such a set is cut out it leaves a hollow, in which a distance lies between
+// two bounds, that are folded as distances are: it is at least that to what was cut, and may be any.
+INLINE surface_point surface_pick(mask m, surface_point yes, surface_point no) {
+    surface_point s;
+    for (int i = 0; i < NUMBERS_OF(surface_point); ++i) ((real *)&s)[i] = pick(m, ((const real *)&yes)[i], ((const real *)&no)[i]);
+    return s;
+}
+
+#if JOINS_SMOOTHLY
+// What is known of a surface as that of the other one.
+INLINE void surface_beside(surface_point *surface, surface_point other) {
+    surface->other_square = other.square;
+    surface->other_square_before = other.square_before;
+    surface->other_count = other.count;
+    surface->other_of = other.of;
+    surface->other_solid = other.solid;
+}
+
+INLINE surface_point surface_of_other(surface_point surface) {
+    surface.square = surface.other_square;
+    surface.square_before = surface.other_square_before;
+    surface.count = surface.other_count;
+    surface.of = surface.other_of;
+    surface.solid = surface.other_solid;
+    return surface;
+}
+
+// A number between those of both, as far as each has one.
+INLINE real shared(real own, real other, mask own_told, mask other_told, real share) {
+    return pick(own_told & other_told, own + share * (other - own), pick(other_told, other, own));
+}
+
+// The surface where `more` flows into all before it, whose part is `of_more`. Of three that meet in one place the two count which
+// have the largest parts.
+INLINE surface_point surface_flowing(surface_point all, surface_point more, mask closer, real of_more) {
+    const real of_all = R(1.0) - of_more, first = of_all * (R(1.0) - all.share), second = of_all * all.share;
+    const mask stays = ~closer & less(of_more, second);
+    surface_point found = surface_pick(closer, more, all), beside = all;
+    surface_beside(&beside, more);
+    surface_beside(&found, all);
+    found = surface_pick(closer, found, surface_pick(stays, all, beside));
+    found.share = pick(stays, all.share, pick(closer, first, of_more) / (first + of_more));
+    return found;
+}
+#endif
+
+#if HOLLOWS
+// In a hollow what is joined to it later counts as the nearest this near: a part of the radius of its ball.
+#define HOLLOW_NEAR R(0.1)
+
+INLINE mask in_hollow(solid_found found) { return less(found.far, found.most); }
+
+// Cuts a formula's set out.
+INLINE void solid_hollow(solid_found *all, solid_found more) {
+    const real all_of_it = (real)(REAL_LARGEST), wall = pick(more.inside, all_of_it, -more.far);
+    more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
+    const mask counts = all->inside & less(all->far, wall);
+    all->surface = surface_pick(counts, more.surface, all->surface);
+    all->scale = pick(counts, more.scale, all->scale);
+    all->far = fmax(all->far, pick(more.inside, R(0.0), -more.far));
+    all->most = pick(more.inside, all_of_it, fmax(all->most, -more.far));
+    all->inside &= ~more.inside;
+}
+#endif
+
+// How near a solid has to be so that its surface is the nearest, not those before it.
+INLINE real nearest_before(__constant const struct Orbit *o, const solid_found *all) {
+#if HOLLOWS
+    const scalar size = o->kind == SOLID_FORMULA ? o->ball_radius : fmax(fmax(o->sides[0], o->sides[1]), o->sides[2]);
+    return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->far);
+#else
+    return all->far;
+#endif
+}
+
+// Joins one more solid to those before it. `rounding`: what a place is not known better than.
+INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid_found more, real rounding) {
+#if HOLLOWS
+    if (o->join == JOIN_CUT && o->kind == SOLID_FORMULA) {
+        solid_hollow(all, more);
+        return;
+    }
+#endif
+    if (o->join == JOIN_CUT) {
+        more.far = -more.far;
+        more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
+    }
+    if (o->join == JOIN_CUT || o->join == JOIN_INTERSECTION) {
+        // A place that a search has put on a wall may lie behind it by rounding: it is on the wall.
+        const real wall = o->kind == SOLID_FORMULA ? R(0.0) : rounding;
+        const mask counts = less(all->far, more.far + wall);
+        // The wall of a simple solid is a part of what it cuts: its orbits are that formula's.
+        if (o->kind != SOLID_FORMULA) {
+            more.surface.square = all->surface.square;
+            more.surface.square_before = all->surface.square_before;
+            more.surface.count = all->surface.count;
+            more.surface.of = all->surface.of;
+#if JOINS_SMOOTHLY
+            // It has a colour of its own, but the counts of both that flow together there.
+            more.surface.share = all->surface.share;
+            surface_beside(&more.surface, surface_of_other(all->surface));
+            more.surface.other_solid = more.surface.solid;
+#endif
+        }
+        all->surface = surface_pick(counts, more.surface, all->surface);
+        all->scale = pick(counts, more.scale, all->scale);
+        all->far = fmax(all->far, more.far);
+        all->most = fmax(all->most, more.far);
+        all->inside &= o->kind == SOLID_FORMULA ? more.inside : less(more.far, -wall);
+        return;
+    }
+    const mask nearer = less(more.far, nearest_before(o, all));
+#if JOINS_SMOOTHLY
+    if (o->join == JOIN_SMOOTH) {
+        // The smooth minimum of Quilez, of distances as they are: between both, a quarter of the width is added at most.
+        const real width = (real)(o->smoothness), a = all->far / all->scale, b = more.far / more.scale;
+        const real share = fmax(width - fabs(a - b), R(0.0)) / width;
+        const mask closer = less(b, a);
+        mask flows = less(R(0.0), share);
+#if HOLLOWS
+        flows &= ~in_hollow(*all);
+#endif
+        const real others = R(0.5) * share, of_more = pick(closer, R(1.0) - others, others);
+        const vec gradient = vec_along(vec_scale(all->surface.gradient, R(1.0) - of_more), of_more, more.surface.gradient);
+        const real lower = fmin(a, b) - R(0.25) * width * share * share, scale = fmin(all->scale, more.scale);
+        const surface_point flowing = surface_flowing(all->surface, more.surface, closer, of_more);
+        all->surface = surface_pick(flows, flowing, surface_pick(nearer, more.surface, all->surface));
+        all->surface.gradient = vec_pick(flows, gradient, all->surface.gradient);
+        all->far = pick(flows, lower * scale, fmin(all->far, more.far));
+        all->most = pick(flows, all->far, fmin(all->most, more.far));
+        all->scale = pick(flows, scale, pick(nearer, more.scale, all->scale));
+        all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));
+        return;
+    }
+#endif
+    all->surface = surface_pick(nearer, more.surface, all->surface);
+    all->scale = pick(nearer, more.scale, all->scale);
+    all->far = fmin(all->far, more.far);
+    all->most = fmin(all->most, more.far);
+    all->inside |= more.inside;
+}
