@@ -6,8 +6,8 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
 
-with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look for a spot; each
-mirror adds what follows `begin_shots` but for the points.
+with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look
+for a spot; each mirror adds what follows `begin_shots` but for the points.
 With `lighting.mode: path` in the place of the last two
 
     scatter_paths  march  gather_paths

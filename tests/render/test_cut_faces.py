@@ -1,4 +1,4 @@
-"""Planes that cut what they name, and the faces of their cuts, against NumPy: in Phong's light, along paths, and in mirrors."""
+"""Planes that cut what they name, and the faces of their cuts, against NumPy: in both lights, and in mirrors."""
 
 from __future__ import annotations
 

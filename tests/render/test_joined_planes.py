@@ -89,8 +89,8 @@ def test_counts_on_the_plane(renderer: str, limit: int | None) -> None:
 
 
 def test_its_face_is_all_of_the_set() -> None:
-    """With a rectangle that is not seen, the faces alone are: what belongs to the set, but not to the hole, and what the plane
-    names beside it, which is whole there."""
+    """With a rectangle that is not seen, the faces alone are: what belongs to the set, but not to the hole, and
+    what the plane names beside it, which is whole there."""
     inside = [0.25, 0.5, 0.75]
     scene = scene_of({"type": "surface"}, opacity=0, colors={"inside": inside, "mode": "stepped"})
     film = clfractal.render(scene, channels=["R", "G", "B", "P.Y"])
