@@ -71,8 +71,7 @@ def scene_of(**sections: Any) -> Scene:
 @dataclass
 class Met:
     """What rays meet first; `body` by its place in BODIES, -1: nothing; `plane`: that of the face, -1: no face; `sure`:
-    that
-    rounding does not decide which of them it is."""
+    that rounding does not decide which of them it is."""
 
     t: Floats
     body: npt.NDArray[np.int64]
