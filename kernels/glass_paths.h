@@ -1,4 +1,5 @@
 // Paths through glass: what they carry while they are inside, and how they get there.
+#include "flights.h"
 #include "media.h"
 
 // A place in the spectrum: the index of refraction there (`bend`, see `clfractal/renderers/glass.py`), and what it weighs.
@@ -50,11 +51,6 @@ INLINE color glass_met(const carried *with, border edge, pbr *p, real *wave, wor
 INLINE mask leads_out(vec toward, vec normal, mask leaving) {
     const mask over = less(R(0.0), vec_dot(toward, normal));
     return (over & ~leaving) | (~over & leaving);
-}
-
-// What a medium leaves of light on a way through it.
-INLINE color absorbed(color light, color extinction, real way) {
-    return color_of(light.r * exp(-way * extinction.r), light.g * exp(-way * extinction.g), light.b * exp(-way * extinction.b));
 }
 
 // The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.

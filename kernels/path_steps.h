@@ -9,6 +9,13 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
 }
 
 #if HAS_GLASS_SCATTER
+// What each sample of each pixel has for its next walk within the set.
+INLINE void walk_seeded(stage s, const packet_pixels *at, carried *with, world w) {
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, PURPOSE_FLIGHT + NEXT_BOUNCE * (uint)s.bounce);
+    const bits each = hash_bits(seed + (bits)((uint)s.sample * 0x85ebca6bu));
+    with->seed_low = real_of_bits(each & 0xffffu);
+    with->seed_high = real_of_bits(each >> 16);
+}
 #include "cloudy.h"
 #endif
 #if HAS_GLASS

@@ -15,7 +15,7 @@ STAGE(scatter_paths) {
     carried with = path_carries(s, &here.at, &so_far, arrived.origin, w);
     mask scatters;
     const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, &scatters, w);
-#if HAS_GLASS_SCATTER
+#if HAS_GLASS_SCATTER && HAS_OBJECTS
     const path flown = so_far;
     const carried within = with;
 #endif
@@ -71,7 +71,10 @@ STAGE(scatter_paths) {
     }
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
+    walk_seeded(s, &here.at, &with, w);
+#if HAS_OBJECTS
     path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, scatters, w);
+#endif
 #endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
@@ -108,8 +111,8 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
-#if HAS_GLASS_SCATTER
-    far = flight_sought(&so_far, &with, w);
+#if HAS_GLASS_SCATTER && HAS_OBJECTS
+    far = pick(equal(with.medium, set_body(w)), far, flight_sought(&so_far, &with, w));
 #endif
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS_SET
