@@ -19,7 +19,10 @@ INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }
 // counts as nothing, since what it does not mirror comes back from the body.
 INLINE color pbr_albedo(const pbr *p, __global const float *tables) {
     const color white = color_of(R(1.0), R(1.0), R(1.0));
-    const color body = color_scale(p->base_color, p->base_weight);
+    color body = color_scale(p->base_color, p->base_weight);
+#if HAS_SUBSURFACE
+    body = color_mix(body, p->subsurface_color, p->subsurface_weight);
+#endif
     const color base = color_mix(body, white, p->transmission_weight * (R(1.0) - p->base_metalness));
     const color below = color_mul(base, color_mix(white, p->coat_color, p->coat_weight));
     const real fibres = p->fuzz_weight * albedo_at(tables + ALBEDO_FUZZ, R(0.5), fmax(p->fuzz_roughness, SMOOTHEST_FUZZ)).mean;
@@ -46,6 +49,12 @@ typedef struct {
 #if HAS_GLASS
     glass clear;
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
+#endif
+#if HAS_SUBSURFACE
+    mask emerges;             // whether light comes from below the boundary, as from a white body whose viewer is below, too
+    real bare;                // part of the body that is none of a medium
+    color below;              // what goes below the boundary, over the probability ...
+    real by_below;            // ... of choosing that: the last part of all choices
 #endif
 } bsdf;
 
@@ -97,15 +106,36 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.clear = glass_at(b.dielectric * p->transmission_weight, b.out.z, p->inside, b.ior, bending, b.rough, b.alpha, b.root, tint, tables);
     b.dielectric *= R(1.0) - p->transmission_weight;
 #endif
+#if HAS_SUBSURFACE
+    const color white = color_of(R(1.0), R(1.0), R(1.0));
+    b.emerges = less(R(0.5), p->emerges);
+    b.bare = R(1.0) - pick(b.emerges | inside, R(0.0), p->subsurface_weight);
+    b.below = white;
+    b.out = vec_pick(b.emerges, vec_of(R(0.0), R(0.0), R(1.0)), b.out);
+    b.body = color_pick(b.emerges, white, b.body);
+    b.gloss = color_pick(b.emerges, color_of(R(0.0), R(0.0), R(0.0)), b.gloss);
+    b.rough_body = pick(b.emerges, R(0.0), b.rough_body);
+    b.metalness = pick(b.emerges, R(0.0), b.metalness);
+    b.clear.weight = pick(b.emerges, R(0.0), b.clear.weight);
+    b.dielectric = pick(b.emerges, R(1.0), b.dielectric);
+    b.coat = pick(b.emerges, R(0.0), b.coat);
+    b.coat_tint = color_pick(b.emerges, white, b.coat_tint);
+    b.fuzz = color_pick(b.emerges, color_of(R(0.0), R(0.0), R(0.0)), b.fuzz);
+#endif
     if (any_of(b.coat)) {
         // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
         const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
         const real most = b.coat * p->coat_darkening;
-#define DARKENED(c) c *= R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * c)
+#define DARKENING(c) (R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * (c)))
+#define DARKENED(c) c *= DARKENING(c)
         DARKENED(b.body.r);
         DARKENED(b.body.g);
         DARKENED(b.body.b);
 #undef DARKENED
+#if HAS_SUBSURFACE
+        const color c = p->subsurface_color;
+        b.below = color_of(DARKENING(c.r), DARKENING(c.g), DARKENING(c.b));
+#endif
         b.metal = b.body;
         b.coat_albedo = b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction;
     }
@@ -114,13 +144,24 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     }
     real of_gloss = R(0.0);
     if (any_of(b.dielectric * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
-    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
+    real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
+#if HAS_SUBSURFACE
+    mirrored = pick(b.emerges, R(0.0), mirrored);
+#endif
     real scattered = b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
                            + luminance(b.fuzz);
 #if HAS_GLASS
     scattered += b.clear.weight * (R(1.0) - b.clear.crosses) * b.clear.lost;
     const real bent = b.clear.weight * (R(1.0) - b.clear.lost), lost = b.clear.weight * b.clear.crosses * b.clear.lost;
+#if HAS_SUBSURFACE
+    const real sunk = b.dielectric * (R(1.0) - of_gloss) * (R(1.0) - b.bare);
+    scattered += sunk - b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) * (R(1.0) - b.bare);
+#endif
     const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered + bent + lost), all = b.coat_albedo + below;
+#if HAS_SUBSURFACE
+    b.by_below = (R(1.0) - b.coat_albedo) * sunk / all;
+    b.below = color_scale(color_mul(b.below, b.coat_tint), (R(1.0) - b.fuzz_albedo) * all);
+#endif
     b.by_glass = (R(1.0) - b.coat_albedo) * bent / all;
     b.by_beyond = (R(1.0) - b.coat_albedo) * lost / all;
 #else
@@ -180,7 +221,7 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
     const real single = ggx_value(b->out, i, h, b->alpha) * lobe_share(broad, sharp, b->alpha);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     if (any_of(b->dielectric)) {
-        const color body = eon_value(b->body, b->out, i, b->rough_body);
+        color body = eon_value(b->body, b->out, i, b->rough_body);
         albedo o = {R(0.0), R(0.0)}, other = o;
         real gloss = R(0.0);
         if (any_of(b->root)) {
@@ -188,6 +229,10 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
             other = albedo_of_dielectric(tables, i.z, b->rough, b->root);
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }
+#if HAS_SUBSURFACE
+        o.of_direction = pick(b->emerges, R(0.0), o.of_direction);
+        body = color_scale(body, b->bare);
+#endif
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other) * broad)),
                           b->dielectric);
     }
@@ -222,7 +267,11 @@ INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
     const real of_coat = b->by_coat * lobe_share(broad, sharp, b->coat_alpha), of_gloss = b->by_gloss * lobe_share(broad, sharp, b->alpha);
 #if HAS_GLASS
     const glass *g = &b->clear;
-    const real hemisphere = broad * (R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond) * fmax(i.z, R(0.0)) / BSDF_PI;
+    real around = R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond;
+#if HAS_SUBSURFACE
+    around = fmax(around - b->by_below, R(0.0));
+#endif
+    const real hemisphere = broad * around * fmax(i.z, R(0.0)) / BSDF_PI;
     const real facets = of_gloss + b->by_glass * sharp * fresnel_across(vec_dot(b->out, h), g->mirrors);
     const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + of_coat * ggx_density(b->out, h, b->coat_alpha);
     const vec bends = bending_facet(b->out, i, g->across);

@@ -60,8 +60,9 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     return chosen;
 }
 
-// Goes on in a direction that the surface chooses, unless Russian roulette ends the path (Arvo and Kirk 1990).
-INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
+// Goes on in a direction that the surface chooses, unless Russian roulette ends the path (Arvo and Kirk 1990). The result says which
+// paths go below the boundary.
+INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
     real u, v, choice, roulette;
     path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
@@ -75,8 +76,14 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     so_far->direction = bsdf_sample(b, choice, u, v, &with->density);
     const color value = bsdf_value(b, so_far->direction, w.albedos);
 #endif
-    mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density);
-    const color part = color_scale(value, R(1.0) / with->density);
+    mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density), sinks = on_path & ~on_path;
+    color part = color_scale(value, R(1.0) / with->density);
+#if HAS_SUBSURFACE
+    sinks = mask_of(so_far->on_path) & b->seen & less(R(1.0) - b->by_below, choice);
+    so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(SURFACE_NORMAL(b), R(-1.0)), u, v), so_far->direction);
+    part = color_pick(sinks, b->below, part);
+    on_path |= sinks;
+#endif
     so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
     on_path &= less(R(0.0), brightest(so_far->through));
     if (s.bounce >= w.settings->roulette) {
@@ -85,6 +92,7 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
         so_far->through = color_pick(on_path, color_scale(so_far->through, R(1.0) / stays), so_far->through);
     }
     so_far->on_path = number_of(on_path);
+    return sinks;
 }
 
 // Adds what a path sees at its end: a lamp, or where it leaves the set what is past it.

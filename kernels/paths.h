@@ -21,6 +21,12 @@ STAGE(scatter_paths) {
 #endif
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
+    mask emerges = lands & ~lands;
+#if HAS_SUBSURFACE
+    emerges = lands & path_emerges(bounce, &with, &found, w);
+    media_leave(&with, body_of(with.medium), emerges);
+    if (any_lane(emerges)) media_found(&with, medium_of(with.medium, w), emerges);
+#endif
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
 #if HAS_PARTS
@@ -41,11 +47,12 @@ STAGE(scatter_paths) {
         shows &= ~edge.hidden;
         outward = vec_pick(behind, vec_scale(outward, R(-1.0)), outward);
 #endif
-        spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows, w);
+        p.emerges = number_of(emerges);
+        spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows & ~emerges, w);
 #if HAS_PARTS
         reflects = pbr_albedo(&p, w.albedos);
 #endif
-        const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_scale(arrived.direction, R(-1.0)), &shading, w);
+        const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_pick(emerges, found.normal, vec_scale(arrived.direction, R(-1.0))), &shading, w);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
         with.total = weight_of_all(so_far.origin, OBJECT_OF(found), w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, OBJECT_OF(found), &b, with.total, behind, w, &with.awaited);
@@ -59,10 +66,10 @@ STAGE(scatter_paths) {
         awaited_absorbed(&with, edge, light.distance, w);
         const path before_it = so_far;
 #endif
-        path_goes_on(s, &here.at, &so_far, &with, &b, w);
+        const mask sinks = path_goes_on(s, &here.at, &so_far, &with, &b, w);
 #if HAS_GLASS
         path_goes_straight(&so_far, &before_it, arrived.direction, edge.hidden);
-        path_crosses(&so_far, &with, &found, edge, &p, weights, wave, w);
+        path_crosses(&so_far, &with, &found, edge, &p, sinks, weights, wave, w);
 #endif
         spot seen_first = found;
         if (bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
@@ -112,11 +119,11 @@ STAGE(gather_paths) {
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
 #if HAS_GLASS_SCATTER && HAS_OBJECTS
-    far = pick(equal(with.medium, set_body(w)), far, flight_sought(&so_far, &with, w));
+    far = pick(equal(body_of(with.medium), set_body(w)), far, flight_sought(&so_far, &with, w));
 #endif
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS_SET
-    const mask within = equal(with.medium, set_body(w));
+    const mask within = equal(body_of(with.medium), set_body(w));
     send_clipped(s, 1, r, R(0.0), WHICH, mask_of(so_far.on_path) & within, w);
     so_far.on_path = pick(within, R(0.0), so_far.on_path);
 #endif
@@ -140,7 +147,7 @@ STAGE(end_paths) {
     tally_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
 #if HAS_GLASS_SET
-    on_path &= ~equal(with.medium, set_body(w));
+    on_path &= ~equal(body_of(with.medium), set_body(w));
 #endif
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);

@@ -1,11 +1,12 @@
 // Walks within the set: a path goes from scattering to scattering until it is where it leaves the set, or meets an object or a lamp that
 // stands within. All of it counts as one bounce.
 //
-// A walk begins where the set does: a ray starts where another has met the surface, which may be some footprints before it, and the
-// entrance is halved down to a small part of a free path. Flights from there on are tested at their ends, and every step on their way:
+// A walk begins where the set does: a ray starts where another has met the surface, which may be some footprints before it or a part of
+// one in it. So the entrance is looked for on both sides, and halved down to a small part of a free path. Flights from there on are tested at their ends, and every step on their way:
 // where a medium is so dense that flights are shorter than steps there is one test for each of them. What has been scattered
 // MOST_SCATTERINGS times leaves the set where it came in, so that dense media lose nothing.
-#define ENTRANCE_PART R(0.05)   // of a free path that is not known of the entrance
+#define ENTRANCE_PART R(0.01)   // of a free path that is not known of the entrance
+#define ENTRANCE_BACK R(1.0)    // footprints that are looked back for it
 #define NEVER_A_SHEET R(-1.0)   // `near` of a ray that is known to have been inside
 
 // What a lane's path carries on its walk, beside its ray.
@@ -15,7 +16,8 @@ typedef struct {
     vec entrance, back;      // where it came in, and the way out from there
     real stop;               // how far its ray goes: to the end of the flight, or to an object or a lamp that is nearer ...
     real object, number;     // ... how far the object is, and which one
-    real scatterings, draws;
+    real scatterings, draws; // the former below 0 until any place within is known
+    mask open;               // whether a place outside, before the entrance, is known
 } walk;
 
 #if LANES == 1
@@ -107,15 +109,18 @@ INLINE void walk_step(march *m, walk *a, int bounce, world w, __constant const s
     const mask inside = m->active & within, outside = m->active & ~within;
     const real size = fmax(fmax(fabs(point.x), fabs(point.y)), fmax(fabs(point.z), m->t));
     const real least_width = R(2.0) * (real)(REAL_EPSILON) * size, finest = fmax(EXIT_TOLERANCE * cone, least_width);
-    // Towards the entrance: outside up to `low`, inside at `high`.
+    // Towards the entrance: outside at `low`, inside at `high`, as far as these are known.
     const mask before = m->active & ~m->entered;
     a->scatterings = pick(before & inside, R(0.0), a->scatterings);
     const mask found = before & (inside | less_equal(R(0.0), a->scatterings));
     const mask sheet = march_misses(m, outside & ~found, cone), placed = march_places(m, inside, outside);
     m->high = pick(before & inside, m->t, m->high);
     m->low = pick(before & outside, m->t, m->low);
+    a->open |= before & outside;
     const real free_path = R(1.0) / fmax(brightest(a->with.extinction), R(1e-20));
-    const mask starts = found & less_equal(m->high - m->low, fmax(fmin(finest, ENTRANCE_PART * free_path), least_width));
+    const mask narrow = a->open & less_equal(m->high - m->low, fmax(fmin(finest, ENTRANCE_PART * free_path), least_width));
+    const mask deep = found & ~a->open & less(ENTRANCE_BACK * cone, m->r.near - m->high), starts = (found & narrow) | deep;
+    m->high = pick(deep, m->r.near, m->high);
 
     // Within: towards the exit, or to the end of the flight.
     const mask searching = m->active & m->entered & ~m->narrow;
@@ -126,7 +131,8 @@ INLINE void walk_step(march *m, walk *a, int bounce, world w, __constant const s
     m->active &= ~done & ~(stops & ~scatters);
 
     const real entrance = fmax(ENTRANCE_START * cone, ENTRANCE_GROWTH * (m->t - m->r.near));
-    const real toward_set = pick(found, R(0.5) * (m->low + m->high), m->t + fmin(entrance, step));
+    const real back = m->high - fmax(ENTRANCE_START * cone, m->r.near - m->high);
+    const real toward_set = pick(found, pick(a->open, R(0.5) * (m->low + m->high), back), m->t + fmin(entrance, step));
     m->t = pick(before, toward_set, march_goes_to(m, fmin(m->t + step, a->stop)));
     walk_enters(m, a, starts, w);
     walk_scatters(m, a, scatters, bounce, w);
@@ -165,6 +171,7 @@ INLINE void walk_takes(walk *a, const int *places, uint fresh, __global const sc
     WRITTEN_OUT(NUMBERS_OF(carried), TAKE_OF_CARRIED)
     const mask here = lanes_of_bits(fresh);
     a->scatterings = pick(here, R(-1.0), a->scatterings);
+    a->open &= ~here;
     a->draws = pick(here, R(0.0), a->draws);
     a->object = pick(here, (real)(REAL_LARGEST), a->object);
 }

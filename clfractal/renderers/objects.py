@@ -11,8 +11,10 @@ from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.maps import MappedMaterials, glass_bodies
+from clfractal.renderers.materials import used_materials
 from clfractal.renderers.water import WAVES, wave_set
 from clfractal.scene.base import Vector, frame_of, length
+from clfractal.scene.blends import is_glass
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
@@ -28,7 +30,7 @@ OBJECT = Struct(
     [
         Field("kind", "int", 0, "one of OBJECT_KINDS"),
         Field("material", "int", 0, "the number of its material along paths"),
-        Field("glass", "int", 0, "1: light goes through it along paths"),
+        Field("glass", "int", 0, "along paths 1: light goes through it; 2: only below its boundary"),
         Field("middle", "real", 3, "of a solid; a point of a plane, scene units"),
         Field("own_x", "real", 3, "from scene units to its own ones: of the ball or cube of radius 1,"),
         Field("own_y", "real", 3, "or of a plane, whose own z is its normal"),
@@ -74,17 +76,18 @@ def object_records(scene: Scene, precision: Precision) -> Record:
     """The objects in their order; one unused record where there are none, since no buffer is empty."""
     numbers = MappedMaterials(scene).blends.roots[1:]
     glass = glass_bodies(scene)[1:]
+    through_all = [is_glass(each, scene.materials) for each in used_materials(scene)[1:]]
     rows: list[dict[str, object]] = [
         {
             "material": number,
-            "glass": int(through),
+            "glass": int(through) and (1 if clear else 2),
             **_place(each),
             **_look(scene, each),
             **_asked(radiance),
             "colored": int(_has_color(scene, each)),
         }
-        for number, through, radiance, each in zip(
-            numbers, glass, asked_radiance(scene), scene.objects.values(), strict=True
+        for number, through, clear, radiance, each in zip(
+            numbers, glass, through_all, asked_radiance(scene), scene.objects.values(), strict=True
         )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
@@ -197,9 +200,15 @@ def phong_of(material: PbrMaterial, color: Vector) -> dict[str, Any]:
     alpha = max(rough**2, 1e-3)
     shininess = min(max(1 / (2 * alpha**2) - 2, 1.0), _LARGEST_EXPONENT)
     highlight = mirrored * (shininess + 2) / 2 if rough > 0 else np.zeros(3)
+    color, matt = body, weight
+    below = _number(material.subsurface.weight, 0)
+    if below > 0:
+        # What comes out of a medium below the boundary is as bright as a body of its colour.
+        color = (1 - below) * weight * body + below * _color(material.subsurface.color, body)
+        matt = 1.0
     return {
-        "color": body,
-        "diffuse": weight * (1 - metal),
+        "color": color,
+        "diffuse": matt * (1 - metal),
         # Rough metals mirror all that is around: about as a white body of their colour does.
         "surround": weight * (1 - metal * sharp),
         "specular": highlight,

@@ -33,6 +33,7 @@ from clfractal.renderers.maps import (
     has_cloudy_glass,
     has_glass,
     has_glass_set,
+    has_subsurface,
     map_defines,
     mapped_materials,
 )
@@ -180,6 +181,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_GLASS": int(has_glass(scene)),
         "HAS_GLASS_SET": int(has_glass_set(scene)),
         "HAS_GLASS_SCATTER": int(has_cloudy_glass(scene)),
+        **({"HAS_SUBSURFACE": 1} if has_subsurface(scene) else {}),
         "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
         "HAS_GLOW": int(scene.glow is not None),
     }

@@ -1,7 +1,7 @@
 """Checks of a scene's objects: their materials, lights in them, and what cannot show them."""
 
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.blends import is_glass
+from clfractal.scene.blends import has_skin, is_glass
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
@@ -122,7 +122,9 @@ def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
     """A light in a solid reaches nothing, but where the eye is in it too: then it is a room."""
     if solid.holds(scene.camera.position):
         return
-    glass = _lets_through(scene, solid.material or scene.material.name)
+    used = solid.material or scene.material.name
+    skin = used is not None and has_skin(scene.materials[used], scene.materials)
+    glass = _lets_through(scene, used) or (skin and isinstance(scene.lighting, PathLighting))
     for index, light in enumerate(scene.lights):
         if glass and isinstance(light, (SphereLight, RectangleLight)):
             continue  # paths find it, since it has a size
