@@ -53,8 +53,7 @@ typedef struct {
 #if HAS_SUBSURFACE
     mask emerges;             // whether light comes from below the boundary, as from a white body whose viewer is below, too
     real bare;                // part of the body that is none of a medium
-    color below;              // what goes below the boundary, over the probability ...
-    real by_below;            // ... of choosing that: the last part of all choices
+    color below; real by_below; // what goes below the boundary, over the probability of choosing that, the last part of all choices
 #endif
 } bsdf;
 
@@ -66,6 +65,8 @@ INLINE color color_less(color c) { return color_of(R(1.0) - c.r, R(1.0) - c.g, R
 INLINE real through_boundary(albedo o, albedo i) {
     return (R(1.0) - o.of_direction) * (R(1.0) - i.of_direction) / fmax(R(1.0) - o.mean, R(1e-6));
 }
+
+#include "bsdf_below.h"
 
 INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
 
@@ -107,20 +108,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.dielectric *= R(1.0) - p->transmission_weight;
 #endif
 #if HAS_SUBSURFACE
-    const color white = color_of(R(1.0), R(1.0), R(1.0));
-    b.emerges = less(R(0.5), p->emerges);
-    b.bare = R(1.0) - pick(b.emerges | inside, R(0.0), p->subsurface_weight);
-    b.below = white;
-    b.out = vec_pick(b.emerges, vec_of(R(0.0), R(0.0), R(1.0)), b.out);
-    b.body = color_pick(b.emerges, white, b.body);
-    b.gloss = color_pick(b.emerges, color_of(R(0.0), R(0.0), R(0.0)), b.gloss);
-    b.rough_body = pick(b.emerges, R(0.0), b.rough_body);
-    b.metalness = pick(b.emerges, R(0.0), b.metalness);
-    b.clear.weight = pick(b.emerges, R(0.0), b.clear.weight);
-    b.dielectric = pick(b.emerges, R(1.0), b.dielectric);
-    b.coat = pick(b.emerges, R(0.0), b.coat);
-    b.coat_tint = color_pick(b.emerges, white, b.coat_tint);
-    b.fuzz = color_pick(b.emerges, color_of(R(0.0), R(0.0), R(0.0)), b.fuzz);
+    below_begins(&b, p, inside);
 #endif
     if (any_of(b.coat)) {
         // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
@@ -133,8 +121,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
         DARKENED(b.body.b);
 #undef DARKENED
 #if HAS_SUBSURFACE
-        const color c = p->subsurface_color;
-        b.below = color_of(DARKENING(c.r), DARKENING(c.g), DARKENING(c.b));
+        b.below = color_of(DARKENING(p->subsurface_color.r), DARKENING(p->subsurface_color.g), DARKENING(p->subsurface_color.b));
 #endif
         b.metal = b.body;
         b.coat_albedo = b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction;
@@ -144,18 +131,17 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     }
     real of_gloss = R(0.0);
     if (any_of(b.dielectric * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
-    real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
 #if HAS_SUBSURFACE
-    mirrored = pick(b.emerges, R(0.0), mirrored);
+    of_gloss = pick(b.emerges, R(0.0), of_gloss);
 #endif
+    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
     real scattered = b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
                            + luminance(b.fuzz);
 #if HAS_GLASS
     scattered += b.clear.weight * (R(1.0) - b.clear.crosses) * b.clear.lost;
     const real bent = b.clear.weight * (R(1.0) - b.clear.lost), lost = b.clear.weight * b.clear.crosses * b.clear.lost;
 #if HAS_SUBSURFACE
-    const real sunk = b.dielectric * (R(1.0) - of_gloss) * (R(1.0) - b.bare);
-    scattered += sunk - b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) * (R(1.0) - b.bare);
+    const real sunk = below_sampled(&b, of_gloss, &scattered);
 #endif
     const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered + bent + lost), all = b.coat_albedo + below;
 #if HAS_SUBSURFACE

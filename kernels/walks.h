@@ -2,9 +2,9 @@
 // stands within. All of it counts as one bounce.
 //
 // A walk begins where the set does: a ray starts where another has met the surface, which may be some footprints before it or a part of
-// one in it. So the entrance is looked for on both sides, and halved down to a small part of a free path. Flights from there on are tested at their ends, and every step on their way:
-// where a medium is so dense that flights are shorter than steps there is one test for each of them. What has been scattered
-// MOST_SCATTERINGS times leaves the set where it came in, so that dense media lose nothing.
+// one in it. So the entrance is looked for on both sides, and halved down to a small part of a free path. Flights from there on are
+// tested at their ends, and every step on their way: where a medium is so dense that flights are shorter than steps there is one test
+// for each of them. What has been scattered MOST_SCATTERINGS times leaves the set where it came in, so that dense media lose nothing.
 #define ENTRANCE_PART R(0.01)   // of a free path that is not known of the entrance
 #define ENTRANCE_BACK R(1.0)    // footprints that are looked back for it
 #define NEVER_A_SHEET R(-1.0)   // `near` of a ray that is known to have been inside

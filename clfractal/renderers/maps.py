@@ -231,7 +231,9 @@ def has_glass(scene: Scene) -> bool:
 def has_glass_set(scene: Scene) -> bool:
     """Whether paths go through the set, or into a part that is joined to it."""
     bodies = glass_bodies(scene)
-    joined = [through for name, through in zip(scene.objects, bodies[1:], strict=True) if name in scene.joined]
+    joined = [
+        through for name, through in zip(scene.objects, bodies[1:], strict=True) if name in scene.joined
+    ]
     return bodies[0] or any(joined)
 
 

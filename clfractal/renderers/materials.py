@@ -107,7 +107,15 @@ def pbr_text() -> str:
         own = f"m->base_own ? {read} : tint" if field.name == "base_color" else read
         lines.append(f"    p.{field.name} = {own};")
     return "\n".join(
-        [*lines, "    p.inside = R(0.0);", "    p.bending_ior = p.specular_ior;", "    p.emerges = R(0.0);", "    return p;", "}", ""]
+        [
+            *lines,
+            "    p.inside = R(0.0);",
+            "    p.bending_ior = p.specular_ior;",
+            "    p.emerges = R(0.0);",
+            "    return p;",
+            "}",
+            "",
+        ]
     )
 
 

@@ -58,7 +58,7 @@ def is_glass(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
 
 
 def has_skin(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
-    """Whether light may go below a material's boundary, or that of a part of what it is blended of, and come out elsewhere; likewise."""
+    """Whether light may go below a material's boundary, or that of a part of what it is blended of; likewise."""
     if material.blend is not None:
         return any(has_skin(named[name], named) for name in material.blend)
     weight = material.subsurface.weight

@@ -102,7 +102,13 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
-    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}, "glass": _GLASS, "skin": _SKIN, "maps": _MAPS},
+    "lighting": {
+        "": {},
+        "path": {"lighting": {"mode": "path"}},
+        "glass": _GLASS,
+        "skin": _SKIN,
+        "maps": _MAPS,
+    },
     "objects": {
         "": {},
         "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
@@ -159,7 +165,10 @@ _APART = {
         for name in _SURFACE["points"]
         if name
     ),
-    *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass", "skin", "maps")),
+    *(
+        frozenset({("lighting", light), ("coloring", "residual")})
+        for light in ("path", "glass", "skin", "maps")
+    ),
     *(frozenset({("lighting", light), ("planes", "planes")}) for light in ("path", "glass", "skin", "maps")),
     frozenset({("objects", "joined"), ("planes", "planes")}),
     frozenset({("objects", "joined"), ("lighting", "glass")}),

@@ -1,5 +1,5 @@
-"""Light below boundaries (`subsurface`): nothing is lost, thick bodies have their colour, dense ones are Lambert's, and a ball is that of
-a random walk of its own.
+"""Light below boundaries (`subsurface`): nothing is lost, thick bodies have their colour, dense ones are Lambert's, and balls
+are those of a random walk in NumPy.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def set_of(material: dict[str, Any], bounces: int = 8, **sections: Any) -> Scene
 
 
 def test_inversion_is_that_of_thick_bodies() -> None:
-    """Albedos by the formula that kernels have, as Chandrasekhar's half spaces of isotropic scattering (1950, chapter V) tell them."""
+    """Albedos by the formula that kernels have, beside Chandrasekhar's half spaces that scatter all around (1950, V)."""
     from tests.render.test_cloudy import depth_function
 
     nodes, weights = np.polynomial.legendre.leggauss(64)
@@ -103,7 +103,9 @@ def test_dense_bodies_are_lamberts() -> None:
     found = set_of(material, background=BLACK, lights=lights)
     found = found.model_copy(update={"renderer": found.surface.model_copy(update={"samples": 64})})
     film = clfractal.render(found, channels=("R", "G", "B", "A", "N.X", "N.Y", "N.Z"))
-    facing = sum(np.asarray(film[f"N.{axis}"], float) * part for axis, part in zip("XYZ", toward, strict=True))
+    facing = sum(
+        np.asarray(film[f"N.{axis}"], float) * part for axis, part in zip("XYZ", toward, strict=True)
+    )
     lit = (np.asarray(film["A"]) == 1) & (facing > 0.3)
     assert lit.sum() > 100
     colors = np.stack([film[name] for name in "RGB"], axis=-1)[lit]
@@ -113,7 +115,7 @@ def test_dense_bodies_are_lamberts() -> None:
 
 
 def walk_in_ball(radius: float, albedo: float, count: int = 200_000) -> float:
-    """What a ball so many mean free paths wide that scatters alike to all sides lets out of light that goes in by Lambert's law."""
+    """What comes out of a ball with a radius of so many mean free paths, of light that goes in by Lambert's law."""
     random = np.random.default_rng(7)
     sine = np.sqrt(random.random(count))
     direction = np.stack([sine, np.zeros(count), -np.sqrt(1 - sine * sine)], axis=1)
@@ -150,7 +152,13 @@ def test_a_ball_is_that_of_a_random_walk() -> None:
 def test_white_joined_sets_before_white_are_not_seen() -> None:
     """Two materials flow into each other; a hole is cut into both."""
     objects = {
-        "drop": {"type": "sphere", "radius": 0.6, "position": [0.9, 0, 0.2], "join": "smooth_union", "material": "n"},
+        "drop": {
+            "type": "sphere",
+            "radius": 0.6,
+            "position": [0.9, 0, 0.2],
+            "join": "smooth_union",
+            "material": "n",
+        },
         "hole": {"type": "box", "size": [0.5, 3, 0.5], "join": "cut", "material": "m"},
     }
     white = skin({"roughness": 0.3}, color=[1, 1, 1], radius=0.1)
@@ -197,9 +205,7 @@ def test_parts_of_a_picture_have_its_bits() -> None:
 def test_scenes_without_it_do_not_know_it() -> None:
     texts = []
     for values in ({}, {"color": [0.5, 0.6, 0.7], "radius": 2}):
-        found = scene_of(
-            lighting=path(2), materials={"m": {"subsurface": values}}, material={"name": "m"}
-        )
+        found = scene_of(lighting=path(2), materials={"m": {"subsurface": values}}, material={"name": "m"})
         plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
         texts.append([text.flat.text for text in program_texts(found, plan)])
         assert "#define HAS_SUBSURFACE" not in texts[-1][1]
