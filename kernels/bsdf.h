@@ -15,20 +15,6 @@
 // Whether any lane has some of it.
 INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }
 
-// About what a material reflects of white light, from wherever it comes and is looked at: what channels call albedo. A clear boundary
-// counts as nothing, since what it does not mirror comes back from the body.
-INLINE color pbr_albedo(const pbr *p, __global const float *tables) {
-    const color white = color_of(R(1.0), R(1.0), R(1.0));
-    color body = color_scale(p->base_color, p->base_weight);
-#if HAS_SUBSURFACE
-    body = color_mix(body, p->subsurface_color, p->subsurface_weight);
-#endif
-    const color base = color_mix(body, white, p->transmission_weight * (R(1.0) - p->base_metalness));
-    const color below = color_mul(base, color_mix(white, p->coat_color, p->coat_weight));
-    const real fibres = p->fuzz_weight * albedo_at(tables + ALBEDO_FUZZ, R(0.5), fmax(p->fuzz_roughness, SMOOTHEST_FUZZ)).mean;
-    return color_mix(below, p->fuzz_color, fibres);
-}
-
 // A material at a spot, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...
@@ -69,6 +55,36 @@ INLINE real through_boundary(albedo o, albedo i) {
 #include "bsdf_below.h"
 
 INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
+
+// With which probability each lobe is sampled: about by what it reflects.
+INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
+    real of_gloss = R(0.0);
+    if (any_of(b->dielectric * b->root)) of_gloss = albedo_of_dielectric(tables, b->out.z, b->rough, b->root).of_direction;
+#if HAS_SUBSURFACE
+    of_gloss = pick(b->emerges, R(0.0), of_gloss);
+#endif
+    const real mirrored = b->metalness * fmax(luminance(b->metal), R(0.1)) + b->dielectric * of_gloss;
+    real scattered = b->dielectric * (R(1.0) - of_gloss) * fmax(luminance(b->body), R(0.02)) + b->metalness * b->rough * R(0.3)
+                           + luminance(b->fuzz);
+#if HAS_GLASS
+    scattered += b->clear.weight * (R(1.0) - b->clear.crosses) * b->clear.lost;
+    const real bent = b->clear.weight * (R(1.0) - b->clear.lost), lost = b->clear.weight * b->clear.crosses * b->clear.lost;
+#if HAS_SUBSURFACE
+    const real sunk = below_sampled(b, of_gloss, &scattered);
+#endif
+    const real below = (R(1.0) - b->coat_albedo) * (mirrored + scattered + bent + lost), all = b->coat_albedo + below;
+#if HAS_SUBSURFACE
+    b->by_below = (R(1.0) - b->coat_albedo) * sunk / all;
+    b->below = color_scale(color_mul(b->below, b->coat_tint), (R(1.0) - b->fuzz_albedo) * all);
+#endif
+    b->by_glass = (R(1.0) - b->coat_albedo) * bent / all;
+    b->by_beyond = (R(1.0) - b->coat_albedo) * lost / all;
+#else
+    const real below = (R(1.0) - b->coat_albedo) * (mirrored + scattered), all = b->coat_albedo + below;
+#endif
+    b->by_coat = b->coat_albedo / all;
+    b->by_gloss = (R(1.0) - b->coat_albedo) * mirrored / all;
+}
 
 // `to_viewer` has length 1.
 INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const float *tables) {
@@ -129,32 +145,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     if (any_of(brightest(b.fuzz))) {
         b.fuzz_albedo = brightest(b.fuzz) * albedo_at(tables + ALBEDO_FUZZ, b.out.z, b.fuzz_rough).of_direction;
     }
-    real of_gloss = R(0.0);
-    if (any_of(b.dielectric * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
-#if HAS_SUBSURFACE
-    of_gloss = pick(b.emerges, R(0.0), of_gloss);
-#endif
-    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
-    real scattered = b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
-                           + luminance(b.fuzz);
-#if HAS_GLASS
-    scattered += b.clear.weight * (R(1.0) - b.clear.crosses) * b.clear.lost;
-    const real bent = b.clear.weight * (R(1.0) - b.clear.lost), lost = b.clear.weight * b.clear.crosses * b.clear.lost;
-#if HAS_SUBSURFACE
-    const real sunk = below_sampled(&b, of_gloss, &scattered);
-#endif
-    const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered + bent + lost), all = b.coat_albedo + below;
-#if HAS_SUBSURFACE
-    b.by_below = (R(1.0) - b.coat_albedo) * sunk / all;
-    b.below = color_scale(color_mul(b.below, b.coat_tint), (R(1.0) - b.fuzz_albedo) * all);
-#endif
-    b.by_glass = (R(1.0) - b.coat_albedo) * bent / all;
-    b.by_beyond = (R(1.0) - b.coat_albedo) * lost / all;
-#else
-    const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered), all = b.coat_albedo + below;
-#endif
-    b.by_coat = b.coat_albedo / all;
-    b.by_gloss = (R(1.0) - b.coat_albedo) * mirrored / all;
+    bsdf_choices(&b, tables);
     return b;
 }
 

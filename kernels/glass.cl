@@ -6,8 +6,10 @@
 #include "structs.h"
 #include "formula.h"
 #include "orbit.h"
+#include "rays.h"
+#include "queue.h"
+#include "arguments.h"
 #if HAS_GLASS_SCATTER
-#include "camera.h"
 #include "sampling.h"
 #include "shade.h"
 #include "tiles.h"
@@ -20,11 +22,8 @@
 #include "light_places.h"
 #include "flights.h"
 #endif
-#include "rays.h"
-#include "queue.h"
 #include "march_inside.h"
 #include "share.h"
-#include "arguments.h"
 #include "surface_at.h"
 #include "exits.h"
 #if HAS_GLASS_SCATTER

@@ -144,6 +144,26 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 #endif
 }
 
+// Paths that come from below the boundary of their spot leave the medium there; the result says which.
+INLINE mask path_comes_out(int bounce, carried *with, const spot *here, mask lands, world w) {
+#if HAS_SUBSURFACE
+    const mask emerges = lands & path_emerges(bounce, with, here, w);
+    media_leave(with, body_of(with->medium), emerges);
+    if (any_lane(emerges)) media_found(with, medium_of(with->medium, w), emerges);
+    return emerges;
+#else
+    return lands & ~lands;
+#endif
+}
+
+// How wide a path is from a spot on: as a pixel there, and as fast as the pixel grows before the first spot.
+INLINE void path_widens(stage s, path *so_far, const spot *here, ray from_eye, real time, world w) {
+    spot seen_first = *here;
+    if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
+    so_far->footprint = here->cone;
+    so_far->spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone);
+}
+
 // Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or on the
 // way there a medium `scatters` it.
 INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, mask *scatters, world w) {

@@ -21,12 +21,7 @@ STAGE(scatter_paths) {
 #endif
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
-    mask emerges = lands & ~lands;
-#if HAS_SUBSURFACE
-    emerges = lands & path_emerges(bounce, &with, &found, w);
-    media_leave(&with, body_of(with.medium), emerges);
-    if (any_lane(emerges)) media_found(&with, medium_of(with.medium, w), emerges);
-#endif
+    const mask emerges = path_comes_out(bounce, &with, &found, lands, w);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
 #if HAS_PARTS
@@ -71,10 +66,7 @@ STAGE(scatter_paths) {
         path_goes_straight(&so_far, &before_it, arrived.direction, edge.hidden);
         path_crosses(&so_far, &with, &found, edge, &p, sinks, weights, wave, w);
 #endif
-        spot seen_first = found;
-        if (bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
-        so_far.footprint = found.cone;
-        so_far.spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, a.time, w.view), found.cone);
+        path_widens(s, &so_far, &found, from_eye, a.time, w);
     }
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);

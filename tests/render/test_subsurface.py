@@ -1,5 +1,6 @@
-"""Light below boundaries (`subsurface`): nothing is lost, thick bodies have their colour, dense ones are Lambert's, and balls
-are those of a random walk in NumPy.
+"""Light below boundaries (`subsurface`): nothing is lost, thick bodies have their colour, dense ones are Lambert's.
+
+Balls are those of a random walk in NumPy.
 """
 
 from __future__ import annotations
