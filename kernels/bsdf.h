@@ -15,17 +15,6 @@
 // Whether any lane has some of it.
 INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }
 
-// About what a material reflects of white light, from wherever it comes and is looked at: what channels call albedo. A clear boundary
-// counts as nothing, since what it does not mirror comes back from the body.
-INLINE color pbr_albedo(const pbr *p, __global const float *tables) {
-    const color white = color_of(R(1.0), R(1.0), R(1.0));
-    const color body = color_scale(p->base_color, p->base_weight);
-    const color base = color_mix(body, white, p->transmission_weight * (R(1.0) - p->base_metalness));
-    const color below = color_mul(base, color_mix(white, p->coat_color, p->coat_weight));
-    const real fibres = p->fuzz_weight * albedo_at(tables + ALBEDO_FUZZ, R(0.5), fmax(p->fuzz_roughness, SMOOTHEST_FUZZ)).mean;
-    return color_mix(below, p->fuzz_color, fibres);
-}
-
 // A material at a spot, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...
@@ -47,6 +36,11 @@ typedef struct {
     glass clear;
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
 #endif
+#if HAS_SUBSURFACE
+    mask emerges;             // whether light comes from below the boundary, as from a white body whose viewer is below, too
+    real bare;                // part of the body that is none of a medium
+    color below; real by_below; // what goes below the boundary, over the probability of choosing that, the last part of all choices
+#endif
 } bsdf;
 
 INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
@@ -58,7 +52,39 @@ INLINE real through_boundary(albedo o, albedo i) {
     return (R(1.0) - o.of_direction) * (R(1.0) - i.of_direction) / fmax(R(1.0) - o.mean, R(1e-6));
 }
 
+#include "bsdf_below.h"
+
 INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
+
+// With which probability each lobe is sampled: about by what it reflects.
+INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
+    real of_gloss = R(0.0);
+    if (any_of(b->dielectric * b->root)) of_gloss = albedo_of_dielectric(tables, b->out.z, b->rough, b->root).of_direction;
+#if HAS_SUBSURFACE
+    of_gloss = pick(b->emerges, R(0.0), of_gloss);
+#endif
+    const real mirrored = b->metalness * fmax(luminance(b->metal), R(0.1)) + b->dielectric * of_gloss;
+    real scattered = b->dielectric * (R(1.0) - of_gloss) * fmax(luminance(b->body), R(0.02)) + b->metalness * b->rough * R(0.3)
+                           + luminance(b->fuzz);
+#if HAS_GLASS
+    scattered += b->clear.weight * (R(1.0) - b->clear.crosses) * b->clear.lost;
+    const real bent = b->clear.weight * (R(1.0) - b->clear.lost), lost = b->clear.weight * b->clear.crosses * b->clear.lost;
+#if HAS_SUBSURFACE
+    const real sunk = below_sampled(b, of_gloss, &scattered);
+#endif
+    const real below = (R(1.0) - b->coat_albedo) * (mirrored + scattered + bent + lost), all = b->coat_albedo + below;
+#if HAS_SUBSURFACE
+    b->by_below = (R(1.0) - b->coat_albedo) * sunk / all;
+    b->below = color_scale(color_mul(b->below, b->coat_tint), (R(1.0) - b->fuzz_albedo) * all);
+#endif
+    b->by_glass = (R(1.0) - b->coat_albedo) * bent / all;
+    b->by_beyond = (R(1.0) - b->coat_albedo) * lost / all;
+#else
+    const real below = (R(1.0) - b->coat_albedo) * (mirrored + scattered), all = b->coat_albedo + below;
+#endif
+    b->by_coat = b->coat_albedo / all;
+    b->by_gloss = (R(1.0) - b->coat_albedo) * mirrored / all;
+}
 
 // `to_viewer` has length 1.
 INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const float *tables) {
@@ -97,37 +123,29 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.clear = glass_at(b.dielectric * p->transmission_weight, b.out.z, p->inside, b.ior, bending, b.rough, b.alpha, b.root, tint, tables);
     b.dielectric *= R(1.0) - p->transmission_weight;
 #endif
+#if HAS_SUBSURFACE
+    below_begins(&b, p, inside);
+#endif
     if (any_of(b.coat)) {
         // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
         const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
         const real most = b.coat * p->coat_darkening;
-#define DARKENED(c) c *= R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * c)
+#define DARKENING(c) (R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * (c)))
+#define DARKENED(c) c *= DARKENING(c)
         DARKENED(b.body.r);
         DARKENED(b.body.g);
         DARKENED(b.body.b);
 #undef DARKENED
+#if HAS_SUBSURFACE
+        b.below = color_of(DARKENING(p->subsurface_color.r), DARKENING(p->subsurface_color.g), DARKENING(p->subsurface_color.b));
+#endif
         b.metal = b.body;
         b.coat_albedo = b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction;
     }
     if (any_of(brightest(b.fuzz))) {
         b.fuzz_albedo = brightest(b.fuzz) * albedo_at(tables + ALBEDO_FUZZ, b.out.z, b.fuzz_rough).of_direction;
     }
-    real of_gloss = R(0.0);
-    if (any_of(b.dielectric * b.root)) of_gloss = albedo_of_dielectric(tables, b.out.z, b.rough, b.root).of_direction;
-    const real mirrored = b.metalness * fmax(luminance(b.metal), R(0.1)) + b.dielectric * of_gloss;
-    real scattered = b.dielectric * (R(1.0) - of_gloss) * fmax(luminance(b.body), R(0.02)) + b.metalness * b.rough * R(0.3)
-                           + luminance(b.fuzz);
-#if HAS_GLASS
-    scattered += b.clear.weight * (R(1.0) - b.clear.crosses) * b.clear.lost;
-    const real bent = b.clear.weight * (R(1.0) - b.clear.lost), lost = b.clear.weight * b.clear.crosses * b.clear.lost;
-    const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered + bent + lost), all = b.coat_albedo + below;
-    b.by_glass = (R(1.0) - b.coat_albedo) * bent / all;
-    b.by_beyond = (R(1.0) - b.coat_albedo) * lost / all;
-#else
-    const real below = (R(1.0) - b.coat_albedo) * (mirrored + scattered), all = b.coat_albedo + below;
-#endif
-    b.by_coat = b.coat_albedo / all;
-    b.by_gloss = (R(1.0) - b.coat_albedo) * mirrored / all;
+    bsdf_choices(&b, tables);
     return b;
 }
 
@@ -180,7 +198,7 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
     const real single = ggx_value(b->out, i, h, b->alpha) * lobe_share(broad, sharp, b->alpha);
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     if (any_of(b->dielectric)) {
-        const color body = eon_value(b->body, b->out, i, b->rough_body);
+        color body = eon_value(b->body, b->out, i, b->rough_body);
         albedo o = {R(0.0), R(0.0)}, other = o;
         real gloss = R(0.0);
         if (any_of(b->root)) {
@@ -188,6 +206,10 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
             other = albedo_of_dielectric(tables, i.z, b->rough, b->root);
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }
+#if HAS_SUBSURFACE
+        o.of_direction = pick(b->emerges, R(0.0), o.of_direction);
+        body = color_scale(body, b->bare);
+#endif
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other) * broad)),
                           b->dielectric);
     }
@@ -222,7 +244,11 @@ INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
     const real of_coat = b->by_coat * lobe_share(broad, sharp, b->coat_alpha), of_gloss = b->by_gloss * lobe_share(broad, sharp, b->alpha);
 #if HAS_GLASS
     const glass *g = &b->clear;
-    const real hemisphere = broad * (R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond) * fmax(i.z, R(0.0)) / BSDF_PI;
+    real around = R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond;
+#if HAS_SUBSURFACE
+    around = fmax(around - b->by_below, R(0.0));
+#endif
+    const real hemisphere = broad * around * fmax(i.z, R(0.0)) / BSDF_PI;
     const real facets = of_gloss + b->by_glass * sharp * fresnel_across(vec_dot(b->out, h), g->mirrors);
     const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + of_coat * ggx_density(b->out, h, b->coat_alpha);
     const vec bends = bending_facet(b->out, i, g->across);

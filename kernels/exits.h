@@ -13,7 +13,10 @@ INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, in
 INLINE void look_inside(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
                         __constant const scalar *k) {
     encounter e = queue_met(q, 0, at);
-    const mask hit = mask_of(e.hit);
+    mask hit = mask_of(e.hit);
+#if HAS_OBJECTS
+    hit &= ~less(R(0.0), queue_object(q, 0, at, e));
+#endif
     if (!any_lane(hit)) return;
     ray r = queue_ray(q, 0, at);
     r.footprint += r.spread * e.t;

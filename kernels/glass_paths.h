@@ -1,4 +1,5 @@
 // Paths through glass: what they carry while they are inside, and how they get there.
+#include "flights.h"
 #include "media.h"
 
 // A place in the spectrum: the index of refraction there (`bend`, see `clfractal/renderers/glass.py`), and what it weighs.
@@ -14,6 +15,17 @@ INLINE color spectrum_at(real place, real *bend, __global const float *table) {
     *bend = lanes_load(found);
     return color_of(lanes_load(found + LANES), lanes_load(found + 2 * LANES), lanes_load(found + 3 * LANES));
 }
+
+#if HAS_SUBSURFACE
+// Whether a path comes from below the boundary of a spot, which it then leaves as if it were seen from outside, straight on.
+INLINE mask path_emerges(int bounce, const carried *with, const spot *here, world w) {
+    real body = set_body(w);
+#if HAS_OBJECTS
+    body = pick(of_the_set(here->object, w), body, here->object);
+#endif
+    return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);
+}
+#endif
 
 // The material as a path meets it, from inside or not: for glass that spreads colours, at the path's wavelength, or at one that it
 // takes if it is refracted now, `wave` in (0, 1), which then is the path's; the result is what it weighs then. The index by Cauchy's
@@ -52,15 +64,10 @@ INLINE mask leads_out(vec toward, vec normal, mask leaving) {
     return (over & ~leaving) | (~over & leaving);
 }
 
-// What a medium leaves of light on a way through it.
-INLINE color absorbed(color light, color extinction, real way) {
-    return color_of(light.r * exp(-way * extinction.r), light.g * exp(-way * extinction.g), light.b * exp(-way * extinction.b));
-}
-
 // The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.
 INLINE real way_within(const carried *with, real way, world w) {
     const real most = R(2.0) * (real)(w.settings->bounds_radius);
-    return pick(equal(with->medium, set_body(w)), fmin(way, most), way);
+    return pick(equal(body_of(with->medium), set_body(w)), fmin(way, most), way);
 }
 
 // Lets the medium absorb light on a path's way through it.
@@ -86,15 +93,27 @@ INLINE void path_goes_straight(path *so_far, const path *before, vec direction, 
 }
 
 // Brings a path over the boundary if its direction leads there.
-INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, color weights, real wave, world w) {
+INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, mask sinks, color weights, real wave,
+                         world w) {
     const mask over = less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;
     const mask stays_out = leads_out(so_far->direction, here->normal, edge.leaving);
+    real body = edge.body;
+#if HAS_SUBSURFACE
+    // Colours stay together below a boundary.
+    wave = pick(sinks, with->wave, wave);
+    weights = color_pick(sinks, color_of(R(1.0), R(1.0), R(1.0)), weights);
+    sinks = (sinks & ~edge.hidden) | (edge.hidden & ~less(R(0.0), p->transmission_weight));
+    body += pick(sinks, SKIN, R(0.0));
+#endif
     so_far->through = color_pick(over, so_far->through, color_mul(so_far->through, weights));
     with->wave = pick(over, with->wave, wave);
     vec origin = here->seen;
 #if HAS_OBJECTS
     const mask of_set = of_the_set(here->object, w);
-    const real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
+    real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
+#if HAS_SUBSURFACE
+    lift = pick(sinks & ~of_set, lift + R(0.05) * here->cone, lift);
+#endif
     origin = vec_pick(of_set, origin, vec_along(here->point, lift, here->normal));
     so_far->origin = vec_pick(stays_out & of_set, so_far->origin, origin);
 #else
@@ -103,13 +122,17 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     // Nobody asks for light that reaches a spot through its own body.
     with->density = pick(stays_out & ~edge.hidden, with->density, R(-1.0));
     media_leave(with, edge.body, crosses & edge.leaving);
-    media_enter(with, edge.body, crosses & ~edge.leaving);
+    media_enter(with, body, crosses & ~edge.leaving);
     if (!any_lane(crosses)) return;
-    const mask enters = crosses & ~edge.leaving & equal(with->medium, edge.body);
+    const mask enters = crosses & ~edge.leaving & equal(with->medium, body);
     medium next = medium_of(with->medium, w), own = next;
     own.extinction = absorption_of(p->transmission_color, p->transmission_depth);
 #if HAS_GLASS_SCATTER
     medium_scatters(&own, p->transmission_scatter, p->transmission_depth, p->transmission_scatter_anisotropy);
+#endif
+#if HAS_SUBSURFACE
+    own = medium_pick(sinks, medium_of_skin(p->subsurface_color, p->subsurface_radius, p->subsurface_radius_scale,
+                                            p->subsurface_scatter_anisotropy), own);
 #endif
     media_found(with, medium_pick(enters, own, next), crosses);
 }

@@ -3,7 +3,7 @@
 //
 // A ray begins where another has met the surface, which may be some footprints before the set: until it is inside its steps grow from
 // a part of a footprint. One that does not find the set there has met a sheet without an inside, and leaves at once. Where media scatter
-// light, rays begin within the set, too: the first place to test is then the very beginning.
+// light this is a part of walks (walks.h), whose first place to test is the very beginning.
 #define ENTRANCE_REACH R(16.0)      // footprints before the set, at the most ...
 #define ENTRANCE_START R(0.0625)    // ... and the first place to test beyond its beginning
 #define ENTRANCE_GROWTH R(0.5)      // of the way so far
@@ -40,6 +40,43 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
     m->tries = pick(fresh, R(0.0), m->tries);
 }
 
+// Lanes that have not found the set within reach: they have met a sheet without an inside, which they leave at once.
+INLINE mask march_misses(march *m, mask outside, real cone) {
+    const mask sheet = outside & ~m->entered & less(m->r.near + ENTRANCE_REACH * cone, m->t);
+    m->found.t = pick(sheet, m->r.near, m->found.t);
+    m->found.last = pick(sheet, m->t, m->found.last);
+    m->found.touch = pick(sheet, m->t, m->found.touch);
+    return sheet;
+}
+
+// Over the exit: the place at which light is computed, nearer where something else begins there; the result says which lanes have it.
+INLINE mask march_places(march *m, mask inside, mask outside) {
+    const mask over = m->active & m->narrow;
+    m->tries += pick(over, R(1.0), R(0.0));
+    m->height = pick(over & inside, EXIT_NEARER * m->height, m->height);
+    const mask placed = over & (outside | less(EXIT_TRIES, m->tries));
+    m->found.t = pick(placed, m->low, m->found.t);
+    m->found.last = pick(placed, m->high, m->found.last);
+    m->found.touch = pick(placed, m->high + m->height, m->found.touch);
+    return placed;
+}
+
+// Narrows the exit of lanes that search for it down to `finest`; then light is to be computed `height` over it.
+INLINE void march_narrows(march *m, mask inside, mask outside, mask searching, real finest, real height) {
+    m->left |= outside & searching & m->entered;
+    m->entered |= inside & searching;
+    m->low = pick(inside & searching, m->t, m->low);
+    m->high = pick(outside & searching & m->entered, m->t, m->high);
+    const mask narrow = searching & m->left & less_equal(m->high - m->low, finest);
+    m->narrow |= narrow;
+    m->height = pick(narrow, height, m->height);
+}
+
+// Where the next test is: `onward`, unless the exit is being narrowed or placed.
+INLINE real march_goes_to(const march *m, real onward) {
+    return pick(m->narrow, m->high + m->height, pick(m->left, R(0.5) * (m->low + m->high), onward));
+}
+
 // One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
 INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
                        __constant const scalar *k) {
@@ -49,39 +86,14 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, here.count, R(0.0));
     const mask inside = m->active & here.inside, outside = m->active & ~here.inside;
-
-    // A sheet without an inside.
-    const mask sheet = outside & ~m->entered & less(m->r.near + ENTRANCE_REACH * cone, m->t);
-    m->found.t = pick(sheet, m->r.near, m->found.t);
-    m->found.last = pick(sheet, m->t, m->found.last);
-    m->found.touch = pick(sheet, m->t, m->found.touch);
-
-    // Over the exit: the place at which light is computed, nearer where something else begins there.
-    const mask over = m->active & m->narrow;
-    m->tries += pick(over, R(1.0), R(0.0));
-    m->height = pick(over & inside, EXIT_NEARER * m->height, m->height);
-    const mask placed = over & (outside | less(EXIT_TRIES, m->tries));
-    m->found.t = pick(placed, m->low, m->found.t);
-    m->found.last = pick(placed, m->high, m->found.last);
-    m->found.touch = pick(placed, m->high + m->height, m->found.touch);
-
-    const mask searching = m->active & ~m->narrow;
-    m->left |= outside & searching & m->entered;
-    m->entered |= inside;
-    m->low = pick(inside & searching, m->t, m->low);
-    m->high = pick(outside & searching & m->entered, m->t, m->high);
+    const mask done = march_misses(m, outside, cone) | march_places(m, inside, outside);
     const real size = fmax(fmax(fabs(point.x), fabs(point.y)), fmax(fabs(point.z), m->t));
     const real finest = fmax(EXIT_TOLERANCE * cone, R(2.0) * (real)(REAL_EPSILON) * size);
-    const mask narrow = searching & m->left & less_equal(m->high - m->low, finest);
-    m->narrow |= narrow;
-    m->height = pick(narrow, (real)(settings->near) * cone, m->height);
-
-    const mask done = sheet | placed;
+    march_narrows(m, inside, outside, m->active & ~m->narrow, finest, (real)(settings->near) * cone);
     m->found.hit |= done;
     m->active &= ~done;
     const real entrance = fmax(ENTRANCE_START * cone, ENTRANCE_GROWTH * (m->t - m->r.near));
-    const real onward = m->t + pick(m->entered, step, fmin(entrance, step));
-    m->t = pick(m->narrow, m->high + m->height, pick(m->left, R(0.5) * (m->low + m->high), onward));
+    m->t = march_goes_to(m, m->t + pick(m->entered, step, fmin(entrance, step)));
     // The set may end where its bounds do.
     m->active &= less_equal(m->t, m->r.far + step);
 }

@@ -80,6 +80,9 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
     p->fuzz_weight = pick(face, none, p->fuzz_weight);
     p->transmission_weight = pick(face, none, p->transmission_weight);
     p->emission_luminance = pick(face, none, p->emission_luminance);
+#if HAS_SUBSURFACE
+    p->subsurface_weight = pick(face, none, p->subsurface_weight);
+#endif
 }
 #endif
 
@@ -105,4 +108,18 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
     pbr_of_face(here, &p);
 #endif
     return p;
+}
+
+// About what a material reflects of white light, from wherever it comes and is looked at: what channels call albedo. A clear boundary
+// counts as nothing, since what it does not mirror comes back from the body.
+INLINE color pbr_albedo(const pbr *p, __global const float *tables) {
+    const color white = color_of(R(1.0), R(1.0), R(1.0));
+    color body = color_scale(p->base_color, p->base_weight);
+#if HAS_SUBSURFACE
+    body = color_mix(body, p->subsurface_color, p->subsurface_weight);
+#endif
+    const color base = color_mix(body, white, p->transmission_weight * (R(1.0) - p->base_metalness));
+    const color below = color_mul(base, color_mix(white, p->coat_color, p->coat_weight));
+    const real fibres = p->fuzz_weight * albedo_at(tables + ALBEDO_FUZZ, R(0.5), fmax(p->fuzz_roughness, SMOOTHEST_FUZZ)).mean;
+    return color_mix(below, p->fuzz_color, fibres);
 }

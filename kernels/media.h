@@ -2,6 +2,17 @@
 // stand in each other the one with the highest number displaces the others (as nested dielectrics by priority: Schmidt and Budge 2002):
 // boundaries of those are not seen there. A path knows two at a place.
 
+#define THROUGH 1   // of an object's `glass`, where light goes through it: it may go below the boundary, too
+
+// Below a boundary (subsurface) a body has a medium of its own, whose number is greater by a half.
+#if HAS_SUBSURFACE
+#define SKIN R(0.5)
+INLINE real body_of(real medium) { return floor(medium); }
+INLINE mask is_skin(real medium) { return less(floor(medium), medium); }
+#else
+#define body_of(medium) (medium)
+#endif
+
 INLINE real set_body(world w) { return (real)((scalar)(w.settings->object_count + 1)); }
 
 // What a material's own numbers say of a medium: its index, and what it takes away for each unit of the way, in natural logarithms.
@@ -41,13 +52,36 @@ INLINE void medium_scatters(medium *found, color scatter, real depth, real aniso
 }
 #endif
 
+#if HAS_SUBSURFACE
+// The medium below a boundary, from what a thick body sends back of light from all sides (OpenPBR 1.1, Subsurface): van de Hulst's
+// reflectance A = (1 - s)(1 - 0.139 s) / (1 + 1.17 s), where s^2 = (1 - albedo) / (1 - g albedo), solved for s (Kulla and Conty 2017).
+// Bodies below a boundary bend no light: what the boundary reflects is told by its albedos, as for diffuse ones.
+INLINE medium medium_of_skin(color back, real radius, color scale, real g) {
+    medium found;
+    found.index = R(1.0);
+    found.anisotropy = g;
+#define OF_SKIN(c)                                                                                                              \
+    {                                                                                                                           \
+        const real s = clamp(R(4.09712) + R(4.20863) * back.c - sqrt(R(9.59217) + (R(41.6808) + R(17.7126) * back.c) * back.c), \
+                             R(0.0), R(1.0));                                                                                   \
+        found.extinction.c = R(1.0) / fmax(radius * scale.c, R(1e-6));                                                          \
+        found.scatters.c = (R(1.0) - s * s) / (R(1.0) - g * s * s);                                                             \
+    }
+    OF_SKIN(r)
+    OF_SKIN(g)
+    OF_SKIN(b)
+#undef OF_SKIN
+    return found;
+}
+#endif
+
 // Of lanes `here` one medium, of the others another.
 INLINE medium medium_pick(mask here, medium yes, medium no) {
     for (int i = 0; i < NUMBERS_OF(medium); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
     return no;
 }
 
-INLINE void medium_of_material(int number, mask here, medium *found, world w) {
+INLINE void medium_of_material(int number, mask here, real body, medium *found, world w) {
     if (!any_lane(here)) return;
     __constant const struct Pbr *material = w.materials + number;
     // A blend is a medium like its first part.
@@ -59,6 +93,11 @@ INLINE void medium_of_material(int number, mask here, medium *found, world w) {
 #if HAS_GLASS_SCATTER
     const color scatter = color_splat(material->transmission_scatter);
     medium_scatters(&own, scatter, depth, (real)(material->transmission_scatter_anisotropy));
+#endif
+#if HAS_SUBSURFACE
+    const medium below = medium_of_skin(color_splat(material->subsurface_color), (real)(material->subsurface_radius),
+                                        color_splat(material->subsurface_radius_scale), (real)(material->subsurface_scatter_anisotropy));
+    own = medium_pick(is_skin(body), below, own);
 #endif
     *found = medium_pick(here, own, *found);
 }
@@ -73,25 +112,25 @@ CALLED medium medium_of(real body, world w) {
     if (!any_lane(less(R(0.0), body))) return found;
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
-        medium_of_material(w.objects[i].material, equal(body, (real)((scalar)(i + 1))), &found, w);
+        medium_of_material(w.objects[i].material, equal(body_of(body), (real)((scalar)(i + 1))), body, &found, w);
     }
 #endif
 #if HAS_GLASS_SET
-    medium_of_material(SET_MATERIAL, equal(body, set_body(w)), &found, w);
+    medium_of_material(SET_MATERIAL, equal(body_of(body), set_body(w)), body, &found, w);
 #endif
     return found;
 }
 
 // Goes into a body, or leaves it.
 INLINE void media_enter(carried *with, real body, mask here) {
-    here &= ~equal(body, with->medium) & ~equal(body, with->under);
+    here &= ~equal(body_of(body), body_of(with->medium)) & ~equal(body_of(body), body_of(with->under));
     const mask over = less(with->medium, body);
     with->under = pick(here, pick(over, with->medium, fmax(with->under, body)), with->under);
     with->medium = pick(here & over, body, with->medium);
 }
 
 INLINE void media_leave(carried *with, real body, mask here) {
-    const mask first = here & equal(body, with->medium), second = here & equal(body, with->under);
+    const mask first = here & equal(body, body_of(with->medium)), second = here & equal(body, body_of(with->under));
     with->medium = pick(first, with->under, with->medium);
     with->under = pick(first | second, R(0.0), with->under);
 }
@@ -111,7 +150,7 @@ INLINE void media_begin(carried *with, vec eye, world w) {
     with->wave = R(-1.0);
 #if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
-        if (w.objects[i].glass) media_enter(with, (real)((scalar)(i + 1)), object_holds(w.objects + i, eye));
+        if (w.objects[i].glass == THROUGH) media_enter(with, (real)((scalar)(i + 1)), object_holds(w.objects + i, eye));
     }
 #endif
     media_found(with, medium_of(with->medium, w), less(R(0.0), R(1.0)));
@@ -129,7 +168,7 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
     border found;
     mask glass = less(R(0.0), R(1.0)) & (HAS_GLASS_SET ? ~0 : 0);
     found.body = set_body(w);
-    found.leaving = equal(with->medium, found.body) | equal(with->under, found.body);
+    found.leaving = equal(body_of(with->medium), found.body) | equal(body_of(with->under), found.body);
 #if HAS_OBJECTS
     // What is joined to the set is one body with it.
     const mask beside = less(R(0.0), here->object) & ~of_the_set(here->object, w);
@@ -144,7 +183,7 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
         found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen, w.tables), here->normal), R(0.0));
     }
 #endif
-    found.around = pick(equal(with->medium, found.body), with->under, with->medium);
+    found.around = pick(equal(body_of(with->medium), found.body), with->under, with->medium);
     found.hidden = glass & less(found.body, found.around);
     return found;
 }

@@ -8,7 +8,7 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
     unit_square((bits)((uint)s.sample), seed, u, v);
 }
 
-#if HAS_GLASS_SCATTER || HAS_CLOUDS
+#if HAS_OBJECTS && (HAS_GLASS_SCATTER || HAS_CLOUDS)
 // Of lanes `here` one path, of the others another; likewise what they carry.
 INLINE path path_pick(mask here, path yes, path no) {
     for (int i = 0; i < NUMBERS_OF(path); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
@@ -22,6 +22,13 @@ INLINE carried carried_pick(mask here, carried yes, carried no) {
 #endif
 
 #if HAS_GLASS_SCATTER
+// What each sample of each pixel has for its next walk within the set.
+INLINE void walk_seeded(stage s, const packet_pixels *at, carried *with, world w) {
+    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, PURPOSE_FLIGHT + NEXT_BOUNCE * (uint)s.bounce);
+    const bits each = hash_bits(seed + (bits)((uint)s.sample * 0x85ebca6bu));
+    with->seed_low = real_of_bits(each & 0xffffu);
+    with->seed_high = real_of_bits(each >> 16);
+}
 #include "cloudy.h"
 #endif
 #if HAS_CLOUDS
@@ -69,8 +76,9 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     return chosen;
 }
 
-// Goes on in a direction that the surface chooses, unless Russian roulette ends the path (Arvo and Kirk 1990).
-INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
+// Goes on in a direction that the surface chooses, unless Russian roulette ends the path (Arvo and Kirk 1990). The result says which
+// paths go below the boundary.
+INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
     real u, v, choice, roulette;
     path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
@@ -84,8 +92,14 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     so_far->direction = bsdf_sample(b, choice, u, v, &with->density);
     const color value = bsdf_value(b, so_far->direction, w.albedos);
 #endif
-    mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density);
-    const color part = color_scale(value, R(1.0) / with->density);
+    mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density), sinks = on_path & ~on_path;
+    color part = color_scale(value, R(1.0) / with->density);
+#if HAS_SUBSURFACE
+    sinks = mask_of(so_far->on_path) & b->seen & less(R(1.0) - b->by_below, choice);
+    so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(SURFACE_NORMAL(b), R(-1.0)), u, v), so_far->direction);
+    part = color_pick(sinks, b->below, part);
+    on_path |= sinks;
+#endif
     so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
     on_path &= less(R(0.0), brightest(so_far->through));
     if (s.bounce >= w.settings->roulette) {
@@ -94,6 +108,7 @@ INLINE void path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
         so_far->through = color_pick(on_path, color_scale(so_far->through, R(1.0) / stays), so_far->through);
     }
     so_far->on_path = number_of(on_path);
+    return sinks;
 }
 
 // Adds what a path sees at its end: a lamp, or where it leaves the set what is past it.
@@ -143,6 +158,26 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 #else
     return bsdf_at(p, *shading, to_viewer, w.albedos);
 #endif
+}
+
+// Paths that come from below the boundary of their spot leave the medium there; the result says which.
+INLINE mask path_comes_out(int bounce, carried *with, const spot *here, mask lands, world w) {
+#if HAS_SUBSURFACE
+    const mask emerges = lands & path_emerges(bounce, with, here, w);
+    media_leave(with, body_of(with->medium), emerges);
+    if (any_lane(emerges)) media_found(with, medium_of(with->medium, w), emerges);
+    return emerges;
+#else
+    return lands & ~lands;
+#endif
+}
+
+// How wide a path is from a spot on: as a pixel there, and as fast as the pixel grows before the first spot.
+INLINE void path_widens(stage s, path *so_far, const spot *here, ray from_eye, real time, world w) {
+    spot seen_first = *here;
+    if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
+    so_far->footprint = here->cone;
+    so_far->spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone);
 }
 
 // What scatters a path before it has met anything.

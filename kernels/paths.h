@@ -16,12 +16,13 @@ STAGE(scatter_paths) {
     scatterer by;
     const mask lands = path_arrives(s, &here.at, &so_far, &with, &found, arrived, a.y, &by, w);
     mask asking = lands;
-#if HAS_GLASS_SCATTER || HAS_CLOUDS
+#if HAS_OBJECTS && (HAS_GLASS_SCATTER || HAS_CLOUDS)
     const path flown = so_far;
     const carried within = with;
 #endif
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
+    const mask emerges = path_comes_out(bounce, &with, &found, lands, w);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
 #if HAS_PARTS
@@ -42,11 +43,12 @@ STAGE(scatter_paths) {
         shows &= ~edge.hidden;
         outward = vec_pick(behind, vec_scale(outward, R(-1.0)), outward);
 #endif
-        spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows, w);
+        p.emerges = number_of(emerges);
+        spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows & ~emerges, w);
 #if HAS_PARTS
         reflects = pbr_albedo(&p, w.albedos);
 #endif
-        const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_scale(arrived.direction, R(-1.0)), &shading, w);
+        const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_pick(emerges, found.normal, vec_scale(arrived.direction, R(-1.0))), &shading, w);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
         with.total = weight_of_all(so_far.origin, OBJECT_OF(found), w);
         const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, OBJECT_OF(found), &b, with.total, behind, w, &with.awaited);
@@ -63,19 +65,19 @@ STAGE(scatter_paths) {
         awaited_absorbed(&with, edge, light.distance, w);
         const path before_it = so_far;
 #endif
-        path_goes_on(s, &here.at, &so_far, &with, &b, w);
+        const mask sinks = path_goes_on(s, &here.at, &so_far, &with, &b, w);
 #if HAS_GLASS
         path_goes_straight(&so_far, &before_it, arrived.direction, edge.hidden);
-        path_crosses(&so_far, &with, &found, edge, &p, weights, wave, w);
+        path_crosses(&so_far, &with, &found, edge, &p, sinks, weights, wave, w);
 #endif
-        spot seen_first = found;
-        if (bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
-        so_far.footprint = found.cone;
-        so_far.spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, a.time, w.view), found.cone);
+        path_widens(s, &so_far, &found, from_eye, a.time, w);
     }
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
+    walk_seeded(s, &here.at, &with, w);
+#if HAS_OBJECTS
     path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, by.glass, w);
+#endif
 #endif
 #if HAS_CLOUDS
     path_in_cloud(s, &here.at, &so_far, &with, flown, within, arrived, &by.cloud, &asks, by.cloud.met, w);
@@ -116,12 +118,12 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
-#if HAS_GLASS_SCATTER
-    far = flight_sought(&so_far, &with, w);
+#if HAS_GLASS_SCATTER && HAS_OBJECTS
+    far = pick(equal(body_of(with.medium), set_body(w)), far, flight_sought(&so_far, &with, w));
 #endif
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
 #if HAS_GLASS_SET
-    const mask within = equal(with.medium, set_body(w));
+    const mask within = equal(body_of(with.medium), set_body(w));
     send_clipped(s, 1, r, R(0.0), WHICH, mask_of(so_far.on_path) & within, w);
     so_far.on_path = pick(within, R(0.0), so_far.on_path);
 #endif
@@ -145,7 +147,7 @@ STAGE(end_paths) {
     tally_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
 #if HAS_GLASS_SET
-    on_path &= ~equal(with.medium, set_body(w));
+    on_path &= ~equal(body_of(with.medium), set_body(w));
 #endif
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);

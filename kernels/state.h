@@ -94,6 +94,7 @@ typedef struct {
     color scatters;     // the part of it that is scattered
     real anisotropy;    // of that, Henyey and Greenstein's g
     real flight;        // how far the path goes until it is scattered, if nothing is nearer
+    real seed_low, seed_high;   // 32 random bits for a walk of its own, as two whole numbers
 #endif
 #endif
 } carried;

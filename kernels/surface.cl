@@ -158,6 +158,13 @@ STAGE(find_spots) {
     if (bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
     STATE_KEEP(s, cost, STATE_TALLY);
     found.found = pick(mask_of(so_far.on_path), found.found, R(0.0));
+#if HAS_SUBSURFACE
+    if (bounce > 0) {
+        carried with;
+        STATE_RECALL(s, with, STATE_CARRIED);
+        found.normal = vec_pick(path_emerges(bounce, &with, &found, w), vec_scale(found.normal, R(-1.0)), found.normal);
+    }
+#endif
     if (COLORING == COLORING_RESIDUAL) found.quantity = found.residual;
     spot_keep(&found, s.state, bounce, s.stride);
     send_for_light(s, &here.at, &found, next_turns, w);

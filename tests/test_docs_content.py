@@ -131,6 +131,7 @@ PATHS = {
     "coat": "Coat",
     "fuzz": "Fuzz",
     "transmission": "Transmission",
+    "subsurface": "Subsurface",
     "emission": "Emission",
     "bump": "Bump",
     "A number": "NumberMap",

@@ -13,7 +13,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
 from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
 from clfractal.scene.base import unit
-from clfractal.scene.blends import Blends, blends_of, is_cloudy, is_glass
+from clfractal.scene.blends import Blends, blends_of, has_skin, is_cloudy, is_glass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.model import Scene
@@ -230,25 +230,38 @@ def has_glass(scene: Scene) -> bool:
 
 
 def has_glass_set(scene: Scene) -> bool:
-    """Whether paths go through the set."""
-    return bool(glass_bodies(scene)[0])
+    """Whether paths go through the set, or into a part that is joined to it."""
+    bodies = glass_bodies(scene)
+    joined = [
+        through for name, through in zip(scene.objects, bodies[1:], strict=True) if name in scene.joined
+    ]
+    return bodies[0] or any(joined)
 
 
 def has_cloudy_glass(scene: Scene) -> bool:
     """Whether anything that paths go through scatters light on the way."""
-    return has_glass(scene) and any(is_cloudy(each, scene.materials) for each in used_materials(scene))
+    cloudy = any(is_cloudy(each, scene.materials) for each in used_materials(scene))
+    return has_subsurface(scene) or (has_glass(scene) and cloudy)
+
+
+def has_subsurface(scene: Scene) -> bool:
+    """Whether paths go below boundaries and come out elsewhere."""
+    return isinstance(scene.lighting, PathLighting) and any(
+        has_skin(each, scene.materials) for each in used_materials(scene)
+    )
 
 
 def glass_bodies(scene: Scene) -> list[bool]:
-    """Whether paths go through the set, then through each object."""
+    """Whether paths go through the set, or below its boundary; then the same of each object."""
     if not isinstance(scene.lighting, PathLighting):
         return [False] * (1 + len(scene.objects))
-    own, *others = [is_glass(material, scene.materials) for material in used_materials(scene)]
+    known = scene.materials
+    own, *others = [is_glass(each, known) or has_skin(each, known) for each in used_materials(scene)]
     # (A cloud has no material of its own, and not the set's either.)
     named = scene.objects.values()
     return [
         own,
-        *(glass and not isinstance(each, VolumeObject) for glass, each in zip(others, named, strict=True)),
+        *(inside and not isinstance(each, VolumeObject) for inside, each in zip(others, named, strict=True)),
     ]
 
 

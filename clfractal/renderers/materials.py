@@ -50,6 +50,11 @@ PBR = Struct(
         Field("transmission_scatter_anisotropy", "real", 0, "Henyey and Greenstein's g"),
         Field("transmission_dispersion_scale", "real", 0, "0 to 1"),
         Field("transmission_dispersion_abbe_number", "real", 0, "1 or more"),
+        Field("subsurface_weight", "real", 0, "part of the diffuse body that is a medium"),
+        Field("subsurface_color", "real", 3, "what comes out of a thick body"),
+        Field("subsurface_radius", "real", 0, "mean free path, scene units"),
+        Field("subsurface_radius_scale", "real", 3, "factor on that"),
+        Field("subsurface_scatter_anisotropy", "real", 0, "Henyey and Greenstein's g"),
         Field("first_map", "int", 0, "of the parameters that differ from place to place"),
         Field("map_count", "int", 0, ""),
         Field(
@@ -92,6 +97,7 @@ def pbr_text() -> str:
     lines += [
         "    real inside;        // whether the viewer is inside the glass",
         "    real bending_ior;   // the index that bends light, of one colour of it",
+        "    real emerges;       // whether light comes from below the boundary",
         "} pbr;",
         "// `tint`: the colouring's colour.",
     ]
@@ -101,7 +107,15 @@ def pbr_text() -> str:
         own = f"m->base_own ? {read} : tint" if field.name == "base_color" else read
         lines.append(f"    p.{field.name} = {own};")
     return "\n".join(
-        [*lines, "    p.inside = R(0.0);", "    p.bending_ior = p.specular_ior;", "    return p;", "}", ""]
+        [
+            *lines,
+            "    p.inside = R(0.0);",
+            "    p.bending_ior = p.specular_ior;",
+            "    p.emerges = R(0.0);",
+            "    return p;",
+            "}",
+            "",
+        ]
     )
 
 
@@ -145,7 +159,7 @@ def used_materials(scene: Scene) -> list[PbrMaterial]:
 def material_values(material: PbrMaterial) -> dict[str, object]:
     """The fields of a record."""
     values: dict[str, object] = {}
-    for part in ("base", "specular", "coat", "fuzz", "transmission"):
+    for part in ("base", "specular", "coat", "fuzz", "transmission", "subsurface"):
         section = getattr(material, part)
         for name in type(section).model_fields:
             values[f"{part}_{name}"] = getattr(section, name)

@@ -11,9 +11,11 @@ from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.maps import MappedMaterials, glass_bodies
+from clfractal.renderers.materials import used_materials
 from clfractal.renderers.object_grids import NO_GRID, ObjectGrids, grid_defines
 from clfractal.renderers.water import WAVES, wave_set
 from clfractal.scene.base import Vector, frame_of, length
+from clfractal.scene.blends import is_glass
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
@@ -39,7 +41,7 @@ OBJECT = Struct(
     [
         Field("kind", "int", 0, "one of OBJECT_KINDS"),
         Field("material", "int", 0, "the number of its material along paths"),
-        Field("glass", "int", 0, "1: light goes through it along paths"),
+        Field("glass", "int", 0, "along paths 1: light goes through it; 2: only below its boundary"),
         Field("middle", "real", 3, "of a solid; a point of a plane, scene units"),
         Field("own_x", "real", 3, "from scene units to its own ones: of the ball or cube of radius 1,"),
         Field("own_y", "real", 3, "or of a plane, whose own z is its normal"),
@@ -101,18 +103,19 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
     grids = ObjectGrids(scene)
     numbers = MappedMaterials(scene).blends.roots[1:]
     glass = glass_bodies(scene)[1:]
+    through_all = [is_glass(each, scene.materials) for each in used_materials(scene)[1:]]
     rows: list[dict[str, object]] = [
         {
             "material": number,
-            "glass": int(through),
+            "glass": int(through) and (1 if clear else 2),
             **_place(scene, each),
             **_look(scene, each),
             **_asked(radiance),
             "colored": int(_has_color(scene, each)),
             **(grids.fields(name, grids_begin) if isinstance(each, VolumeObject) else NO_GRID),
         }
-        for number, through, radiance, (name, each) in zip(
-            numbers, glass, asked_radiance(scene), scene.objects.items(), strict=True
+        for number, through, clear, radiance, (name, each) in zip(
+            numbers, glass, through_all, asked_radiance(scene), scene.objects.items(), strict=True
         )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
@@ -233,11 +236,18 @@ def phong_of(material: PbrMaterial, color: Vector) -> dict[str, Any]:
     alpha = max(rough**2, 1e-3)
     shininess = min(max(1 / (2 * alpha**2) - 2, 1.0), _LARGEST_EXPONENT)
     highlight = mirrored * (shininess + 2) / 2 if rough > 0 else np.zeros(3)
+    shown, matt = body, weight
+    below = _number(material.subsurface.weight, 0)
+    if below > 0:
+        # What comes out of a medium below the boundary is as bright as a body of its colour.
+        beneath = _color(material.subsurface.color, WHITE)
+        shown = (1 - below) * weight * body + below * beneath
+        matt = 1.0
     return {
-        "color": body,
-        "diffuse": weight * (1 - metal),
+        "color": shown,
+        "diffuse": matt * (1 - metal),
         # Rough metals mirror all that is around: about as a white body of their colour does.
-        "surround": weight * (1 - metal * sharp),
+        "surround": matt * (1 - metal * sharp),
         "specular": highlight,
         "shininess": shininess,
         "sharp": sharp,

@@ -33,6 +33,7 @@ from clfractal.renderers.maps import (
     has_cloudy_glass,
     has_glass,
     has_glass_set,
+    has_subsurface,
     map_defines,
     mapped_materials,
 )
@@ -89,7 +90,7 @@ _PARTS_NUMBERS = 15 + 9
 # Of mattes likewise; and each spot's object.
 _MATTE_NUMBERS = 13
 # And of what a path carries through glass, and more through that which scatters light.
-_GLASS_NUMBERS, _CLOUDY_NUMBERS = 8, 5
+_GLASS_NUMBERS, _CLOUDY_NUMBERS = 8, 7
 
 Floats = npt.NDArray[np.float32]
 
@@ -119,6 +120,15 @@ def searches_far(scene: Scene) -> bool:
     center, radius = scene.bounds
     apart = math.dist(center, scene.chain.center)
     return scene.surface.bounds is not None and apart + radius > scene.chain.radius
+
+
+def inside_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """How rays within a set of glass go on, as far as the text of `kernels/glass.cl` depends on it."""
+    found = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+    if not has_cloudy_glass(scene):
+        return {**found, "HAS_GLASS_SCATTER": 0}
+    # Walks know what paths carry, and what may stand in their way.
+    return {**found, **state_defines(scene, plan), **coloring_defines(Coloring())}
 
 
 def several_points(scene: Scene) -> int:
@@ -184,6 +194,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_GLASS": int(has_glass(scene)),
         "HAS_GLASS_SET": int(has_glass_set(scene)),
         "HAS_GLASS_SCATTER": int(has_cloudy_glass(scene)),
+        **({"HAS_SUBSURFACE": 1} if has_subsurface(scene) else {}),
         "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
         "HAS_GLOW": int(scene.glow is not None),
     }
@@ -354,9 +365,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         ),
     ]
     if has_glass_set(scene):
-        within = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
-        within["HAS_GLASS_SCATTER"] = int(has_cloudy_glass(scene))
-        texts.append(text("glass", "glass.cl", within, *inside_kernels(plan)))
+        texts.append(text("glass", "glass.cl", inside_defines(scene, plan), *inside_kernels(plan)))
     if asks_formula(scene):
         colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))

@@ -131,7 +131,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
             if bounce > 0 and has_glass_set(scene):
-                yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE)
+                yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE, bounce)
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
         if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)
@@ -156,7 +156,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         yield stage("end_paths", 1, bounce=bounces(scene) + 1)
 
 
-def _marched(kernels: tuple[str, ...], turns: int, goal: int) -> Iterator[Stage]:
-    yield Stage(kernels[0], "rays", turns, {"goal": goal})
+def _marched(kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0) -> Iterator[Stage]:
+    yield Stage(kernels[0], "rays", turns, {"goal": goal, "bounce": bounce})
     if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
         yield Stage(kernels[1], "packets of rays", turns)

@@ -94,6 +94,24 @@ class Transmission(Mapped):
         return self
 
 
+class Subsurface(Mapped):
+    """A medium below the boundary, in the place of the diffuse body: skin, wax, marble."""
+
+    weight: FractionMap = Field(0.0, description="part of the diffuse body that light goes into")
+    color: ReflectanceMap = Field(
+        (0.8, 0.8, 0.8), description="what comes out of a thick body in all, linear Rec. 709"
+    )
+    radius: DepthMap = Field(
+        0.1, description="how far light goes between two scatterings, in the mean, scene units"
+    )
+    radius_scale: ReflectanceMap = Field(
+        (1.0, 0.5, 0.25), description="factor on the radius for red, green and blue"
+    )
+    scatter_anisotropy: ForwardMap = Field(
+        0.0, description="where light is sent: 0 all around, 0.99 straight on, below 0 back"
+    )
+
+
 class Emission(Mapped):
     """Light of the material's own."""
 
@@ -139,6 +157,11 @@ class PbrMaterial(Mapped):
     transmission: Transmission = Field(
         default_factory=dict, validate_default=True, description="glass in the place of the diffuse body"
     )
+    subsurface: Subsurface = Field(
+        default_factory=dict,
+        validate_default=True,
+        description="a medium below the boundary, in the place of the diffuse body",
+    )
     emission: Emission = Field(
         default_factory=dict, validate_default=True, description="light of the material's own"
     )
@@ -159,7 +182,7 @@ class PbrMaterial(Mapped):
             if self.mask != 0.5:
                 raise problem("applies to a blend of two materials", "mask")
             return self
-        for name in ("base", "specular", "coat", "fuzz", "transmission", "emission", "bump"):
+        for name in ("base", "specular", "coat", "fuzz", "transmission", "subsurface", "emission", "bump"):
             given = getattr(self, name)
             if given != type(given)():
                 raise problem("cannot be combined with blend: a blend takes its layers from others", name)

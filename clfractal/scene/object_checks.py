@@ -1,7 +1,7 @@
 """Checks of a scene's objects: their materials, lights in them, and what cannot show them."""
 
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.blends import is_glass
+from clfractal.scene.blends import has_skin, is_glass
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
@@ -69,28 +69,28 @@ def _check_named(scene: Scene) -> None:
 
 
 def _check_opened(scene: Scene) -> None:
-    """Along paths a set of glass has no faces."""
+    """Along paths a set that light goes into has no faces."""
     used = scene.material.name
-    if not isinstance(scene.renderer, SurfaceRenderer) or not _lets_through(scene, used):
+    if not isinstance(scene.renderer, SurfaceRenderer) or not (inside := _inside(scene, used)):
         return
     for number, plane in enumerate(scene.cut_planes):
         if plane.cuts_set:
             raise SceneError(
-                f"cannot open a set of glass, {used!r}, along paths", Where(path=f"cut_planes.{number}.cut")
+                f"cannot open a set of {inside}, {used!r}, along paths",
+                Where(path=f"cut_planes.{number}.cut"),
             )
 
 
 def _check_cut(scene: Scene, name: str, material: str | None) -> None:
-    """Nor has an object of glass that stands beside it."""
-    if not isinstance(scene.renderer, SurfaceRenderer) or not _lets_through(
-        scene, material or scene.material.name
-    ):
+    """Nor has such an object that stands beside it."""
+    inside = _inside(scene, material or scene.material.name)
+    if not isinstance(scene.renderer, SurfaceRenderer) or not inside:
         return
     for number, plane in enumerate(scene.cut_planes):
         if name in plane.cut_objects:
             place = plane.objects.index(name)
             raise SceneError(
-                f"{name!r} is glass, which cannot be cut along paths",
+                f"{name!r} is of {inside}, which cannot be cut along paths",
                 Where(path=f"cut_planes.{number}.objects.{place}"),
             )
 
@@ -159,6 +159,15 @@ def _lets_through(scene: Scene, material: str | None) -> bool:
     return is_glass(scene.materials[material], scene.materials)
 
 
+def _inside(scene: Scene, material: str | None) -> str:
+    """What light goes into along paths: "glass", or what has "subsurface"; "" for all else."""
+    if _lets_through(scene, material):
+        return "glass"
+    paths = isinstance(scene.lighting, PathLighting)
+    skin = paths and material is not None and has_skin(scene.materials[material], scene.materials)
+    return "subsurface" if skin else ""
+
+
 def _check_material(scene: Scene, name: str, material: str | None) -> None:
     where = Where(path=f"objects.{name}.material")
     if material is None or material in scene.materials:
@@ -170,15 +179,18 @@ def _check_material(scene: Scene, name: str, material: str | None) -> None:
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
-    """What is joined is glass as a whole or not, and what differs from place to place is for paths; only surfaces have materials."""
+    """What is joined is glass as a whole or not, and what differs from place to place is for paths.
+
+    Only surfaces have materials.
+    """
     if not isinstance(scene.renderer, SurfaceRenderer):
         return
     used = material if material is not None else scene.material.name
     each = scene.objects[name]
     if used is None or (isinstance(each, VolumeObject) and each.is_cloud):
         return
-    if isinstance(each, VolumeObject) and _lets_through(scene, used):
-        raise SceneError(f"{used!r} is glass, which volumes cannot be; name another material", where)
+    if isinstance(each, VolumeObject) and (inside := _inside(scene, used)):
+        raise SceneError(f"{used!r} is {inside}, which volumes cannot be; name another material", where)
     own = scene.material.name
     if name in scene.joined and used != own:
         if _lets_through(scene, used):
@@ -199,10 +211,10 @@ def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
     """A light in a solid reaches nothing, but where the eye is in it too: then it is a room."""
     if solid.holds(scene.camera.position):
         return
-    glass = _lets_through(scene, solid.material or scene.material.name)
+    inside = _inside(scene, solid.material or scene.material.name)
     opened = [plane for plane in scene.cut_planes if name in plane.cut_objects]
     for index, light in enumerate(scene.lights):
-        if glass and isinstance(light, (SphereLight, RectangleLight)):
+        if inside and isinstance(light, (SphereLight, RectangleLight)):
             continue  # paths find it, since it has a size
         if isinstance(light, PlacedLight) and solid.holds(light.position):
             if any(plane.in_front(light.position) for plane in opened):

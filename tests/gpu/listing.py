@@ -54,6 +54,11 @@ _GLASS = {
     "materials": {"glass": {"transmission": {"weight": 1, "dispersion_scale": 1}}},
     "material": {"name": "glass"},
 }
+_SKIN = {
+    "lighting": {"mode": "path"},
+    "materials": {"skin": {"subsurface": {"weight": 0.8}}},
+    "material": {"name": "skin"},
+}
 _MAPS = {
     "lighting": {"mode": "path"},
     "materials": {
@@ -114,7 +119,13 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
-    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}, "glass": _GLASS, "maps": _MAPS},
+    "lighting": {
+        "": {},
+        "path": {"lighting": {"mode": "path"}},
+        "glass": _GLASS,
+        "skin": _SKIN,
+        "maps": _MAPS,
+    },
     "objects": {
         "": {},
         "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
@@ -178,12 +189,15 @@ _APART = {
     # Each sample of a path finds a spot of its own.
     *(
         frozenset({("lighting", light), ("points", name)})
-        for light in ("path", "glass", "maps")
+        for light in ("path", "glass", "skin", "maps")
         for name in _SURFACE["points"]
         if name
     ),
-    *(frozenset({("lighting", light), ("coloring", "residual")}) for light in ("path", "glass", "maps")),
-    frozenset({("lighting", "glass"), ("planes", "cut")}),
+    *(
+        frozenset({("lighting", light), ("coloring", "residual")})
+        for light in ("path", "glass", "skin", "maps")
+    ),
+    *(frozenset({("lighting", light), ("planes", "cut")}) for light in ("glass", "skin")),
     # These have planes of their own.
     *(frozenset({("objects", "opened"), ("planes", name)}) for name in ("planes", "cut")),
     *(frozenset({("objects", "joined"), ("planes", name)}) for name in ("planes", "cut")),

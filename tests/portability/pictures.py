@@ -54,12 +54,14 @@ _SCENES: dict[str, str] = {
     "counted": "{name: hast, iterations: 9}",
     "plane": "{name: hast, iterations: 60}",
     "glass": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
+    "skin": "{name: quaternion_julia, iterations: 9, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "inside": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
     "coverage": "{name: quaternion_julia, iterations: 11, julia: [-0.2, 0.68, 0.2, 0.1]}",
 }
 _RENDERERS = {
     "paths": "{samples: 3, filter: tent}",
     "glass": "{samples: 4}",
+    "skin": "{samples: 4}",
     "still": "{samples: 2, points: {}, normal: least_squares, ambient_occlusion: {rays: 2}, bounces: 1,"
     " filter: tent}",
     "steps": "{samples: 2, search: steps, points: {pattern: stochastic, count: 4}, filter: blackman_harris}",
@@ -100,6 +102,11 @@ _MORE = {
     " scatter: [0.5, 0.6, 0.8], scatter_anisotropy: 0.4}}}\nmaterial: {name: glass}\n"
     "objects: {sea: {type: water, position: [0, 0, -0.7], material: sea}, floor: {type: plane, position: [0, 0, -1.2]},"
     " ball: {position: [0.5, -0.7, -0.4], radius: 0.5, material: glass}}\n",
+    "skin": "lighting: {mode: path, bounces: 4}\nbackground: {top: [1, 1, 1], bottom: [0.5, 0.4, 0.3]}\n"
+    "materials: {skin: {coat: {weight: 0.2}, subsurface: {weight: 0.8, color: [0.9, 0.6, 0.4], radius: 0.2}}}\n"
+    "material: {name: skin}\n"
+    "objects: {drop: {type: sphere, join: smooth_union, position: [0.6, -0.7, 0.2], radius: 0.3, material: skin},"
+    " egg: {type: sphere, position: [-0.8, -0.9, 0.5], radius: 0.3, scale: [1, 0.7, 1.2], material: skin}}\n",
     "joined": "coloring: {by: trap, scale: 1, palette: opal}\n"
     "objects: {hole: {type: sphere, position: [0.3, -0.8, 0.3], radius: 0.4, join: cut},"
     " drop: {type: box, join: smooth_union, position: [-0.7, -0.6, 0.6], size: [0.4, 0.3, 0.5]},"
@@ -129,6 +136,7 @@ _BRIEF = (
     "still",
     "paths",
     "glass",
+    "skin",
     "steps",
     "joined",
     "volumes",

@@ -125,7 +125,7 @@ CASES = [
     (
         "materials: {ice: {transmission: {weight: 1}}}\nlighting: {mode: path}\n"
         "objects: {a: {}, b: {material: ice}}\ncut_planes: [{cut: true, objects: [a, §b]}]",
-        "cut_planes.0.objects.1: 'b' is glass, which cannot be cut along paths",
+        "cut_planes.0.objects.1: 'b' is of glass, which cannot be cut along paths",
     ),
     ("cut_planes: [{set: §1}]", "cut_planes.0.set: must be true or false, got 1"),
     (
