@@ -87,8 +87,8 @@ INLINE real water_met(__global const struct Object *o, vec from, vec way, real f
     mask crossed = active & ~active;
     for (int step = 0; step < WATER_STEPS; ++step) {
         real height = from.z + t * way.z - water_height(o, from.x + t * way.x, from.y + t * way.y, way, &change);
-        // Above the water or below: as the ray begins.
-        if (step == 0) side = pick(less(height, R(0.0)), R(-1.0), R(1.0));
+        // Above the water or below: as the ray begins. (At the rim of the waves, where it enters them, a rounded height may lie.)
+        if (step == 0) side = pick(less(pick(less(R(0.0), begin), from.z, height), R(0.0)), R(-1.0), R(1.0));
         height *= side;
         const mask here = active & less_equal(height, R(0.0));
         crossed |= here;

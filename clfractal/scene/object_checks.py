@@ -179,10 +179,7 @@ def _check_material(scene: Scene, name: str, material: str | None) -> None:
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
-    """What is joined is glass as a whole or not, and what differs from place to place is for paths.
-
-    Only surfaces have materials.
-    """
+    """What is joined is glass as a whole or not; what differs from place to place is for paths; only surfaces have it."""
     if not isinstance(scene.renderer, SurfaceRenderer):
         return
     used = material if material is not None else scene.material.name
@@ -195,8 +192,7 @@ def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> 
     if name in scene.joined and used != own:
         if _lets_through(scene, used):
             raise SceneError(
-                f"{used!r} is glass, which formulas and what is joined can be only with all of the set:"
-                " by material.name",
+                f"{used!r} is glass, which formulas and what is joined can be only with all of the set",
                 where,
             )
         if own in scene.materials and _lets_through(scene, own):

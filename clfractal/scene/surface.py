@@ -56,7 +56,8 @@ class SurfaceRenderer(Sampled):
     )
     step: Length | None = Field(
         None,
-        description="step for `search: steps` and of ways through glass, scene units; null: 1/100 of the bounds' radius",
+        description="step for `search: steps`, of ways through glass and in hollows, scene units;"
+        " null: 1/100 of the bounds' radius",
     )
     points: Points | None = Field(
         None, description="points of a pixel; null: one in its middle, or 3 x 3 where `normal` needs them"

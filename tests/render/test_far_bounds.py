@@ -35,7 +35,10 @@ def scene_of(formula: dict[str, Any], far: float, bounds: float | None) -> Scene
     toward = np.array([0.5, -1, 0.4]) / np.linalg.norm([0.5, -1, 0.4])
     renderer: dict[str, Any] = {"type": "surface", "step": radius / 100}
     if bounds is not None:
-        renderer["bounds"] = {"center": [*(center + [0, 0.1 * radius, 0])], "radius": bounds * radius}
+        renderer["bounds"] = {
+            "center": (center + np.array([0, 0.1 * radius, 0])).tolist(),
+            "radius": bounds * radius,
+        }
     camera = {
         "position": [*(center + far * radius * toward)],
         "target": [*center],
