@@ -15,7 +15,7 @@ STAGE(scatter_paths) {
     carried with = path_carries(s, &here.at, &so_far, arrived.origin, w);
     mask scatters;
     const mask lands = path_arrives(s, &so_far, &with, &found, arrived, a.y, &scatters, w);
-#if HAS_GLASS_SCATTER && HAS_OBJECTS
+#if HAS_GLASS_SCATTER
     const path flown = so_far;
     const carried within = with;
 #endif
@@ -71,9 +71,7 @@ STAGE(scatter_paths) {
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
     walk_seeded(s, &here.at, &with, w);
-#if HAS_OBJECTS
     path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, scatters, w);
-#endif
 #endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
