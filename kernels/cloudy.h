@@ -58,9 +58,12 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
     }
 }
 
-// Follows paths that a medium `scatters` on their way: what they were when they arrived is `flown` and `within`.
+#endif
+
+// Follows paths that an object's medium `scatters` on their way: what they were when they arrived is `flown` and `within`.
 INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, carried *with, path flown, carried within, ray arrived,
                                mask scatters, world w) {
+#if HAS_OBJECTS
     if (!any_lane(scatters)) return;
     flown.origin = arrived.origin;
     flown.direction = arrived.direction;
@@ -71,5 +74,5 @@ INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, c
     path_scatters(s, at, &flown, &within, scatters, w);
     *so_far = path_pick(scatters, flown, *so_far);
     *with = carried_pick(scatters, within, *with);
-}
 #endif
+}

@@ -8,7 +8,7 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
     unit_square((bits)((uint)s.sample), seed, u, v);
 }
 
-#if HAS_OBJECTS && (HAS_GLASS_SCATTER || HAS_CLOUDS)
+#if HAS_GLASS_SCATTER || HAS_CLOUDS
 // Of lanes `here` one path, of the others another; likewise what they carry.
 INLINE path path_pick(mask here, path yes, path no) {
     for (int i = 0; i < NUMBERS_OF(path); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);

@@ -16,7 +16,7 @@ STAGE(scatter_paths) {
     scatterer by;
     const mask lands = path_arrives(s, &here.at, &so_far, &with, &found, arrived, a.y, &by, w);
     mask asking = lands;
-#if HAS_OBJECTS && (HAS_GLASS_SCATTER || HAS_CLOUDS)
+#if HAS_GLASS_SCATTER || HAS_CLOUDS
     const path flown = so_far;
     const carried within = with;
 #endif
@@ -75,14 +75,11 @@ STAGE(scatter_paths) {
 #if HAS_GLASS_SCATTER
     path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, lands, w);
     walk_seeded(s, &here.at, &with, w);
-#if HAS_OBJECTS
     path_was_scattered(s, &here.at, &so_far, &with, flown, within, arrived, by.glass, w);
-#endif
 #endif
 #if HAS_CLOUDS
     path_in_cloud(s, &here.at, &so_far, &with, flown, within, arrived, &by.cloud, &asks, by.cloud.met, w);
     asking |= by.cloud.met;
-#endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
     if (bounce == 1) glance_once(s, so_far.seen);
