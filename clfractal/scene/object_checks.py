@@ -101,7 +101,7 @@ def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> 
     if name in scene.joined and used != own:
         if _lets_through(scene, used):
             raise SceneError(
-                f"{used!r} is glass, which formulas and what is joined can be only with all of the set"
+                f"{used!r} is glass, which formulas and what is joined can be only with all of the set",
                 where,
             )
         if own in scene.materials and _lets_through(scene, own):
