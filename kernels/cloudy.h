@@ -57,7 +57,6 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
         path_sets_out(s, at, so_far, with, PURPOSE_FLIGHT + NEXT_BOUNCE + more, here, w);
     }
 }
-
 #endif
 
 // Follows paths that an object's medium `scatters` on their way: what they were when they arrived is `flown` and `within`.

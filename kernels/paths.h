@@ -80,6 +80,7 @@ STAGE(scatter_paths) {
 #if HAS_CLOUDS
     path_in_cloud(s, &here.at, &so_far, &with, flown, within, arrived, &by.cloud, &asks, by.cloud.met, w);
     asking |= by.cloud.met;
+#endif
 #if HAS_PARTS
     if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
     if (bounce == 1) glance_once(s, so_far.seen);
