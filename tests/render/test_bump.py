@@ -19,6 +19,7 @@ from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from tests.render.test_maps import BULB, ramp
 from tests.render.test_paths import GREY, path, scene_of, seen
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -91,7 +92,7 @@ HEIGHTS: dict[str, tuple[dict[str, Any], Callable[[dict[str, Floats]], Floats]]]
 
 
 @pytest.mark.parametrize("by", HEIGHTS)
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_normals_are_those_of_the_displaced_ball(by: str, precision: str) -> None:
     if precision == "float64" and not has_float64(choose().info):
         pytest.skip("the device has no float64")
@@ -354,7 +355,7 @@ def test_normals_face_the_viewer() -> None:
     assert np.allclose(np.linalg.norm(found["normal"], axis=-1), 1, atol=1e-5)
 
 
-@pytest.mark.parametrize("lanes", [4, 8, 16])
+@pytest.mark.parametrize("lanes", one_of(16, 4, 8))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
         pytest.skip("the device has no such packets")

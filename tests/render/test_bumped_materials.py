@@ -12,6 +12,7 @@ import pytest
 from clfractal.scene.materials import PbrMaterial
 from tests.render.material_kernel import NORMAL, ask, turned
 from tests.render.test_materials import LOBES, NO_GLOSS, hemisphere, material, toward
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -41,7 +42,7 @@ def reflected(values: PbrMaterial, cosine: float, leans: Floats, **options: Any)
     return np.asarray(weights.sum(axis=0) / len(places))
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("lobe", ["lambert", "gloss", "rough metal", "all"])
 def test_a_white_furnace_stays_white(lobe: str, precision: Any) -> None:
     """However steep the relief is, as long as it faces the viewer."""
@@ -140,7 +141,7 @@ def test_light_fades_towards_the_horizon() -> None:
     assert found[0] < 1e-3
 
 
-@pytest.mark.parametrize("lanes", [4, 8, 16])
+@pytest.mark.parametrize("lanes", one_of(16, 4, 8))
 def test_lanes_do_not_matter(lanes: int) -> None:
     places = numbers(64)
     random = np.random.default_rng(2)

@@ -18,6 +18,7 @@ from clfractal.renderers.surface import program_texts
 from tests.render.test_glass_objects import BODIES, colors_of, glass, scene
 from tests.render.test_glass_paths import ball
 from tests.render.test_paths import BLACK, path, scene_of, seen
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def test_what_stands_in_milk_before_white_is_not_seen() -> None:
         assert abs(colors.mean() - 1) < 0.015
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_light_that_is_not_scattered_obeys_beer_and_lambert(precision: str) -> None:
     """A small lamp behind a slab that bends nothing, of a medium whose colours differ. (Next to nothing is scattered.)"""
     color, depth, width = np.array([0.7, 0.4, 0.2]), 0.8, 1.2
@@ -147,7 +148,7 @@ def test_the_eye_in_milk_sees_milk() -> None:
     assert film["object"][0, 0] > 0
 
 
-@pytest.mark.parametrize("lanes", [4, 16])
+@pytest.mark.parametrize("lanes", one_of(16, 4))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
         pytest.skip("the device has no such packets")

@@ -22,6 +22,7 @@ from clfractal.renderers.surface import coloring_defines
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of
 from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, PERSPECTIVE, SOLIDS, scene_of
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -168,7 +169,7 @@ MIRRORED = VIEWS - 2 * (VIEWS * NORMALS).sum(1, keepdims=True) * NORMALS
 WAYS_OUT = {"normal": NORMALS, "view": -VIEWS, "reflection": MIRRORED}
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("along", ["normal", "view"])
 def test_thickness_of_a_ball(along: str, precision: Precision) -> None:
     precision = usable(precision)

@@ -13,6 +13,7 @@ from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
+from tests.variants import one_of
 
 ALBEDO = ("albedo.R", "albedo.G", "albedo.B")
 CHANNELS = (
@@ -193,7 +194,7 @@ def test_a_white_cut_model_in_a_white_sky_is_white(device: Device) -> None:
 
 @pytest.mark.combination
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_packets_and_single_lanes_see_the_same(device: Device, mode: str, precision: Any) -> None:
     if precision == "float64" and not has_float64(device.info):
         pytest.skip("the device has no float64")

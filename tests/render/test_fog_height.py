@@ -20,6 +20,7 @@ from tests.render.shots import (
     stacked,
     to_sphere,
 )
+from tests.variants import one_of
 
 SIDE = 48
 RED, MIST, SKY = np.array([0.8, 0.1, 0.1]), np.array([0.3, 0.4, 0.6]), np.array([0.1, 0.6, 0.1])
@@ -56,7 +57,7 @@ CASES: list[dict[str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("values", CASES)
 def test_what_comes_through_is_the_integral(device: Device, values: dict[str, Any], precision: str) -> None:
     scene = scene_with(precision, **values)

@@ -14,6 +14,7 @@ from clfractal.renderers.glass import fresnel_across, seen_colors, wavelengths
 from clfractal.scene.materials import PbrMaterial
 from tests.render.material_kernel import NORMAL, ask, turned
 from tests.render.test_materials import COSINES, numbers, toward
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -158,8 +159,8 @@ def test_all_is_reflected_beyond_the_critical_angle() -> None:
     assert (found.chosen @ NORMAL > 0).all()
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
-@pytest.mark.parametrize("lanes", [4, 16])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
+@pytest.mark.parametrize("lanes", one_of(16, 4))
 def test_lanes_do_not_matter(lanes: int, precision: Any) -> None:
     places = numbers(64)
     random = np.random.default_rng(2)

@@ -16,6 +16,7 @@ from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.render.test_paths import BALL, GREY, path, scene_of
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -106,7 +107,7 @@ def test_a_white_ground_under_water_before_white_is_not_seen() -> None:
         assert abs(colors.mean() - 1) < 0.01
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_media_absorb_along_the_way(precision: str) -> None:
     """Glass that bends nothing: a slab leaves what Beer and Lambert's law says, also with the eye in it."""
     color, depth = np.array([0.9, 0.5, 0.1]), 0.8

@@ -17,6 +17,7 @@ from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.portability.pictures import picture
 from tests.render.test_paths import BALL, GREY, path, scene_of, seen
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -59,7 +60,7 @@ def test_sets_of_glass_keep_light(formula: dict[str, Any], search: str) -> None:
     assert abs(colors.mean() - 1) < (0.03 if formula["name"] == "hast" else 0.01)
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_media_absorb_along_the_chord(precision: str) -> None:
     """Glass that bends nothing: pixels have what Beer and Lambert's law leaves of white on a chord of the ball."""
     color, depth = np.array([0.9, 0.5, 0.1]), 0.8

@@ -12,6 +12,7 @@ from clfractal.formulas import reference
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
+from tests.variants import one_of
 from tests.voxels.joined import EVERY_JOIN, belongs, held_by, own_places
 
 SIDE = 96
@@ -134,7 +135,7 @@ def test_a_named_object_keeps_its_colour_behind_the_plane() -> None:
     assert not ((film["P.Y"] < -0.01) & (film["P.X"] > 1.1) & (film["A"] == 1)).any(), "half of it is gone"
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_a_picture_of_the_plane_alone(precision: str) -> None:
     place = {"center": [0, 0.1, 0], "normal": [0, -1, 0], "width": 4, "height": 4}
     renderer = {"type": "cut_plane", "plane": place, "colors": {"mode": "stepped"}, "iterations": 9}

@@ -19,6 +19,7 @@ from clfractal.renderers.passes import kept_numbers
 from clfractal.scene.model import Scene
 from tests.render.shots import plan_of, repeated
 from tests.render.test_paths import BLACK, path, scene_of
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def light(film: Film) -> Floats:
     return layer(film, "emission") + layer(film, "direct") + layer(film, "indirect")
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("formula", [None, HOLLOW])
 def test_the_layers_of_light_are_the_picture(formula: dict[str, Any] | None, precision: str) -> None:
     """To rounding, in every pixel, where nothing else is in the picture."""

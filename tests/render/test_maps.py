@@ -21,6 +21,7 @@ from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.work.prepare import prepare
 from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -139,7 +140,7 @@ def test_the_formula_is_asked() -> None:
         assert np.abs(colors - expected).max() < tolerance, by
 
 
-@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
+@pytest.mark.parametrize("lanes", one_of(16, 1, 4, 8))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
         pytest.skip("the device has no such packets")

@@ -12,6 +12,7 @@ import pytest
 from clfractal.renderers.scattering import albedo_tables, fresnel
 from clfractal.scene.materials import PbrMaterial
 from tests.render.material_kernel import ask, turned
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -70,7 +71,7 @@ def numbers(count: int) -> Floats:
     return np.asarray(np.clip(qmc.Sobol(3, seed=5).random(count), 1e-6, 1 - 1e-6))
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("lobe", LOBES)
 def test_a_white_furnace_stays_white(lobe: str, precision: Any) -> None:
     """Sampled: the mean of value over density is what is reflected in all."""
@@ -136,7 +137,7 @@ def test_samples_follow_their_density() -> None:
     assert statistic < chi2.ppf(0.9999, int(usual.sum()))
 
 
-@pytest.mark.parametrize("lanes", [1, 4, 8, 16])
+@pytest.mark.parametrize("lanes", one_of(16, 1, 4, 8))
 def test_lanes_do_not_matter(lanes: int) -> None:
     places = numbers(64)
     random = np.random.default_rng(2)

@@ -22,6 +22,7 @@ from clfractal.renderers.mattes import bits_of, identifier, murmur3, ranked
 from clfractal.renderers.surface import program_texts
 from tests.render.shots import plan_of, repeated
 from tests.render.test_paths import path, scene_of
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def lens(radius: float, other: float, apart: float) -> float:
 
 
 @pytest.mark.parametrize("lighting", [{}, path(1)])
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_areas_of_things(lighting: dict[str, Any], precision: str) -> None:
     channels = ["A", *MATTES]
     film = clfractal.render(scene_of(**SECTIONS, lighting=lighting), channels=channels, precision=precision)

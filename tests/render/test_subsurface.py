@@ -21,6 +21,7 @@ from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.render.test_glass_objects import BODIES, colors_of, scene
 from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -185,7 +186,7 @@ def test_what_stands_in_skin_keeps_light() -> None:
 
 
 @pytest.mark.combination
-@pytest.mark.parametrize("lanes", [4, 16])
+@pytest.mark.parametrize("lanes", one_of(16, 4))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
         pytest.skip("the device has no such packets")
