@@ -203,6 +203,9 @@ _APART = {
     *(frozenset({("objects", "joined"), ("planes", name)}) for name in ("planes", "cut")),
     frozenset({("objects", "joined"), ("lighting", "glass")}),
     frozenset({("objects", "clouds"), ("lighting", "")}),
+    # So they have neither points nor a plane through them.
+    frozenset({("objects", "clouds"), ("coloring", "residual")}),
+    *(frozenset({("objects", "clouds"), ("points", name)}) for name in _SURFACE["points"] if name),
     frozenset({("objects", "clouds"), ("fog", "shafts")}),
 }
 _OF_MEDIA = {
