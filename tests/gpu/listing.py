@@ -98,6 +98,7 @@ _JOINED = {
     "hole": {"type": "sphere", "join": "cut"},
     "drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"},
     "other": {"type": "formula", "formula": {"name": "hast"}, "position": [3, 0, 0]},
+    "mould": {"type": "formula", "formula": {"name": "hast"}, "position": [0, -1, 0], "join": "cut"},
 }
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},

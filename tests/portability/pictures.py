@@ -111,7 +111,9 @@ _MORE = {
     "objects: {hole: {type: sphere, position: [0.3, -0.8, 0.3], radius: 0.4, join: cut},"
     " drop: {type: box, join: smooth_union, position: [-0.7, -0.6, 0.6], size: [0.4, 0.3, 0.5]},"
     " other: {type: formula, position: [0.9, -0.3, -0.4], scale: 0.05, formula: {name: mandelbox, iterations: 8}},"
-    " slab: {type: plane, position: [0, 0, 0.9], join: intersection}}\n"
+    " slab: {type: plane, position: [0, 0, 0.9], join: intersection},"
+    " mould: {type: formula, position: [-0.2, -0.9, -0.3], scale: 0.06, formula: {name: mandelbox, iterations: 8},"
+    " join: cut}}\n"
     "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, cut: true, opacity: 0.6}]\n",
     "volumes": "lighting: {mode: path, bounces: 3}\n"
     "objects: {core: {type: volume, file: ball.npy, level: 90, size: 0.9, position: [0.5, -0.9, 0.2]},"

@@ -132,7 +132,7 @@ def test_a_formula_beside_the_set_is_edited() -> None:
     assert ui.studio.edit({f"{path}.formula.parameters.power": 5.0, f"{path}.join": "smooth_union"})
     assert ui.studio.scene.joined_chains["formula"].first.values["power"] == 5
     Stage(ui, scene_dock.draw, window=False)
-    assert not ui.studio.edit({f"{path}.join": "cut"})
+    assert ui.studio.edit({f"{path}.join": "cut"})
     assert ui.studio.edit({f"{path}.formula": {"name": "hast", "iterations": 9}})
     assert renderer.switch(ui, "volume")
     assert list(ui.studio.scene.joined) == ["formula"]
