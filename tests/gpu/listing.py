@@ -100,23 +100,20 @@ _JOINED = {
     "other": {"type": "formula", "formula": {"name": "hast"}, "position": [3, 0, 0]},
     "mould": {"type": "formula", "formula": {"name": "hast"}, "position": [0, -1, 0], "join": "cut"},
 }
+# Of features whose code is a part of another one's only the other is here: a sky has a map, shafts of light have fog, lamps
+# with a shape are soft. Each program takes several compilers.
 _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
         "solid": {},
-        "normal": {"coloring": {"by": "normal"}},
         "iterations": {"coloring": {"by": "iterations"}},
         "residual": {"coloring": {"by": "residual"}},
         "thickness": {"coloring": {"by": "thickness", "along": "view"}},
-        "layer": {"coloring": {"by": "layer_distance", "along": "reflection"}},
         "trap": {"coloring": {"by": "trap", "trap": {"shape": "sphere"}}},
     },
     "points": {
         "": {},
         "grid": {"renderer": {"points": {"count": 9}}},
-        "stochastic": {"renderer": {"points": {"pattern": "stochastic", "count": 4}}},
-        "triangle": {"renderer": {"normal": "one_triangle"}},
-        "shading": {"renderer": {"normal": "eight_triangles_shading"}},
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
@@ -130,9 +127,12 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "objects": {
         "": {},
         "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
-        "shining": {"objects": _LAMPS, "materials": {"glow": {"emission": {"luminance": 5}}}},
         "joined": {"objects": _JOINED},
-        "grids": {"objects": _GRIDS, "materials": {"wood": {}}},
+        # Beside them objects that shine.
+        "grids": {
+            "objects": {**_GRIDS, **_LAMPS},
+            "materials": {"wood": {}, "glow": {"emission": {"luminance": 5}}},
+        },
         "clouds": {"objects": _CLOUDS, "materials": {"wood": {}}},
         "opened": {
             "objects": _OBJECTS,
@@ -144,17 +144,14 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
     "environment": {
         "": {},
-        "map": {"environment": {"name": "studio", "rays": 2}},
         "sky": {"environment": {"sky": {}, "rays": 2}},
     },
     "light": {
         "": {},
-        "soft": {"lights": [{"type": "directional", "direction": [1, 1, -1], "angular_size": 5}]},
         "shapes": {"lights": _SHAPES},
     },
     "fog": {
         "": {},
-        "fog": {"fog": {"density": 0.05}},
         "shafts": {"fog": {"density": 0.05, "height": 2, "scattering": {}}},
         "glow": {"glow": {"by": "trap"}},
     },
