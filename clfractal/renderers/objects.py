@@ -200,17 +200,19 @@ def phong_of(material: PbrMaterial, color: Vector) -> dict[str, Any]:
     alpha = max(rough**2, 1e-3)
     shininess = min(max(1 / (2 * alpha**2) - 2, 1.0), _LARGEST_EXPONENT)
     highlight = mirrored * (shininess + 2) / 2 if rough > 0 else np.zeros(3)
-    color, matt = body, weight
+    shown, matt = body, weight
     below = _number(material.subsurface.weight, 0)
     if below > 0:
         # What comes out of a medium below the boundary is as bright as a body of its colour.
-        color = (1 - below) * weight * body + below * _color(material.subsurface.color, body)
+        inner = material.subsurface.color
+        shown = body * ((1 - below) * weight)
+        shown = shown + below * (body if isinstance(inner, Map) else np.array(inner, np.float64))
         matt = 1.0
     return {
-        "color": color,
+        "color": shown,
         "diffuse": matt * (1 - metal),
         # Rough metals mirror all that is around: about as a white body of their colour does.
-        "surround": weight * (1 - metal * sharp),
+        "surround": matt * (1 - metal * sharp),
         "specular": highlight,
         "shininess": shininess,
         "sharp": sharp,
