@@ -16,22 +16,16 @@ STAGE(scatter_paths) {
     scatterer by;
     const mask lands = path_arrives(s, &here.at, &so_far, &with, &found, arrived, a.y, &by, w);
     mask asking = lands;
-#if HAS_GLASS_SCATTER || HAS_CLOUDS
     const path flown = so_far;
     const carried within = with;
-#endif
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
     const mask emerges = path_comes_out(bounce, &with, &found, lands, w);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
-#if HAS_PARTS
     color reflects = color_of(R(1.0), R(1.0), R(1.0));
-#endif
     if (any_lane(lands)) {
-#if !COLORING_PER_POINT
-        found.tint = tint_of(&found, w);
-#endif
+        if (!COLORING_PER_POINT) found.tint = tint_of(&found, w);
         pbr p = pbr_of_spot(s, &found, w);
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS
@@ -45,9 +39,7 @@ STAGE(scatter_paths) {
 #endif
         p.emerges = number_of(emerges);
         spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows & ~emerges, w);
-#if HAS_PARTS
-        reflects = pbr_albedo(&p, w.albedos);
-#endif
+        if (HAS_PARTS) reflects = pbr_albedo(&p, w.albedos);
         const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_pick(emerges, found.normal, vec_scale(arrived.direction, R(-1.0))), &shading, w);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
         with.total = weight_of_all(so_far.origin, OBJECT_OF(found), w);

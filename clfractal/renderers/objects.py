@@ -240,7 +240,8 @@ def phong_of(material: PbrMaterial, color: Vector) -> dict[str, Any]:
     below = _number(material.subsurface.weight, 0)
     if below > 0:
         # What comes out of a medium below the boundary is as bright as a body of its colour.
-        beneath = _color(material.subsurface.color, WHITE)
+        inner = material.subsurface.color
+        beneath = body if isinstance(inner, Map) else np.array(inner, np.float64)
         shown = (1 - below) * weight * body + below * beneath
         matt = 1.0
     return {
