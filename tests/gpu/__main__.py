@@ -35,6 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     chosen = listing.unlike(listing.everything() if asked.all or asked.record else listing.paired())
     programs = [each for each in chosen if any(fnmatch.fnmatch(each.name, name) for name in asked.only)]
+    if asked.known:
+        recorded = {name.split(" | ")[0] for name in known.figures}
+        fresh = [each.name for each in programs if each.name not in recorded]
+        programs = [each for each in programs if each.name in recorded]
+        print(
+            f"{len(fresh)} programs are not on record yet; make gpu-check ARGUMENTS=--record puts them there"
+        )
     if not programs:
         return _wrong(f"no program is called {' or '.join(asked.only)}")
     print(f"{len(programs)} programs with {_said(found.versions)}", flush=True)
@@ -62,6 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _asked(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="make gpu-check", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--all", action="store_true", help="every program, not only each pair of features")
+    parser.add_argument("--known", action="store_true", help="only programs that are on record")
     parser.add_argument("--record", action="store_true", help="compile all, and put the figures on record")
     parser.add_argument(
         "--only", nargs="+", default=["*"], metavar="NAME", help="programs of such names: 'march *'"
