@@ -106,14 +106,18 @@ _SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
     "coloring": {
         "solid": {},
+        "normal": {"coloring": {"by": "normal"}},
         "iterations": {"coloring": {"by": "iterations"}},
         "residual": {"coloring": {"by": "residual"}},
         "thickness": {"coloring": {"by": "thickness", "along": "view"}},
+        "layer": {"coloring": {"by": "layer_distance", "along": "reflection"}},
         "trap": {"coloring": {"by": "trap", "trap": {"shape": "sphere"}}},
     },
     "points": {
         "": {},
         "grid": {"renderer": {"points": {"count": 9}}},
+        "triangle": {"renderer": {"normal": "one_triangle"}},
+        "shading": {"renderer": {"normal": "eight_triangles_shading"}},
         "eight": {"renderer": {"normal": "eight_triangles_normal"}},
         "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
     },
