@@ -53,7 +53,7 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
         const mask dark = here & ~less(R(0.0), brightest(so_far->through));
         so_far->on_path = pick(dark, R(0.0), so_far->on_path);
         here &= ~dark;
-        if (s.bounce + turn >= w.settings->roulette) here = path_survives(so_far, roulette, R(1.0), R(0.95), here);
+        if (s.bounce + turn >= w.settings->roulette) here = path_survives(so_far, roulette, here);
         path_sets_out(s, at, so_far, with, PURPOSE_FLIGHT + NEXT_BOUNCE + more, here, w);
     }
 }

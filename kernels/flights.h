@@ -56,9 +56,9 @@ INLINE void path_turns(path *so_far, const carried *with, real u, real v, mask h
 }
 
 // Ends paths within a medium by chance that bring little light, the others bring more for them (Arvo and Kirk 1990); the result says
-// which go on. What is above `share` of a whole path's light stays with the probability `most`.
-INLINE mask path_survives(path *so_far, real chance, real share, real most, mask here) {
-    const real stays = fmin(brightest(so_far->through) / share, most);
+// which go on. All that bring more than a quarter do: where nothing is absorbed, any chance of an end would only be noise.
+INLINE mask path_survives(path *so_far, real chance, mask here) {
+    const real stays = fmin(R(4.0) * brightest(so_far->through), R(1.0));
     const mask goes_on = less(R(0.0), stays) & less(chance, stays);
     so_far->through = color_pick(here & goes_on, color_scale(so_far->through, R(1.0) / fmax(stays, (real)(REAL_SMALLEST))), so_far->through);
     so_far->on_path = pick(here, number_of(goes_on), so_far->on_path);

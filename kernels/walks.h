@@ -72,7 +72,7 @@ INLINE void walk_scatters(march *m, walk *a, mask here, int bounce, world w) {
     a->scatterings += pick(here, R(1.0), R(0.0));
     const real chance = walk_number(a, here);
     const mask asked = here & less_equal((real)((scalar)w.settings->roulette), a->scatterings + (real)((scalar)bounce));
-    const mask ends = asked & ~path_survives(&a->so_far, chance, R(0.25), R(1.0), asked);
+    const mask ends = asked & ~path_survives(&a->so_far, chance, asked);
     m->active &= ~ends;
     here &= ~ends;
     const mask enough = here & less_equal((real)((scalar)MOST_SCATTERINGS), a->scatterings);
