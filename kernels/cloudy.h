@@ -53,6 +53,9 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
         path_square(s, at, PURPOSE_SCATTER + more, w, &u, &v);
         path_turns(so_far, with, u, v, here);
         path_square(s, at, PURPOSE_CHOICES + more, w, &choice, &roulette);
+        const mask dark = here & ~less(R(0.0), brightest(so_far->through));
+        so_far->on_path = pick(dark, R(0.0), so_far->on_path);
+        here &= ~dark;
         if (s.bounce + turn >= w.settings->roulette) here = path_survives(so_far, roulette, here);
         path_sets_out(s, at, so_far, with, PURPOSE_FLIGHT + NEXT_BOUNCE + more, here, w);
     }

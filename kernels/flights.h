@@ -56,7 +56,7 @@ INLINE void path_turns(path *so_far, const carried *with, real u, real v, mask h
 }
 
 // Ends paths within a medium by chance that bring little light, the others bring more for them (Arvo and Kirk 1990); the result says
-// which go on.
+// which go on. All that bring more than a quarter do: where nothing is absorbed, any chance of an end would only be noise.
 INLINE mask path_survives(path *so_far, real chance, mask here) {
     const real stays = fmin(R(4.0) * brightest(so_far->through), R(1.0));
     const mask goes_on = less(R(0.0), stays) & less(chance, stays);
