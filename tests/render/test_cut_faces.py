@@ -12,26 +12,12 @@ from clfractal.formulas import reference
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
+from tests.render.shots import CHANNELS as EVERY
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
 from tests.variants import one_of
 
 ALBEDO = ("albedo.R", "albedo.G", "albedo.B")
-CHANNELS = (
-    "R",
-    "G",
-    "B",
-    "A",
-    "Z",
-    "N.X",
-    "N.Y",
-    "N.Z",
-    "P.X",
-    "P.Y",
-    "P.Z",
-    "iterations",
-    "object",
-    *ALBEDO,
-)
+CHANNELS = (*(name for name in EVERY if name not in ("steps", "samples")), "object", *ALBEDO)
 MODES: dict[str, dict[str, Any]] = {"direct": {}, "path": {"lighting": {"mode": "path", "bounces": 0}}}
 FRONT = np.array(PLANES[0]["plane"]["normal"]) / np.linalg.norm(PLANES[0]["plane"]["normal"])
 
