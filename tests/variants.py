@@ -1,4 +1,4 @@
-"""Number types, lane counts and the like, of which `make test` shows one and `make combinations` the others."""
+"""Number types, lane counts, shapes and the like, of which `make test` shows one and `make combinations` the others."""
 
 from __future__ import annotations
 
@@ -8,5 +8,6 @@ import pytest
 
 
 def one_of(first: Any, *others: Any) -> list[Any]:
-    """Parameters for `pytest.mark.parametrize`: each needs programs of its own, so all but the first are combinations."""
-    return [first, *(pytest.param(each, marks=pytest.mark.combination) for each in others)]
+    """Parameters for `pytest.mark.parametrize`, tuples where it has several names: all but the first are combinations."""
+    several = (each if isinstance(each, tuple) else (each,) for each in others)
+    return [first, *(pytest.param(*each, marks=pytest.mark.combination) for each in several)]

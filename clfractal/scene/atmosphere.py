@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi
+from math import exp, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -55,12 +55,7 @@ def aerosol_phase(cosine: Doubles) -> Doubles:
 
 def densities(height: Doubles) -> Doubles:
     """Of molecules, aerosol and ozone, each as a part of its whole column, per km; shape (..., 3)."""
-    height = np.maximum(height, 0.0)
-    ends = 1 - np.exp(-(TOP - EARTH) / np.array([_MOLECULES, _AEROSOL]))
-    molecules = np.exp(-height / _MOLECULES) / (_MOLECULES * ends[0])
-    aerosol = np.exp(-height / _AEROSOL) / (_AEROSOL * ends[1])
-    tent = np.maximum(0.0, 1 - np.abs(height - _OZONE_HEIGHT) / _OZONE_REACH) / _OZONE_REACH
-    return np.stack([molecules, aerosol, tent], axis=-1)
+    return np.stack(_densities(height), axis=-1).astype(np.float64)
 
 
 def columns(radius: Doubles, mu: Doubles) -> Doubles:
@@ -72,9 +67,20 @@ def columns(radius: Doubles, mu: Doubles) -> Doubles:
     part = (_NODES + 1) / 2
     along = length * part**2  # more points where the air is dense
     height = np.sqrt(radius[..., None] ** 2 + along * (along + 2 * (radius * mu)[..., None])) - EARTH
-    widths = length * part * _WEIGHTS
-    found: Doubles = np.einsum("...n,...nk->...k", widths, densities(height))
-    return found
+    widths = (length * part * _WEIGHTS).astype(np.float32)
+    sums = [np.einsum("...n,...n->...", widths, each) for each in _densities(height)]
+    return np.stack(sums, axis=-1).astype(np.float64)
+
+
+def _densities(height: Doubles) -> list[npt.NDArray[np.float32]]:
+    """Of each gas. Single numbers are enough once the height is known, and take a quarter of the time."""
+    above = np.maximum(height, 0.0).astype(np.float32)
+    found: list[npt.NDArray[np.float32]] = []
+    for scale in (_MOLECULES, _AEROSOL):
+        column = scale * (1 - exp(-(TOP - EARTH) / scale))
+        found.append(np.exp(above * np.float32(-1 / scale)) * np.float32(1 / column))
+    tent = 1 - np.abs(above - np.float32(_OZONE_HEIGHT)) * np.float32(1 / _OZONE_REACH)
+    return [*found, np.maximum(tent, np.float32(0)) * np.float32(1 / _OZONE_REACH)]
 
 
 def sun_visible(radius: Doubles, mu: Doubles) -> Doubles:
@@ -107,7 +113,7 @@ class Scattered:
     aerosol: Doubles
     many: Doubles
     through: Doubles
-    """The part of light from the ray's end that arrives."""
+    """The part of light from the ray's end that arrives; shape as mu, wavelengths."""
 
 
 class Atmosphere:
@@ -156,7 +162,6 @@ class Atmosphere:
             steps: of the integration.
             whole: with the light of many scatterings.
         """
-        mu, azimuth, sun = np.broadcast_arrays(mu, azimuth, sun)
         cosine = mu * sun + np.sqrt((1 - mu**2) * np.maximum(1 - sun**2, 0)) * np.cos(azimuth)
         length, _ = ray_length(np.array(radius), mu)
         borders = length[..., None] * np.linspace(0, 1, steps + 1) ** 2

@@ -13,6 +13,7 @@ from clfractal.scene.lighting import Environment, Sky
 from clfractal.scene.load import load_scene
 from clfractal.scene.sky import HEIGHT, WIDTH, bake, pixel_areas, to_rgb
 from clfractal.scene.sun import LIMB, Sun, sun_of
+from tests.variants import one_of
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 ROWS = np.pi / 2 - (np.arange(HEIGHT) + 0.5) * np.pi / HEIGHT
@@ -88,8 +89,7 @@ def test_the_air_mass_of_kasten_and_young() -> None:
 # --- the map ---
 
 
-@pytest.mark.parametrize("elevation", [-4.0, 0.0, 30.0, 90.0])
-@pytest.mark.parametrize("turbidity", [1.0, 10.0])
+@pytest.mark.parametrize(("elevation", "turbidity"), one_of((0.0, 10.0), (-4.0, 1.0), (30.0, 10.0), (90.0, 1.0)))
 def test_light_is_finite_and_none_is_negative(elevation: float, turbidity: float) -> None:
     found = light(elevation, turbidity=turbidity)
     assert found.shape == (HEIGHT, WIDTH, 3)
@@ -102,7 +102,7 @@ def test_light_is_finite_and_none_is_negative(elevation: float, turbidity: float
     assert (numbers[[0, 3]] >= 0).all()
 
 
-@pytest.mark.parametrize("elevation", [10.0, 45.0])
+@pytest.mark.parametrize("elevation", one_of(45.0, 10.0))
 def test_both_sides_of_the_suns_meridian_are_alike(elevation: float) -> None:
     found = light(elevation)
     np.testing.assert_allclose(found, found[:, ::-1], rtol=2e-4, atol=1e-6)
@@ -117,8 +117,7 @@ def test_the_azimuth_turns_the_sky() -> None:
     np.testing.assert_allclose(sun_at(30.0, azimuth=90.0).toward, (np.sqrt(0.75), 0, 0.5), atol=1e-12)
 
 
-@pytest.mark.parametrize("turbidity", [2.0, 4.0])
-@pytest.mark.parametrize("elevation", [20.0, 45.0])
+@pytest.mark.parametrize(("elevation", "turbidity"), one_of((45.0, 3.0), (20.0, 2.0), (20.0, 4.0), (45.0, 4.0)))
 def test_the_zenith_is_bluer_than_the_horizon(turbidity: float, elevation: float) -> None:
     found = light(elevation, turbidity=turbidity)
     away = found[row_at(1), 0]  # opposite to the sun
@@ -128,7 +127,7 @@ def test_the_zenith_is_bluer_than_the_horizon(turbidity: float, elevation: float
 
 
 def test_haze_whitens_the_sky() -> None:
-    ratios = [light(45.0, turbidity=each)[0, 0] for each in (1.0, 2.0, 4.0, 8.0)]
+    ratios = [light(45.0, turbidity=each)[0, 0] for each in (1.0, 3.0, 8.0)]
     blues = [each[2] / each[0] for each in ratios]
     assert blues == sorted(blues, reverse=True)
 
