@@ -31,22 +31,22 @@ def milk(ior: float = 1.5, roughness: float = 0, **transmission: Any) -> dict[st
     return glass(roughness, ior, **{"depth": 0.5, **WHITE, **transmission})
 
 
-@pytest.mark.parametrize("anisotropy", [0.0, 0.8, -0.5])
 @pytest.mark.parametrize(
-    ("body", "ior"), [("sphere", 1.005), ("sphere", 1.5), ("box", 1.3), ("cylinder", 1.5)]
+    ("body", "ior", "anisotropy"),
+    one_of(("box", 1.3, -0.5), ("sphere", 1.005, 0.0), ("sphere", 1.5, 0.8), ("cylinder", 1.5, 0.0)),
 )
 def test_milk_before_white_is_not_seen(body: str, ior: float, anisotropy: float) -> None:
-    """Where nothing is absorbed a white furnace stays white."""
+    """Where nothing is absorbed a white furnace stays white: each path brings all or, at its last bounce, nothing."""
     objects = {"body": {**BODIES[body], "material": "milk"}}
     found = scene(objects, {"milk": milk(ior, scatter_anisotropy=anisotropy)}, bounces=64)
-    assert abs(colors_of(found, 64).mean() - 1) < 0.01
+    assert abs(colors_of(found, 16).mean() - 1) < 0.01
 
 
-@pytest.mark.parametrize("ior", [1.005, 1.5])
+@pytest.mark.parametrize("ior", one_of(1.5, 1.005))
 def test_sets_of_milk_before_white_are_not_seen(ior: float) -> None:
     """Within a set each scattering is a bounce."""
     found = ball(0, ior, bounces=64, transmission={"depth": 1.0, "scatter_anisotropy": 0.3, **WHITE})
-    assert abs(seen(found, 64)[0].mean() - 1) < 0.01
+    assert abs(seen(found, 32)[0].mean() - 1) < 0.01
 
 
 @pytest.mark.combination
@@ -130,7 +130,7 @@ def test_walks_and_bounces_agree() -> None:
     for radius in (1.2, 60):
         bounds = {"bounds": {"radius": radius}}
         found = scene(objects, {"jade": jade}, background=gradient, renderer=bounds, bounces=64)
-        blocks.append(colors_of(found, 64).reshape(4, 8, 4, 8, 3).mean(axis=(1, 3)))
+        blocks.append(colors_of(found, 16).reshape(2, 16, 2, 16, 3).mean(axis=(1, 3)))
     assert np.ptp(blocks[0]) > 0.2
     assert np.abs(blocks[0] - blocks[1]).max() < 0.02
 
@@ -148,7 +148,7 @@ def test_the_eye_in_milk_sees_milk() -> None:
     assert film["object"][0, 0] > 0
 
 
-@pytest.mark.parametrize("lanes", one_of(16, 4))
+@pytest.mark.parametrize("lanes", one_of(4, 16))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
         pytest.skip("the device has no such packets")

@@ -137,7 +137,7 @@ def test_samples_follow_their_density() -> None:
     assert statistic < chi2.ppf(0.9999, int(usual.sum()))
 
 
-@pytest.mark.parametrize("lanes", one_of(16, 1, 4, 8))
+@pytest.mark.parametrize("lanes", one_of(4, 1, 8, 16))
 def test_lanes_do_not_matter(lanes: int) -> None:
     places = numbers(64)
     random = np.random.default_rng(2)
