@@ -19,6 +19,8 @@
 # Another Python: `make test PYTHON=python3.12 VENV=.venv-3.12`. An environment keeps the Python that it was made with.
 
 SHELL := /bin/sh
+# Python keeps what it compiles: pytest takes half a minute to read all tests anew, in each of its processes.
+export PYTHONDONTWRITEBYTECODE :=
 VENV := .venv
 BIN := $(abspath $(VENV))/bin
 LINT := .venv-lint

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,22 @@ settings.register_profile(
     max_examples=100,
 )
 settings.load_profile("repeatable")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--sample", type=int, help="of the tests that are chosen, only so many, at random")
+    parser.addoption("--seed", type=int, default=0, help="which ones; the same number chooses the same tests")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep a sample of the tests, in their order."""
+    count = config.getoption("--sample")
+    if count is None or count >= len(items):
+        return
+    kept = set(random.Random(config.getoption("--seed")).sample(range(len(items)), count))
+    config.hook.pytest_deselected(items=[item for index, item in enumerate(items) if index not in kept])
+    items[:] = [item for index, item in enumerate(items) if index in kept]
 
 
 @pytest.fixture

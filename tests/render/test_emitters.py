@@ -12,6 +12,7 @@ from clfractal.renderers.emitters import asked_radiance
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE, rotation_of
 from tests.render.shots import Floats, points_of, scene_of, shoot, stacked
+from tests.variants import one_of
 
 SIZE = (24, 24)
 # From below what shines above, down to the floor.
@@ -176,11 +177,11 @@ def among_many(glow: dict[str, Any], samples: int, bounces: int = 3) -> Scene:
 def test_asking_and_chance_agree(device: Device) -> None:
     # After the last bounce lamps are still asked for, and nothing is met any more.
     asked, chance = (
-        colors(among_many(GLOW, 256), device),
-        colors(among_many(BY_CHANCE, 2048, bounces=4), device),
+        colors(among_many(GLOW, 64), device),
+        colors(among_many(BY_CHANCE, 512, bounces=4), device),
     )
-    assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.005)
-    one, other = (each.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3)) for each in (asked, chance))
+    assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.01)
+    one, other = (each.reshape(2, 12, 2, 12, 3).mean(axis=(1, 3)) for each in (asked, chance))
     np.testing.assert_allclose(one, other, rtol=0.04, atol=0.004)
 
 
@@ -212,7 +213,7 @@ def test_a_small_lamp_is_little_noise(device: Device) -> None:
     assert asked[1] < chance[1] / 1000
 
 
-@pytest.mark.parametrize("name", ["ball", "egg", "box", "drum"])
+@pytest.mark.parametrize("name", one_of("drum", "ball", "egg", "box"))
 def test_a_room_that_shines_and_reflects_half_is_white(device: Device, name: str) -> None:
     """L = 1/2 + 1/2 L everywhere: on the walls, which nobody asks for from inside, and on what stands in the room."""
     half = {"base": {"color": [0.5] * 3}, "specular": DULL, "emission": {"luminance": 0.5}}
@@ -312,12 +313,12 @@ def test_all_kinds_of_light_add_up(device: Device) -> None:
     sky = {"name": "overcast", "intensity": 0.5}
 
     def mean(glow: dict[str, Any], **sections: Any) -> Floats:
-        found = colors(lit(lamps, 256, 1, materials={**MATERIALS, "glow": glow}, **sections), device)
+        found = colors(lit(lamps, 96, 1, materials={**MATERIALS, "glow": glow}, **sections), device)
         return np.asarray(found.mean(axis=(0, 1)))
 
     parts = [mean(GLOW), mean(dark, lights=lights), mean(dark, environment=sky)]
     assert min(part.min() for part in parts) > 0.03
-    assert mean(GLOW, lights=lights, environment=sky) == pytest.approx(sum(parts), rel=0.005)
+    assert mean(GLOW, lights=lights, environment=sky) == pytest.approx(sum(parts), rel=0.01)
 
 
 @pytest.mark.combination

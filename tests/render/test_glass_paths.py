@@ -35,10 +35,9 @@ def ball(roughness: float, ior: float = 1.5, *, bounces: int = 48, **sections: A
     )
 
 
-@pytest.mark.parametrize("roughness", [0, 0.3, 0.7, 1])
-@pytest.mark.parametrize("weight", [1, 0.5])
+@pytest.mark.parametrize(("roughness", "weight"), [(0, 0.5), (0.3, 1), (0.7, 0.5), (1, 1)])
 def test_glass_before_white_is_not_seen(roughness: float, weight: float) -> None:
-    colors = seen(ball(roughness, transmission={"weight": weight}), 32)[0]
+    colors = seen(ball(roughness, transmission={"weight": weight}), 16)[0]
     assert abs(colors.mean() - 1) < 0.01
 
 
@@ -96,13 +95,13 @@ def test_colours_spread_and_are_white_together() -> None:
     plain = seen(ball(0, background=grey), 16)[0]
     assert np.abs(plain[:, 0] - plain[:, 2]).max() < 1e-4
     spread: dict[str, Any] = {"dispersion_scale": 1, "dispersion_abbe_number": 5}
-    colors = seen(ball(0, background=grey, transmission=spread), 128)[0]
+    colors = seen(ball(0, background=grey, transmission=spread), 32)[0]
     apart = colors[:, 0] - colors[:, 2]
     half = len(apart) // 2
     # The picture is upside down: above, blue, which is bent more, comes from deeper.
     assert apart[:half].mean() > 0.01
     assert apart[half:].mean() < -0.01
-    white = seen(ball(0, transmission=spread), 128)[0]
+    white = seen(ball(0, transmission=spread), 32)[0]
     assert np.abs(white.mean(axis=0) - 1).max() < 0.01
 
 

@@ -89,7 +89,9 @@ def test_the_air_mass_of_kasten_and_young() -> None:
 # --- the map ---
 
 
-@pytest.mark.parametrize(("elevation", "turbidity"), one_of((0.0, 10.0), (-4.0, 1.0), (30.0, 10.0), (90.0, 1.0)))
+@pytest.mark.parametrize(
+    ("elevation", "turbidity"), one_of((0.0, 10.0), (-4.0, 1.0), (30.0, 10.0), (90.0, 1.0))
+)
 def test_light_is_finite_and_none_is_negative(elevation: float, turbidity: float) -> None:
     found = light(elevation, turbidity=turbidity)
     assert found.shape == (HEIGHT, WIDTH, 3)
@@ -117,7 +119,9 @@ def test_the_azimuth_turns_the_sky() -> None:
     np.testing.assert_allclose(sun_at(30.0, azimuth=90.0).toward, (np.sqrt(0.75), 0, 0.5), atol=1e-12)
 
 
-@pytest.mark.parametrize(("elevation", "turbidity"), one_of((45.0, 3.0), (20.0, 2.0), (20.0, 4.0), (45.0, 4.0)))
+@pytest.mark.parametrize(
+    ("elevation", "turbidity"), one_of((45.0, 3.0), (20.0, 2.0), (20.0, 4.0), (45.0, 4.0))
+)
 def test_the_zenith_is_bluer_than_the_horizon(turbidity: float, elevation: float) -> None:
     found = light(elevation, turbidity=turbidity)
     away = found[row_at(1), 0]  # opposite to the sun

@@ -40,6 +40,7 @@ from clfractal.viewer.panels import (
 )
 from clfractal.viewer.panels.ui import Ui
 from clfractal.work.local import LocalExecutor
+from tests.variants import one_of
 from tests.viewer.panel_harness import INFO, Stage, background, headless, make_ui, screenshot
 
 SCENES = sorted(str(path) for path in Path("scenes").glob("*.yaml"))
@@ -121,7 +122,7 @@ class _Watched:
         ui.studio.edit = edit  # type: ignore[method-assign]
 
 
-@pytest.mark.parametrize("scene", [*KINDS, "scenes/stereo_bulb.yaml", "scenes/mengerbulb.yaml"])
+@pytest.mark.parametrize("scene", one_of("scenes/mengerbulb.yaml", "scenes/stereo_bulb.yaml", *KINDS))
 def test_all_that_is_clicked_is_accepted_by_the_schema_and_undone(scene: str) -> None:
     """Clicks down the whole dock, at switches, choices and buttons; then everything is taken back."""
     ui = opened(scene)
@@ -147,7 +148,7 @@ def test_all_that_is_clicked_is_accepted_by_the_schema_and_undone(scene: str) ->
     assert ui.studio.scene == before
 
 
-@pytest.mark.parametrize("scene", KINDS)
+@pytest.mark.parametrize("scene", one_of(*KINDS))
 def test_all_that_is_dragged_is_accepted_and_undone(scene: str) -> None:
     ui = opened(scene)
     before, watched = ui.studio.scene, _Watched(ui)
