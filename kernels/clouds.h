@@ -151,13 +151,8 @@ INLINE void path_in_cloud(stage s, const packet_pixels *at, path *so_far, carrie
     p.footprint = arrived.footprint + arrived.spread * place->t;
     p.spread = arrived.spread;
     p.through = color_mul(p.through, place->keeps);
-    real u, v, choice, unused, roulette;
-    path_square(s, at, PURPOSE_ASK, w, &u, &v);
-    path_square(s, at, PURPOSE_CHOICE, w, &choice, &unused);
-    real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
-#if HAS_SET_LIGHTS
-    path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
-#endif
+    real u, v, unused, roulette, numbers[ASKING_NUMBERS];
+    path_asking(s, at, w, numbers);
     c.total = weight_of_all(p.origin, R(0.0), w);
     asked a;
     color brings = medium_asks(p.origin, arrived.direction, place->anisotropy, numbers, c.total, w, &a);

@@ -8,6 +8,17 @@ INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w,
     unit_square((bits)((uint)s.sample), seed, u, v);
 }
 
+// The random numbers by which a spot asks for light.
+INLINE void path_asking(stage s, const packet_pixels *at, world w, real numbers[ASKING_NUMBERS]) {
+    real unused;
+    path_square(s, at, PURPOSE_ASK, w, numbers, numbers + 1);
+    path_square(s, at, PURPOSE_CHOICE, w, numbers + 2, &unused);
+    numbers[3] = numbers[4] = R(0.5);
+#if HAS_SET_LIGHTS
+    path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
+#endif
+}
+
 #if HAS_GLASS_SCATTER || HAS_CLOUDS
 // Of lanes `here` one path, of the others another; likewise what they carry.
 INLINE path path_pick(mask here, path yes, path no) {
@@ -52,13 +63,8 @@ INLINE mask path_crosses_medium(path *so_far, const carried *with, real far, mas
 // One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
 // `behind`: in glass, whether the spot is seen from inside its body.
 INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, real own, const bsdf *b, real total, mask behind, world w, color *brings) {
-    real u, v, choice, unused;
-    path_square(s, at, PURPOSE_ASK, w, &u, &v);
-    path_square(s, at, PURPOSE_CHOICE, w, &choice, &unused);
-    real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
-#if HAS_SET_LIGHTS
-    path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
-#endif
+    real numbers[ASKING_NUMBERS];
+    path_asking(s, at, w, numbers);
     const asked a = light_asked(point, from, b->normal, own, numbers, total, w);
     light_ray chosen = a.ray;
     real density;

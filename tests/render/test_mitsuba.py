@@ -25,7 +25,7 @@ import clfractal
 
 Floats = npt.NDArray[np.float64]
 
-WIDTH, HEIGHT, SAMPLES, SEEDS = 48, 32, 256, 6
+WIDTH, HEIGHT, SAMPLES, SEEDS = 48, 32, 96, 6
 ACROSS, DOWN = 6, 4  # regions
 EYE, TARGET, FOV = [0.7, -3.6, 1.9], [-0.08, -0.15, -0.12], 36.0
 COLOR = [0.8, 0.5, 0.3]

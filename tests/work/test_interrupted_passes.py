@@ -21,6 +21,7 @@ from clfractal.work.local import LocalExecutor
 from clfractal.work.refine import pass_ranges
 from clfractal.work.run import Progress, run
 from tests.render.shots import BALL, PERSPECTIVE, job_of, plan_of, scene_of, shoot, stacked
+from tests.variants import one_of
 
 SIZE = (72, 48)
 NOISY: dict[str, Any] = {"noise": 0.02, "min_samples": 4}
@@ -141,7 +142,7 @@ def test_in_float64(kind: str, device: Device) -> None:
     assert work.stops > 0
 
 
-@pytest.mark.parametrize("lanes", [1, 4, 16])
+@pytest.mark.parametrize("lanes", one_of(4, 1, 16))
 def test_with_any_number_of_lanes(lanes: int, device: Device) -> None:
     """Lanes of one packet that have different numbers of samples, because some of their pixels are done."""
     scene = scene_with("surface", **NOISY)

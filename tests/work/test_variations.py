@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import cycle
 from pathlib import Path
 from typing import Any, get_args
 
@@ -100,18 +101,31 @@ def different(one: Scene, other: Scene) -> set[str]:
     return {path for path in {*first, *second} if first.get(path) != second.get(path)}
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: str(path.stem))
-def test_every_shipped_scene_has_twelve_valid_different_ones(path: Path) -> None:
+def check_twelve(path: Path, strength: Strength) -> None:
+    """That there are as many, valid and different."""
     scene = load_scene(path)
-    for strength in STRENGTHS:
-        found = variations(scene, strength=strength)
-        assert len(found) == 12
-        texts = [dump_scene(each.scene) for each in found]
-        assert len({*texts, dump_scene(scene)}) == 13
-        for each, text in zip(found, texts, strict=True):
-            assert load_scene(text, folder=scene.folder) == each.scene
-            assert each.remark
-            assert "\n" not in each.remark
+    found = variations(scene, strength=strength)
+    assert len(found) == 12
+    texts = [dump_scene(each.scene) for each in found]
+    assert len({*texts, dump_scene(scene)}) == 13
+    for each, text in zip(found, texts, strict=True):
+        assert load_scene(text, folder=scene.folder) == each.scene
+        assert each.remark
+        assert "\n" not in each.remark
+
+
+@pytest.mark.parametrize(
+    ("path", "strength"), zip(SCENES, cycle(STRENGTHS), strict=False), ids=lambda value: Path(value).stem
+)
+def test_every_shipped_scene_has_twelve_valid_different_ones(path: Path, strength: Strength) -> None:
+    check_twelve(path, strength)
+
+
+@pytest.mark.combination
+@pytest.mark.parametrize("strength", STRENGTHS)
+def test_every_shipped_scene_has_them_at_every_strength(strength: Strength) -> None:
+    for path in SCENES:
+        check_twelve(path, strength)
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: str(path.stem))
