@@ -15,6 +15,7 @@ import yaml
 import clfractal
 from clfractal.errors import SceneError
 from clfractal.scene.model import Scene
+from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -79,12 +80,12 @@ def test_without_bounces_lambert_is_eq_5(light: dict[str, Any]) -> None:
 def test_two_lights_are_their_sum() -> None:
     """One of them is chosen for each sample; the mean is that of both."""
     lights = [{"direction": [-1, 1, -1]}, {"direction": [1, 1, -0.2], "intensity": 0.3}]
-    both = seen(scene_of(lights=lights, lighting=path(), material={"specular": 0}), 256)[0]
+    both = seen(scene_of(lights=lights, lighting=path(), material={"specular": 0}), 96)[0]
     each = [
-        seen(scene_of(lights=[light], lighting=path(), material={"specular": 0}), 256)[0] for light in lights
+        seen(scene_of(lights=[light], lighting=path(), material={"specular": 0}), 96)[0] for light in lights
     ]
-    assert abs(both.mean() - (each[0] + each[1]).mean()) < 0.001
-    assert np.abs(both - each[0] - each[1]).max() < 0.25
+    assert abs(both.mean() - (each[0] + each[1]).mean()) < 0.0015
+    assert np.abs(both - each[0] - each[1]).max() < 0.35
 
 
 def test_a_disc_of_light_has_its_closed_form() -> None:
@@ -147,8 +148,10 @@ def test_white_before_white_is_not_seen(name: str) -> None:
     assert abs(colors.mean() - 1) < 0.01
 
 
-@pytest.mark.parametrize("roulette", [0, 64])
-@pytest.mark.parametrize("surroundings", ["background", "environment"])
+@pytest.mark.parametrize(
+    ("roulette", "surroundings"),
+    one_of((0, "environment"), (64, "background"), (0, "background"), (64, "environment")),
+)
 def test_light_that_bounces_adds_up(roulette: int, surroundings: str, tmp_path: Path) -> None:
     """Surfaces that reflect half and shine with half are as bright as a white sky, in all hollows: L = 1/2 + 1/2 L."""
     shining = {"base": {"color": [0.5, 0.5, 0.5]}, "specular": {"weight": 0}, "emission": {"luminance": 0.5}}
