@@ -245,7 +245,7 @@ def test_plain_lines_come_at_most_every_two_seconds(
 def test_a_bar_on_a_terminal(here: Path) -> None:
     """A render of seconds on a terminal shows rays per second and the time left, and leaves one last line."""
     ours, theirs = pty.openpty()
-    options = ["--samples", "2000", "--size", "128x128", "--set", "formula.iterations=50"]
+    options = ["--samples", "400", "--size", "128x128", "--set", "formula.iterations=50"]
     running = subprocess.Popen(
         command("render", "scene.yaml", "-o", "a.png", *options),
         cwd=here,

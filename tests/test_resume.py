@@ -17,6 +17,7 @@ import clfractal
 from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
 from tests.shell import SCENE, Ended, command, environment, process
+from tests.variants import one_of
 
 # Heavy enough for several batches of tiles, each of a fraction of a second.
 HEAVY = """version: 1
@@ -52,7 +53,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
     return folder / "out.exr", time.perf_counter() - start
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", one_of(0, 1, 2))
 def test_killed_at_random_moments(seed: int, undisturbed: tuple[Path, float], tmp_path: Path) -> None:
     whole, seconds = undisturbed
     chance = random.Random(seed)

@@ -77,6 +77,16 @@ FILLED = (
 
 # By module: all tests of one scene come together, and in one process, which renders it once.
 each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem, scope="module")
+# A program or more for each: `make test` renders every third.
+each_picture = pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=() if n % 3 == 1 else pytest.mark.combination)
+        for n, path in enumerate(SCENES)
+    ],
+    ids=lambda path: path.stem,
+    scope="module",
+)
 
 
 def comment(path: Path) -> list[str]:
@@ -139,7 +149,7 @@ def test_it_is_as_large_as_a_screen_or_a_print_and_smooth(path: Path) -> None:
         assert 4 <= view.renderer.samples <= most
 
 
-@each_scene
+@each_picture
 def test_it_shows_something_well_lit(path: Path) -> None:
     film = small_film(path)
     for channel in film.channels:
@@ -164,7 +174,7 @@ def test_it_shows_something_well_lit(path: Path) -> None:
     assert brightness.std() > 12
 
 
-@each_scene
+@each_picture
 def test_normals_have_length_one_and_face_the_eye(path: Path) -> None:
     film = small_film(path)
     hit = np.isfinite(film["Z"])
@@ -172,7 +182,7 @@ def test_normals_have_length_one_and_face_the_eye(path: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=2e-3)
 
 
-@each_scene
+@each_picture
 def test_it_looks_as_it_did(path: Path) -> None:
     picture, golden = small_picture(path), read_picture(golden_path(path))
     mean, block = mean_difference(picture, golden), worst_block(picture, golden)

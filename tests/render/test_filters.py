@@ -11,6 +11,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from tests.render.shots import SOLIDS, Floats, scene_of, shoot
+from tests.variants import one_of
 
 SIDE, DETAIL = 48, 0.01
 HALF = 1.2  # of the box's side
@@ -48,7 +49,7 @@ def from_above(name: str, width: float | None, height: float, up: list[float], s
 
 
 @pytest.mark.parametrize(("name", "width"), FILTERS)
-@pytest.mark.parametrize("height", [3.3, 3.61])
+@pytest.mark.parametrize("height", one_of(3.61, 3.3))
 def test_profile_of_an_edge(device: Device, name: str, width: float, height: float) -> None:
     """Across an upright or level edge coverage is the filter's integral, but for one sample: of 2^n samples one falls into
     each 2^n-th of the filter's area. The light of the whole square stays."""

@@ -23,6 +23,7 @@ from tests.render.shots import (
     stacked,
     to_sphere,
 )
+from tests.variants import one_of
 
 SIDE, SAMPLES = 64, 256
 FOV = 50.0
@@ -84,7 +85,7 @@ def _compiled(device: Device) -> None:
 
 @pytest.mark.parametrize("target", TARGETS)
 @pytest.mark.parametrize("depth_share", [0.25, 0.6, 3.0])
-@pytest.mark.parametrize("blur", [0.1, 0.3])
+@pytest.mark.parametrize("blur", one_of(0.3, 0.1))
 def test_circle_of_confusion(device: Device, target: str, depth_share: float, blur: float) -> None:
     """The blurred ball is the sharp one spread over a disk: variances add, that of a disk is its diameter's square over 16.
     Its light stays, and stays in its place."""

@@ -182,7 +182,7 @@ def test_roulette_does_not_change_the_mean() -> None:
             lighting=path(12, roulette=roulette),
             material={"color": [0.8, 0.8, 0.8]},
         )
-        return float(seen(scene, 64)[0].mean())
+        return float(seen(scene, 32)[0].mean())
 
     assert abs(bright(0) / bright(64) - 1) < 0.01
 

@@ -17,6 +17,7 @@ from clfractal.scene.coloring import Trap
 from clfractal.scene.model import Scene
 from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, scene_of, shoot, stacked
 from tests.render.test_coloring import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
+from tests.variants import one_of
 
 SIDE = 32
 BLACK = {"color": [0, 0, 0], "ambient": 0, "diffuse": 0, "specular": 0}
@@ -157,8 +158,9 @@ def as_spheres(scene: Scene) -> list[dict[str, Any]]:
     ]
 
 
-@pytest.mark.parametrize("shadow", [True, False])
-@pytest.mark.parametrize("mode", [{}, PATHS], ids=["direct", "path"])
+@pytest.mark.parametrize(
+    ("shadow", "mode"), one_of((True, PATHS), (False, {}), (True, {}), (False, PATHS)), ids=repr
+)
 def test_the_choice_is_without_bias(device: Device, mode: dict[str, Any], shadow: bool) -> None:
     """The mean of many choices is the sum over all balls, each as a light of its own."""
     scene = lit({**FEW, "shadow": shadow, "rays": 2}, 1024, **mode)

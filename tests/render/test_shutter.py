@@ -233,7 +233,9 @@ def test_passes_and_tiles_make_no_difference(kind: str, engine: Engine) -> None:
         np.testing.assert_array_equal(part[name], whole[name][y : y + height, x : x + width], name)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [kind if kind != "lens" else pytest.param(kind, marks=pytest.mark.combination) for kind in KINDS]
+)
 def test_every_kind_of_picture_is_blurred(kind: str, engine: Engine) -> None:
     """It is the mean of sharp pictures at times of the opening, up to noise, and none of these alone."""
     samples, times = {"lens": 4096, "layout": 1024}.get(kind, 64), 16

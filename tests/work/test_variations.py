@@ -128,7 +128,7 @@ def test_every_shipped_scene_has_them_at_every_strength(strength: Strength) -> N
         check_twelve(path, strength)
 
 
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: str(path.stem))
+@pytest.mark.parametrize("path", SCENES[::3], ids=lambda path: str(path.stem))
 def test_nothing_that_tunes_the_search_changes(path: Path) -> None:
     scene = load_scene(path)
     for each in variations(scene, strength="heavy", seed=3):
