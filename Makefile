@@ -55,7 +55,7 @@ install: $(VENV)/.installed
 test: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m "not combination" $(PARALLEL) $(ARGUMENTS)
 
-# Every formula, number type, lane count and normal that the usual tests show by examples.
+# Every formula, number type, lane count, normal and picture that the usual tests show by examples.
 combinations: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m combination $(PARALLEL) $(ARGUMENTS)
 

@@ -91,7 +91,7 @@ HEIGHTS: dict[str, tuple[dict[str, Any], Callable[[dict[str, Floats]], Floats]]]
 }
 
 
-@pytest.mark.parametrize("by", HEIGHTS)
+@pytest.mark.parametrize("by", one_of("distance", "height", "normal"))
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_normals_are_those_of_the_displaced_ball(by: str, precision: str) -> None:
     if precision == "float64" and not has_float64(choose().info):
@@ -150,6 +150,7 @@ def test_traps_are_compared_over_the_width() -> None:
     assert (apart < 2).mean() > 0.9
 
 
+@pytest.mark.combination
 def test_iterations_of_a_fractal() -> None:
     """The smooth count at the places around, by the list of points; exactly so where light is computed at the hit."""
     height = {"by": "iterations", "range": [1, 5], "curve": [[0, 0], [1, 0.1]]}
@@ -206,7 +207,7 @@ OBJECTS: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("by", ["height", "normal"])
+@pytest.mark.parametrize("by", one_of("height", "normal"))
 def test_objects_have_reliefs(by: str) -> None:
     """Planes, balls, boxes, cylinders, joined ones and formulas, by their own normals."""
     height = {"by": by, "direction": [0, 1, 2], "range": [-2, 2], "curve": [[0, -1], [1, 1]]}
@@ -226,6 +227,7 @@ def test_objects_have_reliefs(by: str) -> None:
     assert np.quantile(apart, 0.99) < 0.5
 
 
+@pytest.mark.combination
 def test_water_has_waves_and_a_relief() -> None:
     sea = {"type": "water", "position": [0, 0, -0.9], "material": "m", "waves": {"height": 0.2, "length": 2}}
     found = facts(
@@ -289,7 +291,7 @@ FURNACES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", FURNACES)
+@pytest.mark.parametrize("name", one_of("lacquer", "metal", "clay"))
 def test_white_before_white_is_not_seen(name: str) -> None:
     """A steep relief on a convex body loses no light, and makes none."""
     steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.3], [1, 0]]}
@@ -337,6 +339,7 @@ def test_a_flat_relief_changes_nothing() -> None:
     assert np.array_equal(plain, seen(relief({"by": "normal", "curve": [[0, 2], [1, 2]]}), 4)[0] * 1.0)
 
 
+@pytest.mark.combination
 def test_geometry_stays() -> None:
     """Channels N and P are the surface's."""
     plain, bumped = facts(relief(0)), facts(relief(TRAP))
@@ -355,6 +358,7 @@ def test_normals_face_the_viewer() -> None:
     assert np.allclose(np.linalg.norm(found["normal"], axis=-1), 1, atol=1e-5)
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("lanes", one_of(4, 8, 16))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
@@ -371,6 +375,7 @@ def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> Non
     assert np.abs(pictures[0] - pictures[1]).mean() < 1e-3
 
 
+@pytest.mark.combination
 def test_traps_on_objects_beside_the_set() -> None:
     """A plane through the set's space shows the trap of each of its places; what only the set has is 0 there."""
     board = {"type": "plane", "position": [0, 1.5, 0], "normal": [0, -1, 0], "material": "m"}

@@ -148,6 +148,7 @@ def test_the_eye_in_milk_sees_milk() -> None:
     assert film["object"][0, 0] > 0
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("lanes", one_of(4, 16))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
@@ -186,6 +187,7 @@ def test_scenes_of_clear_glass_do_not_know_it() -> None:
     assert texts[0] == texts[1]
 
 
+@pytest.mark.combination
 def test_what_differs_from_place_to_place_is_that_where_paths_go_in() -> None:
     """A ball before white that is milk above and only dark below."""
     scatter = {"by": "normal", "palette": [[0, 0, 0], [0, 0, 0], [0.9, 0.9, 0.9], [0.9, 0.9, 0.9]]}
