@@ -77,11 +77,11 @@ FILLED = (
 
 # By module: all tests of one scene come together, and in one process, which renders it once.
 each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem, scope="module")
-# A program or more for each: `make test` renders every third.
+# A program or more for each: `make test` renders every fourth.
 each_picture = pytest.mark.parametrize(
     "path",
     [
-        pytest.param(path, marks=() if n % 3 == 1 else pytest.mark.combination)
+        pytest.param(path, marks=() if n % 4 == 1 else pytest.mark.combination)
         for n, path in enumerate(SCENES)
     ],
     ids=lambda path: path.stem,

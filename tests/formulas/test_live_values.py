@@ -23,6 +23,7 @@ from clfractal.renderers import points
 from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
 from tests.formulas.rounding import spread
 from tests.formulas.test_opencl import FAR, ORBITS, STEPS, device, points_of, start_at, usable
+from tests.variants import one_of
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
 LIVE = [name for name in SINGLE if catalog.load(name).parameters]
@@ -130,7 +131,7 @@ def oracle(chain: Chain, at: Floats, base: Any, steps: int = STEPS) -> Floats:
     return np.array(found[first:])
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("name", LIVE)
 def test_every_value_of_the_library(name: str, precision: Precision) -> None:
     if not usable(precision):
@@ -213,7 +214,7 @@ COUNTED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "parameters"), COUNTED)
+@pytest.mark.parametrize(("name", "parameters"), one_of(*COUNTED))
 def test_counts_and_distances_are_those_of_the_plain_program(name: str, parameters: dict[str, float]) -> None:
     plain, live = (catalog.load_chain(spec_of(name, parameters, live=each)) for each in (False, True))
     at = np.random.default_rng(5).uniform(-1, 1, (3000, 3)) * plain.radius * 0.8

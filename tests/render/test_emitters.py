@@ -248,6 +248,7 @@ def test_the_eye_and_mirrors_see_the_whole_of_it(device: Device) -> None:
     )
 
 
+@pytest.mark.combination
 def test_lanes_and_number_types_agree(device: Device) -> None:
     scene = among_many(GLOW, 4)
     packets = colors(scene, device)
@@ -302,6 +303,7 @@ def test_a_limit_holds_for_what_shines(device: Device) -> None:
         assert limited.mean() < free.mean()
 
 
+@pytest.mark.combination
 def test_all_kinds_of_light_add_up(device: Device) -> None:
     """Of lamps, lights and an environment one is asked for at each spot: the mean is their sum."""
     lamps = {"ball": lamp("ball"), "tube": lamp("tube")}

@@ -12,6 +12,7 @@ from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from tests.render.joined_oracle import Floats, a_sphere, marched, smooth, solids
 from tests.render.shots import BALL, PERSPECTIVE, SOLIDS, points_of, rays, scene_of, shoot
+from tests.variants import one_of
 
 PLACE, RADIUS, WIDTH = [0.9, -0.7, 0.4], 0.35, 0.4
 CAMERA = {**PERSPECTIVE, "target": [0.9, -0.7, 0.3], "fov": 24}
@@ -92,7 +93,7 @@ def test_materials_are_blended_along_paths(device: Device) -> None:
     check(film, scene, colors(film))
 
 
-@pytest.mark.parametrize("by", ["iterations", "trap"])
+@pytest.mark.parametrize("by", one_of("iterations", "trap"))
 def test_counts_and_traps_are_between_those_of_both(device: Device, by: str) -> None:
     """Two formulas that flow together have no line between their colours."""
     coloring: dict[str, Any] = {"by": by, "scale": 0.1, "repeat": False, "palette": ["#000000", "#ffffff"]}

@@ -44,6 +44,7 @@ def test_glass_before_white_is_not_seen(roughness: float) -> None:
     assert np.percentile(colors, 2) > 0.8
 
 
+@pytest.mark.combination
 def test_what_is_left_of_a_set_is_as_an_object_of_that_shape() -> None:
     """A ball of which only a box is left is a box of glass: the same light comes through it, dimmed by the same ways."""
     clear = glass(0, 1.4, color=[0.7, 0.4, 0.2], depth=0.5)

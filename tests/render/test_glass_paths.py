@@ -49,7 +49,7 @@ def test_glass_before_white_is_not_seen(roughness: float, weight: float) -> None
         {"name": "hast", "iterations": 12},
     ],
 )
-@pytest.mark.parametrize("search", ["distance", "steps"])
+@pytest.mark.parametrize("search", one_of("steps", "distance"))
 def test_sets_of_glass_keep_light(formula: dict[str, Any], search: str) -> None:
     """However rough the set and whichever way its surface is found; hast is dust where pixels are as wide as here."""
     scene = ball(0.1, bounces=64, formula=formula, camera={"position": [1.4, -2.6, 1.1], "fov": 40})
@@ -115,6 +115,7 @@ def test_a_sun_shines_through_rough_glass() -> None:
     assert seen(smooth, 4)[0].mean() < 0.01
 
 
+@pytest.mark.combination
 def test_lanes_do_not_matter() -> None:
     """Paths are noise that small differences stir: the mean of a packet's picture is that of a lane's."""
     device = choose()

@@ -99,6 +99,7 @@ def test_glow_is_the_integral(device: Device, case: str) -> None:
     np.testing.assert_allclose(seen[inner], wanted[inner], rtol=0.06, atol=0.02 * wanted[inner].max())
 
 
+@pytest.mark.combination
 def test_steps_do_not_show(device: Device) -> None:
     """The same light with one and with many lanes, the same bits each time; in another number type but for noise."""
     scene = glowing(64)

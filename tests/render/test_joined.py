@@ -79,7 +79,7 @@ def test_each_search_and_number_type(device: Device, way: str, precision: Precis
 
 
 @pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
-@pytest.mark.parametrize("points", [1, 9])
+@pytest.mark.parametrize("points", one_of(9, 1))
 def test_a_formula_at_another_place(device: Device, camera: dict[str, Any], points: int) -> None:
     other = {"type": "formula", "formula": {"inline": SOLIDS, "iterations": 3}, "scale": SCALE, **PLACED}
     renderer = {"type": "surface", "points": {"count": points, "pattern": "grid"}}
@@ -131,7 +131,7 @@ def test_the_formula_at_home_looks_as_ever(device: Device) -> None:
     assert np.median(np.linalg.norm(normals_of(alone) - normals_of(joined), axis=-1)[both]) < 0.05
 
 
-@pytest.mark.parametrize("by", ["iterations", "trap", "thickness"])
+@pytest.mark.parametrize("by", one_of("thickness", "iterations", "trap"))
 def test_each_formula_has_its_own_colouring(device: Device, by: str) -> None:
     """The same set as an object, smaller and elsewhere, has the colours that it has by itself."""
     formula = {"name": "mandelbulb", "iterations": 7}
@@ -194,7 +194,7 @@ def twin_of(formula: dict[str, Any], camera: dict[str, Any], **sections: Any) ->
     return alone, scene_of(NOWHERE, moved, (64, 64), objects={"twin": twin}, **sections)
 
 
-@pytest.mark.parametrize("by", ["closeness", "trap"])
+@pytest.mark.parametrize("by", one_of("closeness", "trap"))
 def test_a_formula_beside_the_set_glows(device: Device, by: str) -> None:
     formula, camera = {"name": "mandelbulb", "iterations": 6}, {"position": [0.3, -3, 0.5], "fov": 45}
     glow = {"by": by, "width": 0.1, "reach": 0.5}
@@ -207,6 +207,7 @@ def test_a_formula_beside_the_set_glows(device: Device, by: str) -> None:
     assert second.mean() == pytest.approx(first.mean(), rel=0.08)
 
 
+@pytest.mark.combination
 def test_along_paths_it_has_the_same_light(device: Device) -> None:
     formula, camera = {"name": "mandelbulb", "iterations": 5}, {"position": [0.3, -3, 0.5], "fov": 40}
     alone, joined = twin_of(

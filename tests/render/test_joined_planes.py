@@ -74,7 +74,7 @@ def held_beside(scene: Scene, at: Any) -> Any:
 
 
 @pytest.mark.parametrize("limit", [None, 12])
-@pytest.mark.parametrize("renderer", ["surface", "volume"])
+@pytest.mark.parametrize("renderer", one_of("volume", "surface"))
 def test_counts_on_the_plane(renderer: str, limit: int | None) -> None:
     settings = {
         "type": renderer,

@@ -169,6 +169,7 @@ def test_a_lamp_that_is_seen_is_emission_and_white() -> None:
     assert not layer(film, "direct")[middle].any()
 
 
+@pytest.mark.combination
 def test_layers_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
     names = [*SURFACE_LAYERS]
     scene = scene_of(

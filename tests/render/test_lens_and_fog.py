@@ -105,7 +105,7 @@ def test_circle_of_confusion(device: Device, target: str, depth_share: float, bl
     assert (coverage[reach < edge - 1] > 0).all()
 
 
-@pytest.mark.parametrize("sensor", [0.2, 3.0])
+@pytest.mark.parametrize("sensor", one_of(3.0, 0.2))
 def test_blur_is_that_of_f_number_and_sensor(device: Device, sensor: float) -> None:
     """A sensor n times as high, with n times the f-number, blurs alike; twice the f-number, half as much."""
     scene = lens_scene(0.5, blur=0.2, sensor=sensor)
@@ -122,6 +122,7 @@ def test_blur_is_that_of_f_number_and_sensor(device: Device, sensor: float) -> N
     assert spreads[1] / spreads[0] == pytest.approx(0.5, rel=0.03)
 
 
+@pytest.mark.combination
 def test_focus_is_as_sharp_as_a_pinhole(device: Device) -> None:
     """The ball's outline lies in the plane of focus, its diameter a twentieth of the distance; a tiny lens is sharp at any;
     without a focus distance the target is sharp."""

@@ -91,7 +91,7 @@ BULB: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("by", BY)
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_colors_follow_quantities(by: str, precision: str) -> None:
     if precision == "float64" and not has_float64(choose().info):
         pytest.skip("the device has no float64")
@@ -140,6 +140,7 @@ def test_the_formula_is_asked() -> None:
         assert np.abs(colors - expected).max() < tolerance, by
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("lanes", one_of(4, 1, 8, 16))
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
@@ -156,6 +157,7 @@ def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> Non
     assert np.abs(pictures[0] - pictures[1]).mean() < 2e-4
 
 
+@pytest.mark.combination
 def test_two_questions_have_their_own_answers() -> None:
     """Two traps in one material: the picture is the product of the pictures of each."""
     one = {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]}
@@ -167,7 +169,7 @@ def test_two_questions_have_their_own_answers() -> None:
     assert np.abs(both - first * second).max() < 2e-3
 
 
-@pytest.mark.parametrize("mask", [0, 1])
+@pytest.mark.parametrize("mask", one_of(1, 0))
 def test_a_blend_at_its_ends_is_its_part(mask: int) -> None:
     """Bit for bit, nested as well."""
     parts: dict[str, Any] = {

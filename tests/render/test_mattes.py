@@ -98,6 +98,7 @@ def grid() -> list[tuple[float, float]]:
     return [(0.2 + 0.6 * x, -1.2 + 0.4 * z) for x in steps for z in steps]
 
 
+@pytest.mark.combination
 def test_they_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
     scene, names = scene_of(**SECTIONS, lighting=path(1)), [*MATTES]
     whole, single = repeated(scene, device, names)

@@ -282,7 +282,7 @@ def factor() -> float:
         pytest.param("set", "lambert", "lamps", marks=pytest.mark.combination),
         pytest.param("set", "metal", "sky", marks=pytest.mark.combination),
         pytest.param("objects", "lambert", "sky", marks=pytest.mark.combination),
-        ("objects", "lambert", "sizes"),
+        pytest.param("objects", "lambert", "sizes", marks=pytest.mark.combination),
         ("objects", "lambert", "glowing"),
         pytest.param("objects", "metal", "sky", marks=pytest.mark.combination),
     ],

@@ -377,7 +377,7 @@ def moved(draw: st.DrawFn, camera: AnyCamera) -> AnyCamera:
 
 
 @given(any_cameras(), st.data())
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=150, deadline=None)
 def test_every_camera_is_valid_whatever_is_asked(camera: AnyCamera, data: st.DataObject) -> None:
     for _ in range(10):
         camera = data.draw(moved(camera))

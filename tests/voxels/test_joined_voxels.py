@@ -20,6 +20,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests.render.joined_oracle import SIMPLE, Distance, Floats, a_sphere, ball, normal_at, smooth, solids
 from tests.render.shots import BALL, SOLIDS
+from tests.variants import one_of
 from tests.voxels.grids import decoded, device, differing_voxels, filled, voxel_points
 from tests.voxels.joined import EVERY_JOIN, JULIA, SPONGE, belongs, own_places
 from tests.voxels.test_fill import ROUNDED
@@ -44,6 +45,7 @@ def test_every_voxel_against_numpy() -> None:
     check(scene_of(EVERY_JOIN, resolution=64))
 
 
+@pytest.mark.combination
 def test_every_lane_count_and_number_type() -> None:
     scene = scene_of(EVERY_JOIN)
     for lanes in accepted_lanes(device(), "float32"):
@@ -93,7 +95,7 @@ PROOFS: dict[str, tuple[dict[str, Any], dict[str, Any], float]] = {
 }
 
 
-@pytest.mark.parametrize("name", PROOFS)
+@pytest.mark.parametrize("name", one_of(*PROOFS))
 def test_the_octree_leaves_out_nothing(name: str) -> None:
     objects, formula, side = PROOFS[name]
     settings = {"resolution": 128, "box": {"size": side}}
@@ -155,7 +157,7 @@ def cut_ball(at: Floats) -> Floats:
     return np.maximum(ball(at), -SIMPLE["sphere"][1](at))
 
 
-@pytest.mark.parametrize("normals", ["exact", "least_squares"])
+@pytest.mark.parametrize("normals", one_of("least_squares", "exact"))
 def test_normals_are_those_of_the_distance(normals: str) -> None:
     objects = {"hole": {**SIMPLE["sphere"][0], "join": "cut"}}
     settings = {"resolution": 48, "box": {"size": 2.2}, "normals": normals, "value": "inside"}
@@ -220,6 +222,7 @@ def test_a_volume_file_gives_objects_their_colours_again(tmp_path: Path) -> None
     assert (mesh.vertices[red][:, 0] > 0.9).all()
 
 
+@pytest.mark.combination
 def test_a_picture_of_voxels_lies_where_the_surface_does() -> None:
     objects = {"egg": EVERY_JOIN["egg"], "hole": EVERY_JOIN["hole"], "sponge": SPONGE}
     scene = scene_of(objects, resolution=160)

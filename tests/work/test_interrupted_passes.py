@@ -118,7 +118,7 @@ def same_bits(found: Film, wanted: Film) -> None:
     np.testing.assert_array_equal(stacked(found).view(np.uint32), stacked(wanted).view(np.uint32))
 
 
-@pytest.mark.parametrize("budget", [1e-7, 0.002])
+@pytest.mark.parametrize("budget", one_of(0.002, 1e-7))
 @pytest.mark.parametrize("adaptive", [False, True])
 @pytest.mark.parametrize("kind", RENDERERS)
 def test_an_interrupted_pass_done_anew(kind: str, adaptive: bool, budget: float, device: Device) -> None:
@@ -142,6 +142,7 @@ def test_in_float64(kind: str, device: Device) -> None:
     assert work.stops > 0
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("lanes", one_of(4, 1, 16))
 def test_with_any_number_of_lanes(lanes: int, device: Device) -> None:
     """Lanes of one packet that have different numbers of samples, because some of their pixels are done."""
