@@ -41,7 +41,7 @@ def test_glass_before_white_is_not_seen(roughness: float) -> None:
     camera = {"position": [0.6, -4, 1], "fov": 36}
     colors = colors_of(joined(HOLES, glass(roughness), camera=camera), 8)
     assert abs(colors.mean() - 1) < 0.01
-    assert np.percentile(colors, 2) > 0.8
+    assert np.percentile(colors, 2) > 0.6
 
 
 @pytest.mark.combination

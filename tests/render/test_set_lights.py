@@ -200,6 +200,7 @@ def test_the_eye_sees_the_nearest_ball(device: Device) -> None:
     assert not (shoot(hidden, device)["R"] > 0.5).any()
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize(
     "mode", [pytest.param({}, id="direct", marks=pytest.mark.combination), pytest.param(PATHS, id="path")]
 )

@@ -61,7 +61,7 @@ def test_inversion_is_that_of_thick_bodies() -> None:
         assert abs((weights * cosines * back).sum() - color) < 0.003
 
 
-@pytest.mark.parametrize("radius", [0.5, 0.05, 0.004])
+@pytest.mark.parametrize("radius", one_of(0.05, 0.5, 0.004))
 def test_white_sets_before_white_are_not_seen(radius: float) -> None:
     """With a boundary, a coat and fuzz over it, and beside a diffuse part of the body.
 
@@ -78,7 +78,7 @@ def test_white_sets_before_white_are_not_seen(radius: float) -> None:
     assert abs(colors.mean() - 1) < 0.01
 
 
-@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("body", one_of(*BODIES))
 def test_white_objects_before_white_are_not_seen(body: str) -> None:
     objects = {"body": {**BODIES[body], "material": "m"}}
     material = skin({"roughness": 0.4}, color=[1, 1, 1], radius=0.2, scatter_anisotropy=0.4)
