@@ -95,13 +95,13 @@ def test_colours_spread_and_are_white_together() -> None:
     plain = seen(ball(0, background=grey), 16)[0]
     assert np.abs(plain[:, 0] - plain[:, 2]).max() < 1e-4
     spread: dict[str, Any] = {"dispersion_scale": 1, "dispersion_abbe_number": 5}
-    colors = seen(ball(0, background=grey, transmission=spread), 96)[0]
+    colors = seen(ball(0, background=grey, transmission=spread), 128)[0]
     apart = colors[:, 0] - colors[:, 2]
     half = len(apart) // 2
     # The picture is upside down: above, blue, which is bent more, comes from deeper.
     assert apart[:half].mean() > 0.01
     assert apart[half:].mean() < -0.01
-    white = seen(ball(0, transmission=spread), 96)[0]
+    white = seen(ball(0, transmission=spread), 128)[0]
     assert np.abs(white.mean(axis=0) - 1).max() < 0.01
 
 
