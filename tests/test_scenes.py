@@ -28,6 +28,7 @@ from tests.pictures import (
     small_film,
     small_picture,
 )
+from tests.variants import every
 
 # In levels of 8 bits. PoCL 3.1 and the PoCL wheel give the same pictures, bit for bit; Intel's runtime differs
 # in five scenes, by a mean of at most 0.27 and in a block by at most 8.7 (both in hast_above,
@@ -79,13 +80,7 @@ FILLED = (
 each_scene = pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem, scope="module")
 # A program or more for each: `make test` renders every fourth.
 each_picture = pytest.mark.parametrize(
-    "path",
-    [
-        pytest.param(path, marks=() if n % 4 == 1 else pytest.mark.combination)
-        for n, path in enumerate(SCENES)
-    ],
-    ids=lambda path: path.stem,
-    scope="module",
+    "path", every(4, SCENES, start=1), ids=lambda path: path.stem, scope="module"
 )
 
 

@@ -24,6 +24,7 @@ from clfractal.scene.movement import movement_of
 from clfractal.scene.volume import VolumeRenderer
 from tests.makers import maker
 from tests.pictures import scene_paths
+from tests.variants import every
 
 FILMS = [path for path in scene_paths() if load_scene(path).animation is not None]
 each_film = pytest.mark.parametrize("path", FILMS, ids=lambda path: path.stem, scope="module")
@@ -149,11 +150,7 @@ def test_the_last_frame_leads_into_the_first(path: Path) -> None:
         np.testing.assert_allclose(judge(points), judge(points + whole), rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "path",
-    [pytest.param(path, marks=() if n % 3 == 0 else pytest.mark.combination) for n, path in enumerate(FILMS)],
-    ids=lambda path: path.stem,
-)
+@pytest.mark.parametrize("path", every(3, FILMS), ids=lambda path: path.stem, scope="module")
 def test_its_frames_show_something(path: Path) -> None:
     """At its beginning, on its way and at its end, not only where the still of the scene is."""
     small = [f"image.width={SMALL[0]}", f"image.height={SMALL[1]}"]

@@ -73,7 +73,7 @@ def columns(radius: Doubles, mu: Doubles) -> Doubles:
 
 
 def _densities(height: Doubles) -> list[npt.NDArray[np.float32]]:
-    """Of each gas. Single numbers are enough once the height is known, and take a quarter of the time."""
+    """Of each gas. Once the height is known float32 is enough, and takes a quarter of the time."""
     above = np.maximum(height, 0.0).astype(np.float32)
     found: list[npt.NDArray[np.float32]] = []
     for scale in (_MOLECULES, _AEROSOL):

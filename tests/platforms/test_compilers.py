@@ -16,7 +16,7 @@ from clfractal.device.structs import Precision
 from clfractal.resources import folder
 from tests.platforms import clang
 from tests.platforms.programs import EVERY_KIND, Named, every_text, of_formulas
-from tests.variants import one_of
+from tests.variants import every
 
 EXPECTED = "CLFRACTAL_EXPECT_CLANG"
 """Set to 1: a missing clang is a failure, not a reason to skip."""
@@ -61,11 +61,9 @@ def checked(programs: list[Named], precision: Precision) -> None:
 
 @pytest.mark.parametrize(
     ("lanes", "precision"),
-    [
-        (4, "float32"),
-        (1, "float64"),
-        *one_of((16, "float32"), (1, "float32"), (4, "float64"), (16, "float64"))[1:],
-    ],
+    every(
+        5, [(4, "float32"), (1, "float32"), (16, "float32"), (4, "float64"), (16, "float64"), (1, "float64")]
+    ),
 )
 def test_every_program_is_opencl_1_2(lanes: int, precision: Precision) -> None:
     checked(list(every_text(lanes, precision)), precision)

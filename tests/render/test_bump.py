@@ -91,7 +91,7 @@ HEIGHTS: dict[str, tuple[dict[str, Any], Callable[[dict[str, Floats]], Floats]]]
 }
 
 
-@pytest.mark.parametrize("by", one_of("distance", "height", "normal"))
+@pytest.mark.parametrize("by", one_of(*HEIGHTS))
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_normals_are_those_of_the_displaced_ball(by: str, precision: str) -> None:
     if precision == "float64" and not has_float64(choose().info):
@@ -291,7 +291,7 @@ FURNACES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", one_of("lacquer", "metal", "clay"))
+@pytest.mark.parametrize("name", one_of(*FURNACES))
 def test_white_before_white_is_not_seen(name: str) -> None:
     """A steep relief on a convex body loses no light, and makes none."""
     steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.3], [1, 0]]}
@@ -359,7 +359,7 @@ def test_normals_face_the_viewer() -> None:
 
 
 @pytest.mark.combination
-@pytest.mark.parametrize("lanes", one_of(4, 8, 16))
+@pytest.mark.parametrize("lanes", [4, 8, 16])
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
     if lanes not in accepted_lanes(choose(), "float32"):
         pytest.skip("the device has no such packets")

@@ -174,14 +174,15 @@ def among_many(glow: dict[str, Any], samples: int, bounces: int = 3) -> Scene:
     return lit(objects, samples, bounces, camera, materials=materials)
 
 
+@pytest.mark.combination
 def test_asking_and_chance_agree(device: Device) -> None:
     # After the last bounce lamps are still asked for, and nothing is met any more.
     asked, chance = (
-        colors(among_many(GLOW, 64), device),
-        colors(among_many(BY_CHANCE, 512, bounces=4), device),
+        colors(among_many(GLOW, 256), device),
+        colors(among_many(BY_CHANCE, 2048, bounces=4), device),
     )
-    assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.01)
-    one, other = (each.reshape(2, 12, 2, 12, 3).mean(axis=(1, 3)) for each in (asked, chance))
+    assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.005)
+    one, other = (each.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3)) for each in (asked, chance))
     np.testing.assert_allclose(one, other, rtol=0.04, atol=0.004)
 
 
@@ -315,12 +316,12 @@ def test_all_kinds_of_light_add_up(device: Device) -> None:
     sky = {"name": "overcast", "intensity": 0.5}
 
     def mean(glow: dict[str, Any], **sections: Any) -> Floats:
-        found = colors(lit(lamps, 96, 1, materials={**MATERIALS, "glow": glow}, **sections), device)
+        found = colors(lit(lamps, 256, 1, materials={**MATERIALS, "glow": glow}, **sections), device)
         return np.asarray(found.mean(axis=(0, 1)))
 
     parts = [mean(GLOW), mean(dark, lights=lights), mean(dark, environment=sky)]
     assert min(part.min() for part in parts) > 0.03
-    assert mean(GLOW, lights=lights, environment=sky) == pytest.approx(sum(parts), rel=0.01)
+    assert mean(GLOW, lights=lights, environment=sky) == pytest.approx(sum(parts), rel=0.005)
 
 
 @pytest.mark.combination

@@ -201,9 +201,7 @@ def test_the_eye_sees_the_nearest_ball(device: Device) -> None:
 
 
 @pytest.mark.combination
-@pytest.mark.parametrize(
-    "mode", [pytest.param({}, id="direct", marks=pytest.mark.combination), pytest.param(PATHS, id="path")]
-)
+@pytest.mark.parametrize("mode", [{}, PATHS], ids=["direct", "path"])
 def test_pictures_repeat_for_any_number_of_lanes(device: Device, mode: dict[str, Any]) -> None:
     scene = lit({"count": 300, "radius": 0.01}, 8, **mode)
     one, many = (shoot(scene, device, lanes=lanes)["R"] for lanes in (1, 8))

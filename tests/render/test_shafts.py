@@ -22,6 +22,7 @@ from tests.render.shots import (
     stacked,
     to_sphere,
 )
+from tests.variants import every
 
 SIDE = 32
 ALBEDO = np.array([1.0, 0.5, 0.25])
@@ -91,17 +92,8 @@ FOGS: list[dict[str, Any]] = [
 ]
 
 
-CASES = [
-    *zip(LIGHTS, FOGS, (False, True, False), strict=True),
-    *(
-        pytest.param(light, fog, paths, marks=pytest.mark.combination)
-        for (i, light), (j, fog), paths in product(enumerate(LIGHTS), enumerate(FOGS), (False, True))
-        if i != j or paths == (i != 1)
-    ),
-]
-
-
-@pytest.mark.parametrize(("light", "fog", "paths"), CASES)
+# Every fourth: each light, each fog and both modes.
+@pytest.mark.parametrize(("paths", "light", "fog"), every(4, product((False, True), LIGHTS, FOGS)))
 def test_scattered_light_is_the_integral(
     device: Device, light: dict[str, Any], fog: dict[str, Any], paths: bool
 ) -> None:

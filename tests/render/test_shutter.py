@@ -25,7 +25,7 @@ from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
 from clfractal.work.job import Job
 from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS
-from tests.variants import one_of
+from tests.variants import combinations, one_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -234,9 +234,7 @@ def test_passes_and_tiles_make_no_difference(kind: str, engine: Engine) -> None:
         np.testing.assert_array_equal(part[name], whole[name][y : y + height, x : x + width], name)
 
 
-@pytest.mark.parametrize(
-    "kind", [kind if kind != "lens" else pytest.param(kind, marks=pytest.mark.combination) for kind in KINDS]
-)
+@pytest.mark.parametrize("kind", [*(kind for kind in KINDS if kind != "lens"), *combinations(["lens"])])
 def test_every_kind_of_picture_is_blurred(kind: str, engine: Engine) -> None:
     """It is the mean of sharp pictures at times of the opening, up to noise, and none of these alone."""
     samples, times = {"lens": 4096, "layout": 1024}.get(kind, 64), 16

@@ -19,6 +19,7 @@ import pytest
 from clfractal.device import gl_sharing, select
 from clfractal.device.gl_sharing import GLHandles
 from clfractal.errors import DeviceError
+from tests.variants import every
 from tests.viewer import gl_layer
 from tests.viewer.sharing_mistakes import MISTAKES
 
@@ -154,13 +155,7 @@ def test_textures_that_cannot_be_shared_are_refused_in_one_line(screen: Screen, 
 
 
 @pytest.mark.skipif(cl.have_gl(), reason="pyopencl makes the calls that are changed")
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=() if n % 3 == 0 else pytest.mark.combination)
-        for n, name in enumerate(MISTAKES)
-    ],
-)
+@pytest.mark.parametrize("name", every(3, MISTAKES))
 def test_a_mistake_is_caught(screen: Screen, name: str) -> None:
     mistake = MISTAKES[name]
     found = screen.run("sharing_child", "glx", name, **mistake.environment)

@@ -37,6 +37,7 @@ from clfractal.work.variations import (
 from clfractal.work.varied import AMOUNT, Kind, Strength, is_locked, rounded
 from clfractal.work.vary_colors import Grade
 from clfractal.work.vary_formula import expanded, moved_value, shown_parameters, slots
+from tests.variants import every
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
 BULB = load_scene("""version: 1
@@ -130,7 +131,7 @@ def test_every_shipped_scene_has_them_at_every_strength(strength: Strength) -> N
         check_twelve(path, strength)
 
 
-@pytest.mark.parametrize("path", SCENES[::3], ids=lambda path: str(path.stem))
+@pytest.mark.parametrize("path", every(3, SCENES), ids=lambda path: str(path.stem))
 def test_nothing_that_tunes_the_search_changes(path: Path) -> None:
     scene = load_scene(path)
     for each in variations(scene, strength="heavy", seed=3):
