@@ -39,7 +39,7 @@ def joined(objects: dict[str, Any], material: dict[str, Any], **sections: Any) -
 def test_glass_before_white_is_not_seen(roughness: float) -> None:
     """Also where something is cut out of it, and flows into it."""
     camera = {"position": [0.6, -4, 1], "fov": 36}
-    colors = colors_of(joined(HOLES, glass(roughness), camera=camera), 16)
+    colors = colors_of(joined(HOLES, glass(roughness), camera=camera), 32)
     assert abs(colors.mean() - 1) < 0.01
     assert np.percentile(colors, 2) > 0.8
 
