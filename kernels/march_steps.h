@@ -62,8 +62,10 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
     m->found.last = pick(done, m->found.t, m->found.last);
     m->active &= ~done;
 
-    const real onward = pick(inside, fmax(m->t - m->pace, m->r.near), m->t + m->pace);
+    // Far off a step may be less than numbers tell apart, and a footprint may be 0: a ray gets on all the same.
+    const real way = fmax(m->pace, finest);
+    const real onward = pick(inside, fmax(m->t - way, m->r.near), m->t + way);
     m->t = pick(bracketed, R(0.5) * (m->low + m->high), onward);
-    m->pace = fmin(SHADOW_GROWTH * m->pace, step);
+    m->pace = fmin(SHADOW_GROWTH * way, step);
     m->active &= less_equal(m->t, m->r.far);
 }

@@ -6,7 +6,7 @@
 #if POINTS > 1
 typedef struct {
     bits seed;
-    real cone;                  // the pixel's, where the shared march ended
+    real cone;                  // the pixel's, where the shared march ended, or at the object that is seen
     real count;                 // points that found the surface
     real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
     vec point, base, normal;    // base: where it is shaded
@@ -103,6 +103,10 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
     p->base = vec_pick(nearer, base, p->base);
     p->normal = vec_pick(nearer, met.normal, p->normal);
     p->smooth = pick(nearer, met.smooth, p->smooth);
+#if HAS_OBJECTS
+    // The shared march knows nothing of objects: where it ended says nothing of how wide the cone is at one.
+    p->cone = pick(nearer & ~of_the_set(object, w), r.footprint + r.spread * met.t, p->cone);
+#endif
     p->object = pick(nearer, object, p->object);
 #if JOINS_SMOOTHLY
     p->other = pick(nearer, met.other, p->other);

@@ -81,6 +81,37 @@ def test_set_and_objects_shadow_each_other(device: Device, mode: str) -> None:
     assert np.median(np.abs(a - b)) < 1e-4
 
 
+@pytest.mark.parametrize("search", ["distance", "steps"])
+def test_the_set_shadows_what_points_of_pixels_see_beside_it(device: Device, search: str) -> None:
+    """The cone of such a pixel's shared march ends nowhere; its light's rays have a width all the same, and arrive."""
+    way = np.array([0.4, 0.2, -1.0])
+    scene = scene_of(
+        BALL,
+        {"position": [3, -5, 5], "target": [0, 0, -1.6], "fov": 50},
+        (64, 64),
+        objects={"floor": {**FLOOR, "position": [0, 0, -1.6]}},
+        materials={"white": WHITE},
+        material=DULL,
+        lights=[{"direction": way.tolist()}],
+        renderer={"search": search, "points": {"pattern": "grid", "count": 4}, "detail": 0.05},
+        background=[0, 0, 0],
+    )
+    film = shoot(scene, device)
+    points = points_of(film)
+    on_floor = (film["A"] == 1) & (np.abs(points[..., 2] + 1.6) < 1e-4)
+    toward = -way / np.linalg.norm(way)
+    along = points @ toward
+    # How far a shadow ray passes the middle of the ball.
+    passes = np.sqrt((points**2).sum(-1) - along**2)
+    expected = np.where(passes < 4.0 ** (2.0**-8), 0, toward[2])
+    # At the ball's rim points of a pixel lie on both.
+    all_on_floor = np.lib.stride_tricks.sliding_window_view(np.pad(on_floor, 1, mode="edge"), (3, 3)).all((2, 3))
+    sure = all_on_floor & (np.abs(passes - 1) > 0.08)
+    assert (expected[sure] == 0).sum() > 90
+    assert (expected[sure] > 0).sum() > 800
+    np.testing.assert_allclose(colors(film)[sure][:, 0], expected[sure], atol=1e-4)
+
+
 @pytest.mark.parametrize(("light", "expected"), CASES, ids=["sphere", "rectangle", "spot"])
 @pytest.mark.parametrize("mode", ["direct", "path"])
 def test_a_plane_has_the_irradiance_of_closed_forms(

@@ -231,6 +231,16 @@ def test_steps_of_a_ball(device: Device) -> None:
     assert np.abs(within["Z"]).max() < 1e-6
 
 
+def test_steps_arrive_from_where_numbers_are_coarser_than_they(device: Device) -> None:
+    camera = {**ORTHOGRAPHIC, "position": [0, -1e6, 0], "target": [0, 0, 0]}
+    scene = scene_of(BALL, camera, (SIDE, SIDE), lights=[], renderer={"search": "steps", "step": 0.01})
+    found = found_by(device, scene)
+    assert 0.01 < EPSILON["float32"] * 1e6
+    _, nearest = to_sphere(found.origin, found.direction, [0, 0, 0], BALL_RADIUS)
+    sure = np.abs(nearest - BALL_RADIUS) > 0.1  # scene units: what a depth of some 0.25 does near the rim
+    np.testing.assert_array_equal(found.hit[sure], (nearest < BALL_RADIUS)[sure])
+
+
 def test_shadows_of_steps_begin_small(device: Device) -> None:
     """Place by place: steps of a ray to a light grow from the size of a pixel to the whole step, half as long again each
     time. Here a whole step at once would pass most of the ball that hovers over the box."""
