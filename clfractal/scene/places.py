@@ -27,6 +27,8 @@ _BATCH, _MOST_BATCHES = 20_000, 12
 _FEW = 1_000
 # Places to choose from for each that is wanted.
 _CHOICE = 4
+# Where the nearest place of a batch is so many thresholds away, others will not be much nearer.
+_HOPELESS = 2
 # Applications after which an orbit's trap is known well enough: it bounds the time.
 _MOST_APPLICATIONS = 200
 
@@ -142,7 +144,7 @@ def near_trap(
         chosen = near < threshold
         pool.append((surface[chosen], normal[chosen], near[chosen]))
         enough += int(chosen.sum())
-        if enough >= _CHOICE * count:
+        if enough >= _CHOICE * count or (enough == 0 and _HOPELESS * threshold < nearest < np.inf):
             break
     if not reached:
         return "no place of the surface was found; give a larger ball in within, or remove it"

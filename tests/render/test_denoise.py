@@ -54,7 +54,7 @@ def test_a_denoised_picture_is_nearer_to_the_truth(device: Device) -> None:
     engine = engine_of(device)
     clean = engine.render(bulb(denoise=True, channels=["R", "G", "B", "A", *NOISY]))
     noisy = engine.render(bulb(channels=["R", "G", "B", "A"]))
-    truth = colors(engine.render(bulb(300)))
+    truth = colors(engine.render(bulb(150)))
     assert np.array_equal(colors(clean, NOISY), colors(noisy))
     assert np.array_equal(clean["A"], noisy["A"])
     assert clean.channels == ("R", "G", "B", "A", *NOISY)

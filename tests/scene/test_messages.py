@@ -216,7 +216,7 @@ CASES = [
     ),
     (
         "lights: [{type: set, trap: {center: [9, 9, 9]}, threshold: §0.5}]",
-        "lights.0.threshold: no place of the set is that near to the trap: the nearest is 1.24 away, got 0.5",
+        "lights.0.threshold: no place of the set is that near to the trap: the nearest is 1.25 away, got 0.5",
     ),
     (
         "renderer: {type: cut_plane}\nlights: [{type: §set, threshold: 1}]",

@@ -33,7 +33,7 @@ def error(found: Any, exact: Any) -> float:
 
 def test_at_rest_the_noise_is_gone(device: Device) -> None:
     noisy, wanted = scene_of(BULB, *PATHS), scene_of(BULB, *PATHS, CLEAN)
-    exact = colors(clfractal.render(noisy, samples=256, channels=("R", "G", "B")))
+    exact = colors(clfractal.render(noisy, samples=128, channels=("R", "G", "B")))
     with session_on(device) as watch:
         before = colors(films_of(watch.finished(noisy)).films[0])
         frame = watch.finished(wanted)
