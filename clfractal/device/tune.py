@@ -19,7 +19,7 @@ LANE_COUNTS = (1, 4, 8, 16)
 PROBE = "clfractal.device.probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
-_VERSION = 5  # of the probes: older measurements no longer count
+_VERSION = 6  # of the probes: older measurements no longer count
 _SECTION = "lanes"
 
 
