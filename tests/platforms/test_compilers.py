@@ -16,7 +16,7 @@ from clfractal.device.structs import Precision
 from clfractal.resources import folder
 from tests.platforms import clang
 from tests.platforms.programs import EVERY_KIND, Named, every_text, of_formulas
-from tests.variants import every
+from tests.variants import every, one_of
 
 EXPECTED = "CLFRACTAL_EXPECT_CLANG"
 """Set to 1: a missing clang is a failure, not a reason to skip."""
@@ -73,7 +73,7 @@ def test_every_formula_of_the_library_is_opencl_1_2() -> None:
     checked(list(of_formulas()), "float32")
 
 
-@pytest.mark.parametrize("maker", GPUS)
+@pytest.mark.parametrize("maker", one_of(*GPUS))
 def test_every_program_becomes_code_of_a_gpu(maker: str) -> None:
     """With numbers of 32 bits alone, and calls of nothing but its own functions and OpenCL's (whose names are mangled)."""
     for name, program in every_text(1, "float32", EVERY_KIND):

@@ -1,7 +1,7 @@
 """`python -m tests.portability [--tested] [--all] [NAME ...]`: the same tests and pictures on every OpenCL implementation.
 
 With `--all` an implementation that this user or machine may not have is a fault, too, and is not passed over.
-With `--tested` the first, which every installation has, gets no tests, since `make test` has run them all on it, and
+With `--tested` the one that the program takes by itself gets no tests, since `make test` has run them all on it, and
 fewer pictures are rendered: those that differ in kind, as golden pictures have shown the formulas on it.
 
 Each implementation runs alone, in processes of its own: first the tests marked `conformance`, then the
@@ -30,6 +30,7 @@ from tests.portability.implementations import (
     Implementation,
     MissingError,
     NotAllowedError,
+    taken_by_itself,
 )
 from tests.portability.pictures import PARTS
 
@@ -39,8 +40,8 @@ _TIMEOUT_S = 1800
 def main() -> int:
     """The exit status: 0 if every implementation is there and passes."""
     wanted = [argument for argument in sys.argv[1:] if argument not in ("--tested", "--all")]
-    tested = IMPLEMENTATIONS[0] if "--tested" in sys.argv else None
-    kind = "full" if tested is None else "brief"
+    tested = taken_by_itself() if "--tested" in sys.argv else None
+    kind = "brief" if "--tested" in sys.argv else "full"
     unknown = set(wanted) - {each.name for each in IMPLEMENTATIONS}
     if unknown:
         known = ", ".join(each.name for each in IMPLEMENTATIONS)

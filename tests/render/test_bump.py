@@ -139,6 +139,7 @@ def least_height(points: Floats, applications: int = 12) -> Floats:
     return np.where(np.isfinite(least), least, np.abs(points[:, 2]))
 
 
+@pytest.mark.combination
 def test_traps_are_compared_over_the_width() -> None:
     """The same differences of the same orbits in NumPy."""
     ball = {"name": "quaternion_julia", "iterations": 3, "julia": [0, 0, 0, 0]}
@@ -249,6 +250,7 @@ def test_water_has_waves_and_a_relief() -> None:
 # -- blends
 
 
+@pytest.mark.combination
 def test_masks_make_edges() -> None:
     """A material that lies 0.3 over another: the mask's slope is the edge's."""
     materials = {

@@ -42,6 +42,7 @@ def test_milk_before_white_is_not_seen(body: str, ior: float, anisotropy: float)
     assert abs(colors_of(found, 16).mean() - 1) < 0.01
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("ior", one_of(1.5, 1.005))
 def test_sets_of_milk_before_white_are_not_seen(ior: float) -> None:
     """Within a set each scattering is a bounce."""

@@ -79,6 +79,7 @@ def test_glass_before_white_is_not_seen(body: str, roughness: float) -> None:
     assert abs(colors.mean() - 1) < 0.005
 
 
+@pytest.mark.combination
 def test_glass_in_glass_before_white_is_not_seen() -> None:
     """Whichever is the denser, and whether it is an object or the set; and where three stand in each other."""
     materials = {"box": glass(0.2, 1.3), "ball": glass(0, 1.6), "set": glass(0.1, 1.2)}

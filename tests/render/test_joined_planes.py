@@ -115,6 +115,7 @@ def test_what_is_not_named_stands_whole() -> None:
     assert (film["P.Y"][egg] < 0.09).all(), "the egg is in front of the plane"
 
 
+@pytest.mark.combination
 def test_a_named_object_keeps_its_colour_behind_the_plane() -> None:
     """Beside the face it is seen as it was, where the plane's rectangle does not stand."""
     scene = {

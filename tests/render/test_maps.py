@@ -169,6 +169,7 @@ def test_two_questions_have_their_own_answers() -> None:
     assert np.abs(both - first * second).max() < 2e-3
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("mask", one_of(1, 0))
 def test_a_blend_at_its_ends_is_its_part(mask: int) -> None:
     """Bit for bit, nested as well."""

@@ -158,7 +158,7 @@ MATERIALS = {
 }
 
 
-@pytest.mark.parametrize("mode", ["direct", "path"])
+@pytest.mark.parametrize("mode", one_of("direct", "path"))
 def test_the_order_of_objects_changes_nothing(device: Device, mode: str) -> None:
     found = []
     for order in (["floor", "left", "right", "through"], ["through", "right", "floor", "left"]):
@@ -215,7 +215,7 @@ def test_points_of_a_pixel_find_objects_on_their_own_rays(device: Device) -> Non
     assert (np.abs(film["A"] - expected) > 1e-5).sum() <= 1
 
 
-@pytest.mark.parametrize("points", [1, 9])
+@pytest.mark.parametrize("points", one_of(9, 1))
 def test_an_object_hides_the_face_of_a_cut(device: Device, points: int) -> None:
     plane = {"center": [0, 0, 0], "normal": [0, -1, 0]}
     camera = {"position": [0, -4, 0], "target": [0, 0, 0], "fov": 40}

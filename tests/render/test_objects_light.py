@@ -105,7 +105,9 @@ def test_the_set_shadows_what_points_of_pixels_see_beside_it(device: Device, sea
     passes = np.sqrt((points**2).sum(-1) - along**2)
     expected = np.where(passes < 4.0 ** (2.0**-8), 0, toward[2])
     # At the ball's rim points of a pixel lie on both.
-    all_on_floor = np.lib.stride_tricks.sliding_window_view(np.pad(on_floor, 1, mode="edge"), (3, 3)).all((2, 3))
+    all_on_floor = np.lib.stride_tricks.sliding_window_view(np.pad(on_floor, 1, mode="edge"), (3, 3)).all(
+        (2, 3)
+    )
     sure = all_on_floor & (np.abs(passes - 1) > 0.08)
     assert (expected[sure] == 0).sum() > 90
     assert (expected[sure] > 0).sum() > 800

@@ -225,6 +225,7 @@ def test_fewer_channels_are_the_same(device: Device, wholes: dict[str, npt.NDArr
         assert same(film[name], np.ascontiguousarray(expected)), name
 
 
+@pytest.mark.combination
 @pytest.mark.parametrize("name", ["mandelbulb"])
 def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
     """Packets of another width are another program, whose compiler may fuse other products with sums: the last bits
