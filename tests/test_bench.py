@@ -138,7 +138,7 @@ def test_only_the_wanted_rows_are_measured(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(bench, "_render_row", row)
     monkeypatch.setattr(bench, "_grid_row", lambda device: row(bench.GRID_ROW))
     monkeypatch.setattr(bench, "_shell_row", lambda device: row(bench.SHELL_ROW))
-    monkeypatch.setattr(bench.frames, "frame_times", lambda name, device: (1.0, 2.0))
+    monkeypatch.setattr("clfractal.commands.frames.frame_times", lambda name, device: (1.0, 2.0))
     monkeypatch.setattr(bench, "fma_peak", lambda device, precision: 100.0)
     report = tmp_path / "bench.json"
     shell = Shell(owns_process=False)
