@@ -39,7 +39,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
 
-.PHONY: demo view test combinations window cluster kills soak lint locks lowest bench truth mutate gpu-check portability install clean
+.PHONY: demo view test light combinations window cluster kills soak lint locks lowest bench truth mutate gpu-check portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -53,7 +53,11 @@ view: $(VENV)/.viewer
 install: $(VENV)/.installed
 
 test: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m "not combination" $(PARALLEL) $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m "not combination and not light" $(PARALLEL) $(ARGUMENTS)
+
+# Light along paths: furnaces, closed forms, Mitsuba 3 beside it. Its truth is in statistics, which take samples.
+light: $(VENV)/.tested-with $(STAGE)/.linked
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest tests/render -m "light and not combination" $(PARALLEL) $(ARGUMENTS)
 
 # Every formula, number type, lane count, normal and picture that the usual tests show by examples.
 combinations: $(VENV)/.tested-with $(STAGE)/.linked

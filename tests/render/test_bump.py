@@ -21,6 +21,8 @@ from tests.render.test_maps import BULB, ramp
 from tests.render.test_paths import GREY, path, scene_of, seen
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 EYE = np.array([0.0, -4.0, 0.0])

@@ -14,6 +14,8 @@ from tests.render.material_kernel import NORMAL, ask, turned
 from tests.render.test_materials import LOBES, NO_GLOSS, hemisphere, material, toward
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.floating[Any]]
 
 GLASS = {"base": {"color": [1, 1, 1]}, "specular": {"roughness": 0.4}, "transmission": {"weight": 1}}

@@ -19,6 +19,8 @@ from tests.render.shots import BALL_ITERATIONS, Floats, rays, shoot, stacked
 from tests.render.volumes import keep, middles, to_box, value_at
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 VOXELS = 16
 VOXEL = 2 / VOXELS
 OPACITY = 0.12

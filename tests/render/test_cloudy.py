@@ -20,6 +20,8 @@ from tests.render.test_glass_paths import ball
 from tests.render.test_paths import BLACK, path, scene_of, seen
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 WHITE = {"scatter": [1, 1, 1]}

@@ -21,6 +21,8 @@ from clfractal.scene.model import Scene
 from tests.render.shots import engine_of
 from tests.render.test_paths import path, scene_of
 
+pytestmark = pytest.mark.light
+
 pyoidn = pytest.importorskip("pyoidn")
 
 Floats = npt.NDArray[np.float32]

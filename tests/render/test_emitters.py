@@ -14,6 +14,8 @@ from tests.render.objects_oracle import NOWHERE, rotation_of
 from tests.render.shots import Floats, points_of, scene_of, shoot, stacked
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 SIZE = (24, 24)
 # From below what shines above, down to the floor.
 CAMERA = {"position": [0.1, -0.05, 0.45], "target": [0.1, -0.05, 0], "up": [0, 1, 0], "fov": 120}

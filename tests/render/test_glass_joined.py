@@ -11,6 +11,8 @@ from tests.render.test_glass_objects import BODIES, FAR_OFF, Floats, colors_of, 
 from tests.render.test_paths import BALL, GREY, path, scene_of
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 HOLES: dict[str, Any] = {
     "hole": {"type": "sphere", "radius": 0.5, "position": [0.2, -0.9, 0.3], "join": "cut"},
     "hollow": {

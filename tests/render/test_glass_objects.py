@@ -18,6 +18,8 @@ from clfractal.scene.model import Scene
 from tests.render.test_paths import BALL, GREY, path, scene_of
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 BODIES: dict[str, dict[str, Any]] = {

@@ -19,6 +19,8 @@ from tests.portability.pictures import picture
 from tests.render.test_paths import BALL, GREY, path, scene_of, seen
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 

@@ -23,6 +23,8 @@ from clfractal.work.prepare import prepare
 from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 DARK: dict[str, Any] = {"base": {"weight": 0}, "specular": {"weight": 0}}

@@ -14,6 +14,8 @@ from clfractal.scene.materials import PbrMaterial
 from tests.render.material_kernel import ask, turned
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.floating[Any]]
 
 WHITE: dict[str, Any] = {"color": [1, 1, 1]}

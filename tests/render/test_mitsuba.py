@@ -23,6 +23,8 @@ import pytest
 
 import clfractal
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 WIDTH, HEIGHT, SAMPLES, SEEDS = 48, 32, 96, 6

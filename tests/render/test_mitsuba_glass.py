@@ -20,6 +20,8 @@ import pytest
 
 import clfractal
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 SIZE, SAMPLES, SEEDS, REGIONS = 32, 48, 6, 4

@@ -17,6 +17,8 @@ from clfractal.errors import SceneError
 from clfractal.scene.model import Scene
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 BALL = {"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]}

@@ -19,6 +19,8 @@ from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, scene_of, 
 from tests.render.test_coloring import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 SIDE = 32
 BLACK = {"color": [0, 0, 0], "ambient": 0, "diffuse": 0, "specular": 0}
 DARK = {"top": [0, 0, 0], "bottom": [0, 0, 0]}

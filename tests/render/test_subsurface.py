@@ -23,6 +23,8 @@ from tests.render.test_glass_objects import BODIES, colors_of, scene
 from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 MATT = {"weight": 0}

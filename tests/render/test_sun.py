@@ -19,6 +19,8 @@ from clfractal.scene.sun import SOLID_ANGLE, Sun, sun_of
 from tests.render.environment_kernel import ask, settings_of
 from tests.render.test_environment_kernel import check_usable, every_variant
 
+pytestmark = pytest.mark.light
+
 Floats = npt.NDArray[np.float64]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])

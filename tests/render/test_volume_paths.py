@@ -22,6 +22,8 @@ from tests.render.shots import Floats, rays, shoot, stacked
 from tests.render.volumes import keep, middles, to_box, value_at
 from tests.scene.test_environment import write_map
 
+pytestmark = pytest.mark.light
+
 SIDE, VOXELS = 2.0, 20
 VOXEL = SIDE / VOXELS
 CORNER, SIDES = np.full(3, -SIDE / 2), np.full(3, SIDE)
