@@ -176,6 +176,8 @@ class _Builder:
             mark: Any = error.problem_mark or error.context_mark
             place = Where(self.file, mark.line + 1, mark.column + 1) if mark is not None else Where(self.file)
             problem = error.problem or error.context or "cannot be read"
+            if "nesting depth" in problem:  # libyaml's own limit, of 1000, when it looks ahead
+                raise self.error(f"nested more than {MAX_DEPTH} levels deep", place) from error
             near = text.splitlines()[max(mark.line - 3, 0) : mark.line + 1] if mark is not None else []
             # The rest of the line is a comment then, the closing bracket included.
             bare = next(filter(None, map(_BARE_COLOR.search, near)), None)
