@@ -1,8 +1,7 @@
-"""`python -m tests.portability [--tested] [--all] [NAME ...]`: the same tests and pictures on every OpenCL implementation.
+"""`python -m tests.portability [--brief] [--all] [NAME ...]`: the same tests and pictures on every OpenCL implementation.
 
 With `--all` an implementation that this user or machine may not have is a fault, too, and is not passed over.
-With `--tested` the one that the program takes by itself gets no tests, since `make test` has run them all on it, and
-fewer pictures are rendered: those that differ in kind, as golden pictures have shown the formulas on it.
+With `--brief` fewer pictures are rendered: those that differ in kind, as golden pictures show the formulas.
 
 Each implementation runs alone, in processes of its own: first the tests marked `conformance`, then the
 pictures of `pictures.py`; Oclgrind renders tiny ones and checks every access to memory. All pictures are then
@@ -15,7 +14,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -30,7 +29,6 @@ from tests.portability.implementations import (
     Implementation,
     MissingError,
     NotAllowedError,
-    taken_by_itself,
 )
 from tests.portability.pictures import PARTS
 
@@ -39,9 +37,8 @@ _TIMEOUT_S = 1800
 
 def main() -> int:
     """The exit status: 0 if every implementation is there and passes."""
-    wanted = [argument for argument in sys.argv[1:] if argument not in ("--tested", "--all")]
-    tested = taken_by_itself() if "--tested" in sys.argv else None
-    kind = "brief" if "--tested" in sys.argv else "full"
+    wanted = [argument for argument in sys.argv[1:] if argument not in ("--brief", "--all")]
+    kind = "brief" if "--brief" in sys.argv else "full"
     unknown = set(wanted) - {each.name for each in IMPLEMENTATIONS}
     if unknown:
         known = ", ".join(each.name for each in IMPLEMENTATIONS)
@@ -52,8 +49,7 @@ def main() -> int:
     faults: dict[str, list[str]] = {}
     for implementation in chosen:
         start, before = time.monotonic(), _processor_seconds()
-        parts = _parts(kind, tested=implementation is tested)
-        faults[implementation.name] = list(_examine(implementation, parts))
+        faults[implementation.name] = _examine(implementation, kind)
         took, worked = time.monotonic() - start, _processor_seconds() - before
         print(f"{implementation.name}: {took:.0f} s, {worked:.0f} s of a processor", flush=True)
     for name, fault in _compare(chosen, (kind, "tiny")):
@@ -70,7 +66,7 @@ def _processor_seconds() -> float:
     return times.children_user + times.children_system
 
 
-def _examine(implementation: Implementation, wanted: Sequence[Part]) -> list[str]:
+def _examine(implementation: Implementation, kind: str) -> list[str]:
     """What is wrong with one implementation by itself."""
     print(f"\n=== {implementation.name}", flush=True)
     try:
@@ -82,6 +78,9 @@ def _examine(implementation: Implementation, wanted: Sequence[Part]) -> list[str
         print(error)
         return ["not there and not to be installed"]
     environment.update(_oclgrind_checks(implementation))
+    # Each in processes of its own.
+    wanted: list[Part] = [_conformance_faults]
+    wanted += [partial(_picture_faults, half=half, kind=kind) for half in (0, 1)]
     # Most of the time goes into compiling, one core each. (The simulator's processes share a log.)
     with ThreadPoolExecutor(1 if implementation.simulator else 2) as both:
         parts = [
@@ -117,12 +116,6 @@ def _picture_faults(
 
 
 Part = Callable[[Implementation, Mapping[str, str]], list[str]]
-
-
-def _parts(kind: str, *, tested: bool) -> tuple[Part, ...]:
-    """What is done on an implementation, each in processes of its own."""
-    halves = tuple(partial(_picture_faults, half=half, kind=kind) for half in (0, 1))
-    return halves if tested else (_conformance_faults, *halves)
 
 
 def _tests(implementation: Implementation) -> list[str]:

@@ -14,7 +14,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from clfractal.device.select import choose
 from tests.portability import trixie
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -166,15 +165,6 @@ IMPLEMENTATIONS = (
     ),
     Implementation("oclgrind", "oclgrind", _oclgrind, simulator=True),
 )
-
-
-def taken_by_itself() -> Implementation | None:
-    """The one that tests run on where nobody names another."""
-    info = choose().info
-    described = f"{info.name} {info.platform} {info.version}".casefold()
-    # Those that only a part of their version tells from the wheel's come after it.
-    here = [each for each in IMPLEMENTATIONS if each.root is None and each.device.casefold() in described]
-    return here[-1] if here else None
 
 
 def _pip(folder: Path, *packages: str) -> None:
