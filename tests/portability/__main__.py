@@ -32,7 +32,7 @@ from tests.portability.implementations import (
 )
 from tests.portability.pictures import PARTS
 
-_TIMEOUT_S = 1800
+_TIMEOUT_S = 600
 
 
 def main() -> int:
