@@ -33,6 +33,33 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     return p;
 }
 
+#if HAS_SUBSURFACE
+// How much of the light that goes into a material meets its body, and how much its medium.
+typedef struct {
+    real body, medium;
+} pbr_shares;
+
+INLINE pbr_shares pbr_shares_of(const pbr *p) {
+    const real below = p->subsurface_weight * (R(1.0) - p->base_metalness);
+    const pbr_shares found = {R(1.0) - below, p->subsurface_weight};
+    return found;
+}
+
+// Scales what only those parts of the light meet: where materials are mixed a colour counts by what it colours, and one that is not
+// seen for nothing.
+INLINE void pbr_weigh(pbr *p, pbr_shares by) {
+    p->base_color = color_scale(p->base_color, by.body);
+    p->subsurface_color = color_scale(p->subsurface_color, by.medium);
+    p->subsurface_radius *= by.medium;
+}
+
+// The mean of parts that were weighed, from their sum.
+INLINE void pbr_mixed(pbr *sum, pbr_shares of) {
+    const pbr_shares by = {R(1.0) / fmax(of.body, R(1e-6)), R(1.0) / fmax(of.medium, R(1e-6))};
+    pbr_weigh(sum, by);
+}
+#endif
+
 INLINE pbr pbr_at(stage s, const spot *here, world w) {
 #if MATERIALS == 1
     return pbr_mapped(s, here, 0, w);
@@ -44,6 +71,9 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
     pbr sum;
     real *sums = (real *)&sum;
     for (int i = 0; i < NUMBERS_OF(pbr); ++i) sums[i] = R(0.0);
+#if HAS_SUBSURFACE
+    pbr_shares of = {R(0.0), R(0.0)};
+#endif
     for (int i = 0; i < MATERIALS; ++i) {
         if (!any_of(shares[i])) continue;
         __constant const struct Pbr *material = w.materials + i;
@@ -55,11 +85,20 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
             continue;
         }
 #endif
-        const pbr part = pbr_mapped(s, here, i, w);
+        pbr part = pbr_mapped(s, here, i, w);
+#if HAS_SUBSURFACE
+        const pbr_shares by = pbr_shares_of(&part);
+        pbr_weigh(&part, by);
+        of.body += shares[i] * by.body;
+        of.medium += shares[i] * by.medium;
+#endif
         const real *numbers = (const real *)&part;
         for (int j = 0; j < NUMBERS_OF(pbr); ++j) sums[j] += shares[i] * numbers[j];
     }
     sum.base_weight = sum.emission_luminance = R(1.0);
+#if HAS_SUBSURFACE
+    pbr_mixed(&sum, of);
+#endif
     return sum;
 #endif
 }
@@ -98,10 +137,21 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
         one.tint = object_color(here->normal, quantity, one.object, w);
         other.tint = object_color(here->normal, quantity, other.object, w);
         p = pbr_at(s, &one, w);
-        const pbr more = pbr_at(s, &other, w);
+        pbr more = pbr_at(s, &other, w);
+#if HAS_SUBSURFACE
+        pbr_shares of = pbr_shares_of(&p);
+        const pbr_shares by = pbr_shares_of(&more);
+        pbr_weigh(&p, of);
+        pbr_weigh(&more, by);
+        of.body += here->share * (by.body - of.body);
+        of.medium += here->share * (by.medium - of.medium);
+#endif
         for (int i = 0; i < NUMBERS_OF(pbr); ++i) {
             ((real *)&p)[i] += here->share * (((const real *)&more)[i] - ((real *)&p)[i]);
         }
+#if HAS_SUBSURFACE
+        pbr_mixed(&p, of);
+#endif
     }
 #endif
 #if HAS_FACES

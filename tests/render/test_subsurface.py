@@ -152,9 +152,8 @@ def test_a_ball_is_that_of_a_random_walk() -> None:
     np.testing.assert_allclose(of_object, expected, atol=0.01)
 
 
-@pytest.mark.combination
 def test_white_joined_sets_before_white_are_not_seen() -> None:
-    """Two materials flow into each other; a hole is cut into both."""
+    """Two materials flow into each other, of which one's base is black but never seen; a hole is cut into both."""
     objects = {
         "drop": {
             "type": "sphere",
