@@ -1,4 +1,31 @@
 // The material of a spot: what paths scatter by.
+#if HAS_SUBSURFACE
+// How much of the light that goes into a material meets its body, and how much its medium.
+typedef struct {
+    real body, medium;
+} pbr_shares;
+
+INLINE pbr_shares pbr_shares_of(const pbr *p) {
+    const real below = p->subsurface_weight * (R(1.0) - p->base_metalness);
+    const pbr_shares found = {R(1.0) - below, p->subsurface_weight};
+    return found;
+}
+
+// Scales what only those parts of the light meet: where materials are mixed a colour counts by what it colours, and one that is not
+// seen for nothing.
+INLINE void pbr_weigh(pbr *p, pbr_shares by) {
+    p->base_color = color_scale(p->base_color, by.body);
+    p->subsurface_color = color_scale(p->subsurface_color, by.medium);
+    p->subsurface_radius *= by.medium;
+}
+
+// The mean of parts that were weighed, from their sum.
+INLINE void pbr_mixed(pbr *sum, pbr_shares of) {
+    const pbr_shares by = {R(1.0) / fmax(of.body, R(1e-6)), R(1.0) / fmax(of.medium, R(1e-6))};
+    pbr_weigh(sum, by);
+}
+#endif
+
 #if !HAS_MAPS && MATERIALS == 1
 INLINE pbr pbr_at(stage s, const spot *here, world w) { return pbr_of(w.materials, here->tint); }
 #else
@@ -32,33 +59,6 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     p.base_weight = p.emission_luminance = R(1.0);
     return p;
 }
-
-#if HAS_SUBSURFACE
-// How much of the light that goes into a material meets its body, and how much its medium.
-typedef struct {
-    real body, medium;
-} pbr_shares;
-
-INLINE pbr_shares pbr_shares_of(const pbr *p) {
-    const real below = p->subsurface_weight * (R(1.0) - p->base_metalness);
-    const pbr_shares found = {R(1.0) - below, p->subsurface_weight};
-    return found;
-}
-
-// Scales what only those parts of the light meet: where materials are mixed a colour counts by what it colours, and one that is not
-// seen for nothing.
-INLINE void pbr_weigh(pbr *p, pbr_shares by) {
-    p->base_color = color_scale(p->base_color, by.body);
-    p->subsurface_color = color_scale(p->subsurface_color, by.medium);
-    p->subsurface_radius *= by.medium;
-}
-
-// The mean of parts that were weighed, from their sum.
-INLINE void pbr_mixed(pbr *sum, pbr_shares of) {
-    const pbr_shares by = {R(1.0) / fmax(of.body, R(1e-6)), R(1.0) / fmax(of.medium, R(1e-6))};
-    pbr_weigh(sum, by);
-}
-#endif
 
 INLINE pbr pbr_at(stage s, const spot *here, world w) {
 #if MATERIALS == 1
