@@ -1,30 +1,44 @@
 // The material of a spot: what paths scatter by.
-#if HAS_SUBSURFACE
-// How much of the light that goes into a material meets its body, and how much its medium.
+// Materials are mixed by the shares that they have in a spot. A colour counts by the light that it colours: that of a body which a medium
+// hides counts for nothing.
 typedef struct {
-    real body, medium;
-} pbr_shares;
+    pbr sum;
+#if HAS_SUBSURFACE
+    real body, medium;   // how much of the light meets the bodies and the media of all parts
+#endif
+} pbr_mix;
 
-INLINE pbr_shares pbr_shares_of(const pbr *p) {
-    const real below = p->subsurface_weight * (R(1.0) - p->base_metalness);
-    const pbr_shares found = {R(1.0) - below, p->subsurface_weight};
-    return found;
+INLINE pbr_mix pbr_nothing(void) {
+    pbr_mix m;
+    for (int i = 0; i < NUMBERS_OF(pbr_mix); ++i) ((real *)&m)[i] = R(0.0);
+    return m;
 }
 
-// Scales what only those parts of the light meet: where materials are mixed a colour counts by what it colours, and one that is not
-// seen for nothing.
-INLINE void pbr_weigh(pbr *p, pbr_shares by) {
-    p->base_color = color_scale(p->base_color, by.body);
-    p->subsurface_color = color_scale(p->subsurface_color, by.medium);
-    p->subsurface_radius *= by.medium;
-}
-
-// The mean of parts that were weighed, from their sum.
-INLINE void pbr_mixed(pbr *sum, pbr_shares of) {
-    const pbr_shares by = {R(1.0) / fmax(of.body, R(1e-6)), R(1.0) / fmax(of.medium, R(1e-6))};
-    pbr_weigh(sum, by);
+#if HAS_SUBSURFACE
+// Scales what only the light that meets the body, and the medium, is coloured by.
+INLINE void pbr_weigh(pbr *p, real body, real medium) {
+    p->base_color = color_scale(p->base_color, body);
+    p->subsurface_color = color_scale(p->subsurface_color, medium);
+    p->subsurface_radius *= medium;
 }
 #endif
+
+INLINE void pbr_add(pbr_mix *m, pbr part, real share) {
+#if HAS_SUBSURFACE
+    const real medium = part.subsurface_weight, body = R(1.0) - medium * (R(1.0) - part.base_metalness);
+    pbr_weigh(&part, body, medium);
+    m->body += share * body;
+    m->medium += share * medium;
+#endif
+    for (int i = 0; i < NUMBERS_OF(pbr); ++i) ((real *)&m->sum)[i] += share * ((const real *)&part)[i];
+}
+
+INLINE pbr pbr_mixed(pbr_mix m) {
+#if HAS_SUBSURFACE
+    pbr_weigh(&m.sum, R(1.0) / fmax(m.body, R(1e-6)), R(1.0) / fmax(m.medium, R(1e-6)));
+#endif
+    return m.sum;
+}
 
 #if !HAS_MAPS && MATERIALS == 1
 INLINE pbr pbr_at(stage s, const spot *here, world w) { return pbr_of(w.materials, here->tint); }
@@ -68,12 +82,7 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
     real shares[MATERIALS];
     const real root = spot_material(here, w);
     for (int i = 0; i < MATERIALS; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
-    pbr sum;
-    real *sums = (real *)&sum;
-    for (int i = 0; i < NUMBERS_OF(pbr); ++i) sums[i] = R(0.0);
-#if HAS_SUBSURFACE
-    pbr_shares of = {R(0.0), R(0.0)};
-#endif
+    pbr_mix mix = pbr_nothing();
     for (int i = 0; i < MATERIALS; ++i) {
         if (!any_of(shares[i])) continue;
         __constant const struct Pbr *material = w.materials + i;
@@ -85,20 +94,10 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
             continue;
         }
 #endif
-        pbr part = pbr_mapped(s, here, i, w);
-#if HAS_SUBSURFACE
-        const pbr_shares by = pbr_shares_of(&part);
-        pbr_weigh(&part, by);
-        of.body += shares[i] * by.body;
-        of.medium += shares[i] * by.medium;
-#endif
-        const real *numbers = (const real *)&part;
-        for (int j = 0; j < NUMBERS_OF(pbr); ++j) sums[j] += shares[i] * numbers[j];
+        pbr_add(&mix, pbr_mapped(s, here, i, w), shares[i]);
     }
+    pbr sum = pbr_mixed(mix);
     sum.base_weight = sum.emission_luminance = R(1.0);
-#if HAS_SUBSURFACE
-    pbr_mixed(&sum, of);
-#endif
     return sum;
 #endif
 }
@@ -136,22 +135,10 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
         one.share = other.share = R(0.0);
         one.tint = object_color(here->normal, quantity, one.object, w);
         other.tint = object_color(here->normal, quantity, other.object, w);
-        p = pbr_at(s, &one, w);
-        pbr more = pbr_at(s, &other, w);
-#if HAS_SUBSURFACE
-        pbr_shares of = pbr_shares_of(&p);
-        const pbr_shares by = pbr_shares_of(&more);
-        pbr_weigh(&p, of);
-        pbr_weigh(&more, by);
-        of.body += here->share * (by.body - of.body);
-        of.medium += here->share * (by.medium - of.medium);
-#endif
-        for (int i = 0; i < NUMBERS_OF(pbr); ++i) {
-            ((real *)&p)[i] += here->share * (((const real *)&more)[i] - ((real *)&p)[i]);
-        }
-#if HAS_SUBSURFACE
-        pbr_mixed(&p, of);
-#endif
+        pbr_mix mix = pbr_nothing();
+        pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share);
+        pbr_add(&mix, pbr_at(s, &other, w), here->share);
+        p = pbr_mixed(mix);
     }
 #endif
 #if HAS_FACES

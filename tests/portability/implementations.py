@@ -15,24 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tests.portability import trixie
+from tests.portability.pictures import LARGE
 
 ROOT = Path(__file__).resolve().parents[2]
 WORKPLACE = ROOT / "build" / "portability"
-# Pictures with large programs. (llvmpipe makes one function of a whole kernel, on which LLVM then works for minutes.)
-LARGE = (
-    "still",
-    "paths",
-    "glass",
-    "skin",
-    "steps",
-    "joined",
-    "volumes",
-    "cloud",
-    "inside",
-    "coverage",
-    "filled",
-    "counted",
-)
 # Where other systems in a folder see the program that is installed here.
 _PROGRAM = WORKPLACE / "program"
 
@@ -161,7 +147,7 @@ IMPLEMENTATIONS = (
         _of_trixie("rusticl.icd"),
         root=_trixie,
         variables=(("RUSTICL_ENABLE", "llvmpipe"), ("RUSTICL_FEATURES", "fp64")),
-        left_out=LARGE,
+        left_out=LARGE,  # llvmpipe makes one function of a whole kernel, on which LLVM then works for minutes
     ),
     Implementation("oclgrind", "oclgrind", _oclgrind, simulator=True),
 )

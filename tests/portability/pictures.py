@@ -131,10 +131,8 @@ _MORE = {
     "cloud": "cut_planes: [{plane: {normal: [1, -1, 0.2], width: 2, height: 2}, opacity: 0.5}]\n",
 }
 _LENSES = {"still": ", f_number: 0.5"}
-# Each adds something that the others do not have; the rest are more formulas.
-_BRIEF = (
-    "trigonometric",
-    "mandelbox",
+# Pictures with large programs.
+LARGE = (
     "still",
     "paths",
     "glass",
@@ -147,8 +145,9 @@ _BRIEF = (
     "coverage",
     "filled",
     "counted",
-    "plane",
 )
+# Each adds something that the others do not have; the rest are more formulas.
+_BRIEF = ("trigonometric", "mandelbox", *LARGE, "plane")
 # Rendered in float64 too: small programs, as PoCL compiles wide doubles slowly.
 _DOUBLE = ("mandelbulb", "mandelbox")
 # (Oclgrind 21.10 crashes itself on the cloud when it looks for uses of what was never written.)

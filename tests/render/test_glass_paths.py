@@ -103,7 +103,7 @@ def test_colours_spread_and_are_white_together() -> None:
     # The picture is upside down: above, blue, which is bent more, comes from deeper.
     assert apart[:half].mean() > 0.01
     assert apart[half:].mean() < -0.01
-    white = seen(ball(0, transmission=spread), 64)[0]
+    white = seen(ball(0, transmission=spread), 128)[0]
     assert np.abs(white.mean(axis=0) - 1).max() < 0.01
 
 

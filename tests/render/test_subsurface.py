@@ -167,7 +167,7 @@ def test_white_joined_sets_before_white_are_not_seen() -> None:
     white = skin({"roughness": 0.3}, color=[1, 1, 1], radius=0.1)
     materials = {"m": white, "n": {"base": {"color": [1, 1, 1]}}}
     found = set_of(white, 32, materials=materials, objects=objects)
-    assert abs(seen(found, 32)[0].mean() - 1) < 0.01
+    assert np.abs(seen(found, 96)[0].mean(axis=0) - 1).max() < 0.012
 
 
 @pytest.mark.combination
