@@ -7,7 +7,12 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 DOCS = Path(__file__).resolve().parents[1] / "docs"
+PICTURES = DOCS / "pictures"
+pictured = pytest.mark.skipif(not PICTURES.is_dir(), reason="an sdist comes without the pages' pictures")
+"""Of tests that look at these pictures."""
 
 
 def maker(name: str) -> ModuleType:

@@ -7,13 +7,14 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from tests.makers import DOCS, maker
+from tests.makers import DOCS, maker, pictured
 
 each_picture = pytest.mark.parametrize(
     "picture", maker("make_pictures").table(), ids=lambda picture: str(picture.name)
 )
 
 
+@pictured
 @each_picture
 def test_it_is_there_and_small(picture: Any) -> None:
     assert picture.path.stat().st_size <= maker("make_gallery").LARGEST_FILE == 200_000

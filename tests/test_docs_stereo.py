@@ -29,7 +29,7 @@ from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
-from tests.makers import maker
+from tests.makers import maker, pictured
 from tests.test_docs_content import DOCS, code, table, text
 
 WIDTH, HEIGHT = 640, 360
@@ -125,6 +125,7 @@ def test_the_angle_that_keeps_the_camera() -> None:
     assert float(told[1]) == round(2 * np.degrees(np.arctan(high / 2 / stereo.screen_distance)), 1)
 
 
+@pictured
 def test_drawings_are_there_and_as_they_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawings = maker("make_drawings")
     monkeypatch.setattr(drawings, "PICTURES", tmp_path)

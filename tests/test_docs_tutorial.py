@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from PIL import Image
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+from tests.makers import DOCS, pictured
+
 PAGE = (DOCS / "tutorial.md").read_text("utf-8")
 NAMES = re.findall(r"\]\(pictures/tutorial_(\w+)\.webp\)", PAGE)
 
@@ -18,6 +18,7 @@ def test_it_has_pictures() -> None:
     assert len(set(NAMES)) == len(NAMES)
 
 
+@pictured
 @pytest.mark.parametrize("name", NAMES)
 def test_a_picture(name: str) -> None:
     assert f"-o {name}.png" in PAGE
@@ -27,6 +28,7 @@ def test_a_picture(name: str) -> None:
         assert shown.width <= 1280
 
 
+@pictured
 def test_no_picture_is_left_over() -> None:
     assert {file.stem for file in (DOCS / "pictures").glob("tutorial_*")} == {
         f"tutorial_{name}" for name in NAMES

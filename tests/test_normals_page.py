@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from clfractal.device.select import choose, has_float64
-from tests.makers import DOCS, maker
+from tests.makers import DOCS, maker, pictured
 
 NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares", "gradient")
 # Of the printed figure, for its two digits and another device's rounding; and degrees.
@@ -58,6 +58,7 @@ def test_errors_on_the_mandelbulb() -> None:
         assert table[normal][place : place + 2] == pytest.approx(errors, rel=RELATIVE, abs=ABSOLUTE)
 
 
+@pictured
 def test_the_page_is_whole() -> None:
     page = (DOCS / "normals.md").read_text("utf-8")
     assert maker("make_normals").NORMALS == NORMALS

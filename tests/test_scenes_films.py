@@ -22,7 +22,7 @@ from clfractal.scene.checks import inside_solid
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 from clfractal.scene.volume import VolumeRenderer
-from tests.makers import maker
+from tests.makers import maker, pictured
 from tests.pictures import scene_paths
 from tests.variants import every
 
@@ -168,6 +168,7 @@ def test_its_frames_show_something(path: Path) -> None:
         assert brightness.std() > 10, number
 
 
+@pictured
 @each_film
 def test_its_small_film_is_shown(path: Path) -> None:
     from PIL import Image
