@@ -37,7 +37,7 @@ PYTHON := $(shell for python in python3.14 python3.13 python3.12 python3.11 pyth
 # Versions that are low enough to be the lowest have no wheels for the newest Python.
 OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 python3 python; do \
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
-SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE
+SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE docs/clfractal.1
 
 .PHONY: demo view test light combinations window cluster kills soak lint locks lowest bench truth mutate gpu-check portability install clean
 

@@ -24,21 +24,30 @@ def run(*command: str | Path, folder: Path) -> str:
     return ended.stdout
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built from the checkout."""
-    folder = tmp_path_factory.mktemp("wheel")
+def built_wheel(source: Path, folder: Path) -> Path:
+    """The wheel of a folder with sources, built in another folder."""
     run(
         *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"),
-        *("--wheel-dir", folder, ROOT),
+        *("--wheel-dir", folder, source),
         folder=folder,
     )
     (found,) = folder.glob("*.whl")
     return found
 
 
+def names_in(wheel: Path) -> set[str]:
+    """The files in a wheel."""
+    return set(zipfile.ZipFile(wheel).namelist())
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from the checkout."""
+    return built_wheel(ROOT, tmp_path_factory.mktemp("wheel"))
+
+
 def test_what_travels_in_the_wheel(wheel: Path) -> None:
-    names = set(zipfile.ZipFile(wheel).namelist())
+    names = names_in(wheel)
     for place, pattern, inside in (
         (ROOT / "kernels", "*.*", "clfractal/kernels"),
         (ROOT / "scenes", "*.yaml", "clfractal/scenes"),
@@ -49,6 +58,7 @@ def test_what_travels_in_the_wheel(wheel: Path) -> None:
         files = {f"{inside}/{path.relative_to(place)}" for path in place.rglob(pattern) if path.is_file()}
         assert files <= names, files - names
     assert "clfractal/py.typed" in names
+    assert [name for name in names if name.endswith(".data/data/share/man/man1/clfractal.1")]
     assert not [name for name in names if name.startswith(("tests", "benchmarks", "docs"))]
 
 
@@ -64,6 +74,7 @@ def test_a_fresh_environment_renders_from_the_wheel(wheel: Path, tmp_path: Path)
     )
     where = run(python, "-c", "import clfractal; print(clfractal.__file__)", folder=work).strip()
     assert Path(where).is_relative_to(environment)
+    assert (environment / "share" / "man" / "man1" / "clfractal.1").is_file()
     (work / "scene.yaml").write_text(SCENE)
     run(environment / "bin" / "clfractal", "render", "scene.yaml", "-o", "a.exr", "-o", "a.png", folder=work)
     assert (work / "a.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"

@@ -12,6 +12,7 @@ from typer.models import CommandInfo
 
 import clfractal
 from clfractal.commands import list_facts, list_grids, list_pictures, list_scenes, list_window
+from clfractal.commands.completion import check_shell
 from clfractal.commands.options import app
 from clfractal.commands.progress import Patience
 from clfractal.commands.shell import Shell
@@ -57,10 +58,13 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
     Raises:
         ClfractalError: and whatever else a command raises.
     """
+    check_shell(arguments)
     try:
         work = _application(arguments)(
             list(arguments), prog_name="clfractal", obj=shell, standalone_mode=False
         )
+    except SystemExit as ended:  # Typer's answers to shells that complete a command line
+        return ended.code if isinstance(ended.code, int) else STATUS_BAD_INPUT
     except Exception as error:
         # Typer's own errors: their classes differ between its versions, but all have this method.
         tell = getattr(error, "format_message", None)

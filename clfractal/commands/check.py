@@ -32,9 +32,17 @@ _WORDS: Mapping[Kind, str] = {
 
 
 def check_scene(
-    source: str, overrides: tuple[str, ...], shell: Shell, *, parallax: bool, device: str | None
+    source: str,
+    overrides: tuple[str, ...],
+    shell: Shell,
+    *,
+    parallax: bool,
+    as_json: bool,
+    device: str | None,
 ) -> None:
     """Prints a scene with all defaults; remarks about movement and stereo come first, as comments: the output is a scene.
+
+    As JSON the scene is the value `scene` of an object, and the lines of remarks are its list `remarks`.
 
     Args:
         parallax: whether to measure a stereo scene's depth (which needs a device) and print the range of parallax.
@@ -57,10 +65,13 @@ def check_scene(
         lines = [*_eyes(scene), *lines]
     if scene.animation is not None:
         lines = [*_moves(scene, scene.animation), *lines]
-    text = dump_scene(scene)
-    if not shell.can_print(text):
-        text = dump_scene(scene, only_ascii=True)  # the output stays a scene
-    shell.print("".join(f"# {line}\n" for line in lines) + text)
+    if as_json:
+        shell.print_json({"scene": scene.resolved(), "remarks": lines})
+    else:
+        text = dump_scene(scene)
+        if not shell.can_print(text):
+            text = dump_scene(scene, only_ascii=True)  # the output stays a scene
+        shell.print("".join(f"# {line}\n" for line in lines) + text)
     if warning:
         shell.say(f"{source}: {warning}")
 

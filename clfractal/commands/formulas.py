@@ -38,6 +38,62 @@ def _title(name: str) -> str:
         return _line(error)
 
 
+def facts_of_all() -> list[dict[str, Any]]:
+    """The same as plain data: name, title and file of each, which is null for the library's.
+
+    `problem` is there only where a formula of one's own is wrong, which then has no title.
+
+    Raises:
+        FileError: a folder of CLFRACTAL_FORMULAS is not there.
+    """
+    found: list[dict[str, Any]] = [
+        {"name": name, "title": _line(catalog.description(name).get("title", "")), "file": None}
+        for name in catalog.names()
+    ]
+    for name, path in own_files(Path()).items():
+        facts: dict[str, Any] = {"name": name, "title": None, "file": str(path)}
+        try:
+            facts["title"] = _line(catalog.described(name, Path())[1].title)
+        except ClfractalError as error:
+            facts["problem"] = _line(error)
+        found.append(facts)
+    return found
+
+
+def facts_of(name: str) -> dict[str, Any]:
+    """What `tell_formula` tells as plain data; errors as there.
+
+    A chain has its links as its file has them; any other formula has its variables, what it adds, and its parameters.
+    """
+    data, chain = catalog.described(name, Path())
+    found: dict[str, Any] = {
+        "name": name,
+        "title": _line(data.get("title", name)),
+        "reference": _line(data["reference"]) if data.get("reference") else None,
+        "description": _line(data["description"]) if data.get("description") else None,
+    }
+    if "chain" in data:
+        return {**found, "chain": [dict(link) for link in data["chain"]]}
+    formula = chain.first.formula
+    return {
+        **found,
+        "variables": list(formula.variables),
+        "add": formula.add,
+        "parameters": [
+            {
+                "name": each.name,
+                "type": each.type,
+                "default": each.default,
+                "choices": list(each.choices) if each.choices else None,
+                "minimum": each.minimum,
+                "maximum": each.maximum,
+                "description": _line(each.description) or None,
+            }
+            for each in formula.parameters
+        ],
+    }
+
+
 def tell_formula(name: str) -> str:
     """Title, reference, description and parameters of one formula.
 

@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
+from clfractal.commands import completion
 from clfractal.commands.options import (
+    AsJson,
     DeviceOption,
     Overrides,
     Precision,
@@ -31,6 +33,7 @@ def check(
             "--parallax", help="Measure the depth of a stereo scene and print its range of parallax."
         ),
     ] = False,
+    as_json: AsJson = False,
     device: DeviceOption = None,
     verbose: Verbose = False,
 ) -> Work:
@@ -38,7 +41,9 @@ def check(
     from clfractal.commands.check import check_scene
 
     shell = shell_of(context, verbose=verbose)
-    return lambda: check_scene(scene, tuple(overrides or ()), shell, parallax=parallax, device=device)
+    return lambda: check_scene(
+        scene, tuple(overrides or ()), shell, parallax=parallax, as_json=as_json, device=device
+    )
 
 
 @app.command()
@@ -46,7 +51,7 @@ def probe(
     context: typer.Context,
     scene: Scene,
     pixel: Annotated[str, typer.Argument(metavar="X,Y", help="The pixel, counted from the top left.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
     device: DeviceOption = None,
     precision: Precision = None,
     size: Annotated[
@@ -69,35 +74,46 @@ def probe(
 
 
 @app.command()
-def devices(context: typer.Context, quiet: Quiet = False, verbose: Verbose = False) -> Work:
+def devices(
+    context: typer.Context, as_json: AsJson = False, quiet: Quiet = False, verbose: Verbose = False
+) -> Work:
     """List every OpenCL device and its speed, which is measured once and then remembered."""
     from clfractal.commands.devices import list_devices
 
     shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: list_devices(shell)
+    return lambda: list_devices(shell, as_json=as_json)
 
 
 @app.command()
 def formulas(
     context: typer.Context,
-    name: Annotated[str | None, typer.Argument(help="Name of a formula in the library.")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            help="Name of a formula, of the library or your own.", autocompletion=completion.formula_names
+        ),
+    ] = None,
+    as_json: AsJson = False,
 ) -> Work:
     """List the library of formulas, or describe one."""
-    from clfractal.commands.formulas import list_formulas, tell_formula
+    from clfractal.commands import formulas as work
 
     shell = shell_of(context)
-    return lambda: shell.print(list_formulas() if name is None else tell_formula(name))
+    facts, words = (
+        (work.facts_of_all, work.list_formulas)
+        if name is None
+        else (lambda: work.facts_of(name), lambda: work.tell_formula(name))
+    )
+    return lambda: shell.print_json(facts()) if as_json else shell.print(words())
 
 
 @app.command()
 def schema(context: typer.Context) -> Work:
     """Print the JSON Schema of scene files, for editors."""
-    import json
-
     from clfractal.scene import load
 
     shell = shell_of(context)
-    return lambda: shell.print(json.dumps(load.schema(), indent=2))
+    return lambda: shell.print_json(load.schema())
 
 
 @app.command()

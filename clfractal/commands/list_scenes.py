@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from clfractal.commands import completion
 from clfractal.commands.options import (
     DeviceOption,
     Overrides,
@@ -29,7 +30,11 @@ def scenes(
     context: typer.Context,
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="A scene to print; with --sheet the scenes to show."),
+        typer.Argument(
+            metavar="[NAME]...",
+            help="A scene to print; with --sheet the scenes to show.",
+            autocompletion=completion.scene_names,
+        ),
     ] = None,
     sheet: Annotated[
         Path | None,
@@ -65,7 +70,10 @@ def new(
     formula: Annotated[
         str | None,
         typer.Option(
-            "--formula", metavar="F", help="A formula's name, or a formula file.  [default: mandelbulb]"
+            "--formula",
+            metavar="F",
+            help="A formula's name, or a formula file.  [default: mandelbulb]",
+            autocompletion=completion.formula_names,
         ),
     ] = None,
     device: DeviceOption = None,

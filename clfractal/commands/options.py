@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from clfractal.commands import completion
 from clfractal.commands.shell import Shell
 
 Work = Callable[[], None]
@@ -17,7 +18,7 @@ Work = Callable[[], None]
 app = typer.Typer(
     name="clfractal",
     help="Renders 3D fractals with OpenCL: YAML scenes in, finished pictures out.",
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -37,7 +38,11 @@ Overrides = Annotated[
 ]
 DeviceOption = Annotated[
     str | None,
-    typer.Option("--device", help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]"),
+    typer.Option(
+        "--device",
+        help="cpu, gpu, PLATFORM:DEVICE, or part of a name.  [env: CLFRACTAL_DEVICE]",
+        autocompletion=completion.kinds_of_devices,
+    ),
 ]
 ClusterOption = Annotated[
     str | None,
@@ -53,6 +58,7 @@ DevicesOption = Annotated[
         "--device",
         help="cpu, gpu, PLATFORM:DEVICE, or part of a name; cpu/2+2 for parts of one; all; repeatable."
         "  [env: CLFRACTAL_DEVICE]",
+        autocompletion=completion.kinds_of_devices,
     ),
 ]
 Resolution = Annotated[
@@ -65,7 +71,11 @@ Resolution = Annotated[
 ]
 Precision = Annotated[
     str | None,
-    typer.Option("--precision", help="auto, float32 or float64.  [default: as in the scene, else auto]"),
+    typer.Option(
+        "--precision",
+        help="auto, float32 or float64.  [default: as in the scene, else auto]",
+        autocompletion=completion.precisions,
+    ),
 ]
 Size = Annotated[
     str | None,
@@ -78,6 +88,7 @@ Quality = Annotated[
         "--quality",
         metavar="PRESET",
         help="draft, good, final or print: samples, noise and detail together; other options win.",
+        autocompletion=completion.quality_presets,
     ),
 ]
 Denoise = Annotated[
@@ -86,6 +97,7 @@ Denoise = Annotated[
         "--denoise", help="Take the noise out of the finished picture by Open Image Denoise (extra denoise)."
     ),
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Show more: statistics, causes of errors, drivers' messages.")

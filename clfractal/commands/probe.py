@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -44,7 +43,10 @@ def probe_pixel(order: Order, pixel: str, shell: Shell, *, as_json: bool) -> Non
         )
     with speaking_of(order.scene):
         found = probed(job, x, y, engine.look)
-    shell.print(json.dumps(found.plain(), indent=2) if as_json else _text(found))
+    if as_json:
+        shell.print_json(found.plain())
+    else:
+        shell.print(_text(found))
 
 
 def _text(found: Probe) -> str:

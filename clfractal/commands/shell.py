@@ -147,6 +147,12 @@ class Shell:
 
         self._to_output(write)
 
+    def print_json(self, data: Any) -> None:
+        """A command's result as JSON, in ASCII; errors as of `print`."""
+        import json
+
+        self.print(json.dumps(data, indent=2, allow_nan=False))
+
     def keep_output(self, *, is_text: bool) -> None:
         """Keeps standard output for a file that will be sent: from now on what drivers print there is dropped.
 
