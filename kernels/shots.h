@@ -10,14 +10,16 @@ INLINE vec normal_seen(glance look, vec own) {
 #endif
 }
 
-// A shot's layers: of what its path has seen in all, `comes` is in the picture.
-INLINE parts parts_of(glance look, color seen, real coverage, real comes) {
+// A shot's layers, of the part of its surface that is in the picture: `comes`. Of what its path has seen in all, that part is light; and a
+// surface that fog hides must not tell the filter of detail where there is none.
+INLINE parts parts_of(glance look, color seen, vec normal, real comes) {
     parts found;
-    found.albedo = color_scale(look.albedo, coverage);
+    found.albedo = color_scale(look.albedo, comes);
     found.emission = color_scale(look.emission, comes);
     found.direct = color_scale(color_add(look.once, color_scale(look.emission, R(-1.0))), comes);
     found.indirect = color_scale(color_add(seen, color_scale(look.once, R(-1.0))), comes);
-    found.normal = vec_of(R(0.0), R(0.0), R(0.0));
+    const vec none = vec_of(R(0.0), R(0.0), R(0.0));   // where nothing is found there is no normal
+    found.normal = vec_scale(vec_pick(less(R(0.0), comes), normal_seen(look, normal), none), comes);
     return found;
 }
 
@@ -61,12 +63,14 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     result.covers = result.coverage;
 #endif
     result.depth = depth_of(result.point, a.time, w.view);
+    real comes = pick(result.hit, result.coverage, R(0.0));
     color background = sky(from_eye.direction, a.y, 0, w);
 #if HAS_FOG
     const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
     const color mist = color_splat(w.material->fog_color);
     const real passes = exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material));
     seen = color_mix(seen, mist, R(1.0) - passes);
+    comes *= pick(result.hit, passes, R(1.0));
     if (w.material->fog_background) {
         background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
     }
@@ -95,24 +99,19 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
-#if HAS_PARTS
-    real comes = result.coverage;
-#if HAS_FOG
-    comes *= passes;
-#endif
-    result.of_light = parts_of(look, in_all, result.coverage, comes);
-#endif
 #if PLANES > 0
     plane_layers layers;
     STATE_RECALL(s, layers, STATE_LAYERS);
+    comes *= layers.front_through;
+    const color beside = color_scale(layers.behind, layers.front_through * (R(1.0) - result.coverage));
     result = planes_into(result, seen, background, layers, a.time, w.view);
 #endif
 #if HAS_PARTS
+    result.of_light = parts_of(look, in_all, found.normal, comes);
 #if PLANES > 0
-    const color past = color_add(result.of_light.albedo, color_scale(layers.behind, R(1.0) - comes));
-    result.of_light.albedo = color_add(layers.front, color_scale(past, layers.front_through));
+    result.of_light.albedo = color_add(color_add(layers.front, beside), result.of_light.albedo);
+    result.of_light.normal = vec_pick(less(layers.nearest, (real)(REAL_LARGEST)), layers.normal, result.of_light.normal);
 #endif
-    result.of_light.normal = vec_pick(result.hit, vec_scale(normal_seen(look, result.normal), result.coverage), result.of_light.normal);
 #endif
     return result;
 }

@@ -21,7 +21,13 @@ def check_installed() -> None:
         raise _missing()
 
 
-def denoised(colors: Floats, albedo: Floats | None = None, normals: Floats | None = None) -> Floats:
+def denoised(
+    colors: Floats,
+    albedo: Floats | None = None,
+    normals: Floats | None = None,
+    *,
+    coverage: Floats | None = None,
+) -> Floats:
     """A picture without its noise; what the filter sees as detail of `albedo` and `normals` stays.
 
     The filter is Open Image Denoise's `RT` for light without an upper bound (Attila Afra, 2019 and later,
@@ -33,6 +39,8 @@ def denoised(colors: Floats, albedo: Floats | None = None, normals: Floats | Non
             pixels brighter than 65504, which the filter does not know, stay as they are.
         albedo: what the surface reflects, 0 to 1, of the same shape.
         normals: of length 1 at most, of the same shape; only with albedo.
+        coverage: shape (height, width); where it is 0 and there is no light, the filter may put none. None if coverage or
+            light comes by chance, so that it may be right to.
 
     Raises:
         FileError: the package is not installed, or the filter failed; at `output.denoise`.
@@ -52,6 +60,8 @@ def denoised(colors: Floats, albedo: Floats | None = None, normals: Floats | Non
         raise FileError(f"{NAME} failed: {error}", Where(path="output.denoise")) from error
     bright = np.isfinite(colors).all(axis=-1) & (colors > _BRIGHTEST).any(axis=-1)
     found[bright] = colors[bright]
+    if coverage is not None:
+        found[(coverage == 0) & (colors == 0).all(axis=-1)] = 0
     return found
 
 

@@ -14,6 +14,7 @@ from clfractal.pictures.tiled import Floats
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.work.canvas import Canvas
+from clfractal.work.denoising import darkness_is_certain
 from clfractal.work.films import JobFilms
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
@@ -39,12 +40,13 @@ def clean(
     check_installed()
     tell("taking out the noise")
     guides = _guides(scene, canvas, executor, token, tell)
+    certain = all(darkness_is_certain(each) for each in _shown(scene))
     cleaned: list[Floats] = []
     for number, guide in enumerate(guides):
         planes = canvas.read(executor.device.queue, number)
         colors = np.stack([planes[name] for name in "RGB"], axis=-1)
         aids = [] if guide is None else [_stacked(guide, names) for names in (ALBEDO, NORMAL)]
-        cleaned.append(denoised(colors, *aids))
+        cleaned.append(denoised(colors, *aids, coverage=planes["A"] if certain else None))
         token.check()
     for number, colors in enumerate(cleaned):
         canvas.write_colors(executor.device.queue, number, colors)
@@ -55,8 +57,7 @@ def _guides(
 ) -> list[Film | None]:
     """What each part of the canvas shows of surfaces; None where only colours are known."""
     plain = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
-    shown = [view.renderer for view, _ in scene.views] if scene.layout is not None else [scene.renderer]
-    if not all(isinstance(renderer, SurfaceRenderer) for renderer in shown):
+    if not all(isinstance(each.renderer, SurfaceRenderer) for each in _shown(scene)):
         return [None] * len(canvas.parts)
     job = prepare(
         plain,
@@ -69,6 +70,10 @@ def _guides(
     run(job, films.films, executor, token=token)
     token.check()
     return [*films.films]
+
+
+def _shown(scene: Scene) -> list[Scene]:
+    return [view for view, _ in scene.views] if scene.layout is not None else [scene]
 
 
 def _stacked(film: Film, names: tuple[str, ...]) -> Floats:

@@ -10,6 +10,11 @@ from clfractal.files.channels import ALBEDO, NOISY, NORMAL
 from clfractal.pictures.denoise import denoised
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Floats, Picture
+from clfractal.renderers.plan import PlannedView
+from clfractal.scene.model import Scene
+from clfractal.scene.objects import VolumeObject
+from clfractal.scene.parts import PerspectiveCamera
+from clfractal.scene.volume import VolumeRenderer
 from clfractal.work.job import Job
 
 
@@ -24,14 +29,32 @@ def finished(job: Job, stores: Sequence[Picture]) -> Sequence[Picture]:
     """
     if not job.denoises:
         return stores
-    return [_finished(job, in_memory(store)) for store in stores]
+    return [_finished(job, view, in_memory(store)) for view, store in zip(job.views, stores, strict=True)]
 
 
-def _finished(job: Job, film: Film) -> Film:
+def darkness_is_certain(scene: Scene) -> bool:
+    """Whether no other samples would find anything where a view's samples have found nothing and no light.
+
+    Else one or the other comes by chance: light in fog, clouds and paths through volumes, what a lens blurs, or a
+    picture as background.
+    """
+    fog, around, camera = scene.fog, scene.environment, scene.camera
+    return not (
+        (fog is not None and fog.scattering is not None)
+        or any(isinstance(each, VolumeObject) and each.is_cloud for each in scene.objects.values())
+        or (isinstance(scene.renderer, VolumeRenderer) and scene.lighting.mode == "path")
+        or (isinstance(camera, PerspectiveCamera) and camera.lens_radius > 0)
+        or (around is not None and around.background and scene.background != "transparent")
+    )
+
+
+def _finished(job: Job, view: PlannedView, film: Film) -> Film:
     colors = _stacked(film, ("R", "G", "B"))
     if film.done.any():
         aids = (ALBEDO, NORMAL) if set(ALBEDO) <= set(film.channels) else ()
-        clean = denoised(colors, *(_stacked(film, names) for names in aids))
+        certain = view.shutter is None and darkness_is_certain(view.scene)
+        coverage = film["A"] if certain else None
+        clean = denoised(colors, *(_stacked(film, names) for names in aids), coverage=coverage)
     else:
         clean = colors
     made = {

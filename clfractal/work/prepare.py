@@ -108,8 +108,9 @@ def prepare(
 def _rendered(view: Scene, names: tuple[str, ...]) -> tuple[str, ...]:
     """The channels that rays are sent for: those asked for, and what denoising needs."""
     found = [name for name in names if name not in NOISY]
-    if view.output.denoise and {"R", "G", "B"} <= set(names) and isinstance(view.renderer, SurfaceRenderer):
-        found += [name for name in (*ALBEDO, *NORMAL) if name not in found]
+    if view.output.denoise and {"R", "G", "B"} <= set(names):
+        of_surfaces = (*ALBEDO, *NORMAL) if isinstance(view.renderer, SurfaceRenderer) else ()
+        found += [name for name in ("A", *of_surfaces) if name not in found]
     return tuple(found)
 
 

@@ -13,7 +13,7 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import FileError
-from clfractal.files.channels import NOISY
+from clfractal.files.channels import NOISY, NORMAL
 from clfractal.files.exr import read_exr
 from clfractal.pictures.denoise import denoised
 from clfractal.pictures.film import Film
@@ -98,6 +98,94 @@ def test_values_that_are_no_light_do_no_harm() -> None:
     far = np.s_[:4, 40:]
     assert np.abs(found[far] - wanted[far]).max() < 0.2
     assert denoised(picture[:1, :1]).shape == (1, 1, 3)
+
+
+# Branches up to far away, finer than pixels there, behind fog that lies over the ground.
+FOGGED: dict[str, Any] = {
+    "formula": {"name": "pseudo_kleinian", "iterations": 7},
+    "image": {"width": 240, "height": 135},
+    "camera": {"position": [0.2, -1.6, 0.5], "target": [0, 0.4, 0.2], "fov": 60},
+    "lighting": path(3),
+    "lights": [
+        {"direction": [0.8, 0.25, -0.5], "temperature": 3800, "intensity": 4, "angular_size": 1},
+    ],
+    "environment": {"sky": {"sun_elevation": 25, "sun": False}, "intensity": 0.6},
+    "fog": {
+        "color": [0.25, 0.3, 0.36],
+        "density": 0.6,
+        "height": 0.3,
+        "base": 0,
+        "scattering": {"anisotropy": 0.4},
+    },
+    "coloring": {
+        "by": "trap",
+        "trap": {"shape": "plane"},
+        "palette": ["#2d3a2a", "#75814f", "#b9a77a", "#6b5c4d"],
+        "scale": 1.2,
+    },
+    "renderer": {"samples": 16},
+}
+
+
+def grain(picture: Floats) -> float:
+    """How much pixels differ from the mean of the 3 x 3 around them, in parts of it (root mean square)."""
+    light = picture.mean(axis=-1)
+    windows = np.lib.stride_tricks.sliding_window_view(light, (3, 3)).mean(axis=(2, 3))
+    return float(np.std(light[1:-1, 1:-1] / windows - 1))
+
+
+def test_what_fog_hides_keeps_no_grain(device: Device) -> None:
+    """Where nothing but fog is seen, detail behind it is no reason to keep noise; of 400 samples the grain is 0.014."""
+    names = ["R", "G", "B", *NOISY, *NORMAL]
+    scene = clfractal.Scene(**{"version": 1, **FOGGED, "output": {"denoise": True, "channels": names}})
+    film = engine_of(device).render(scene)
+    hidden = np.s_[95:130, 22:80]
+    assert np.median(np.linalg.norm(colors(film, NORMAL)[hidden], axis=-1)) < 0.02
+    assert grain(colors(film, NOISY)[hidden]) > 0.08
+    assert grain(colors(film)[hidden]) < 0.015
+
+
+@pytest.mark.parametrize("lamp", [0, 1e6])
+def test_no_light_where_nothing_is(device: Device, lamp: float) -> None:
+    """Neither the surface's nor that of a highlight, which may be much brighter, goes over the picture's rim."""
+    lamps = [{"type": "sphere", "position": [1.4, -1.2, 1.2], "radius": 0.05, "intensity": lamp}]
+    dark = {
+        "environment": {"sky": {}, "background": False},
+        "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]},
+    }
+    scene = scene_of(
+        formula={"name": "mandelbulb", "iterations": 6},
+        image={"width": 128, "height": 96},
+        camera={"position": [0, -3.5, 0.8], "fov": 45},
+        lighting=path(3),
+        material={"color": [0.8, 0.7, 0.6]},
+        renderer={"samples": 8},
+        output={"denoise": True, "channels": ["R", "G", "B", "A"]},
+        **({"lights": lamps, "background": "transparent"} if lamp else dark),
+    )
+    film = engine_of(device).render(scene)
+    nothing = film["A"] == 0
+    assert 0.5 < nothing.mean() < 0.9
+    assert not colors(film)[nothing].any()
+    assert colors(film)[film["A"] == 1].mean() > 0.05
+    alone = engine_of(device).render(scene, channels=["R", "G", "B"])
+    assert np.array_equal(colors(alone), colors(film))
+
+
+def test_light_that_comes_by_chance_is_kept(device: Device) -> None:
+    """A lamp's light in fog is seen where no surface is; of few samples many have none of it."""
+    values = bulb(1, denoise=True, channels=["R", "G", "B", "A", *NOISY]).model_dump(
+        mode="json", exclude_none=True
+    )
+    values["background"] = "transparent"
+    values["lights"] = [
+        {"type": "point", "position": [-1.6, 0, 0], "intensity": 1, "falloff": "inverse_square"}
+    ]
+    values["fog"] = {"color": [0, 0, 0], "density": 0.4, "scattering": {}}
+    film = engine_of(device).render(Scene(**values))
+    unlucky = (film["A"] == 0) & (colors(film, NOISY) == 0).all(axis=-1)
+    assert unlucky.any()
+    assert (colors(film)[unlucky] > 0).mean() > 0.9
 
 
 def test_each_eye_view_and_region(device: Device) -> None:

@@ -83,6 +83,23 @@ def test_fog_dims_the_layers_like_the_picture() -> None:
     assert np.allclose(light(film), layer(film, ""), atol=2e-6)
     full = film["A"] == 1
     assert (light(film)[full].sum(axis=-1) < 0.6 * light(clear)[full].sum(axis=-1)).all()
+    # Emission is the same everywhere, so it tells what comes through.
+    comes = layer(film, "emission")[full][:, :1] / layer(clear, "emission")[full][:, :1]
+    for name, parts in (("albedo", "RGB"), ("normal", "XYZ")):
+        assert np.allclose(layer(film, name, parts)[full], comes * layer(clear, name, parts)[full], atol=1e-3)
+
+
+def test_a_plane_in_front_dims_the_layers_like_the_picture() -> None:
+    """A quad that lets 0.4 of the light through, in one half of the picture."""
+    black = {"palette": ["#000000", "#000000"], "inside": [0, 0, 0]}
+    place = {"center": [1, -2, 0], "normal": [0, -1, 0], "width": 2, "height": 4}
+    quad = {"plane": place, "colors": black, "opacity": 0.6}
+    film = rendered(GLOWING, background="transparent", cut_planes=[quad])
+    clear = rendered(GLOWING, background="transparent")
+    assert np.allclose(light(film), layer(film, ""), atol=2e-6)
+    assert layer(clear, "")[:, 26:].max() > 0.5
+    for name in ("", "albedo", "direct", "indirect", "emission"):
+        assert np.allclose(layer(film, name)[:, 26:], 0.4 * layer(clear, name)[:, 26:], atol=1e-5)
 
 
 def test_layers_change_no_bit_of_the_picture() -> None:
