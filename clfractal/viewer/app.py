@@ -14,7 +14,7 @@ from clfractal.device import gl_sharing
 from clfractal.device.select import Device, choose, devices
 from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
 from clfractal.optics.view import scene_view, seen_by
-from clfractal.scene.stereo import MIDDLE
+from clfractal.scene.stereo import MIDDLE, Mode, Stereo
 from clfractal.viewer import gl, marks, window
 from clfractal.viewer.aim import Aim, aimed
 from clfractal.viewer.begin import Begun
@@ -23,6 +23,7 @@ from clfractal.viewer.deeds import Deeds
 from clfractal.viewer.inputs import Inputs
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.outputs import Outputs
+from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.panels import all_panels, theme
 from clfractal.viewer.panels.ui import Ui
@@ -35,6 +36,7 @@ from clfractal.viewer.speed import Meter
 from clfractal.viewer.studio import Studio
 from clfractal.viewer.surface import Surface
 from clfractal.viewer.ui_renderer import UiRenderer
+from clfractal.viewer.viewport import image_of
 from clfractal.viewer.window import Window
 
 _IDLE_SECONDS = 0.5
@@ -73,6 +75,9 @@ class Viewer:
         imgui.get_io().set_ini_filename("")
         theme.setup()
         self.renderer = UiRenderer(self.window.handle)
+        self.outputs = Outputs(self.window, self.events.append)
+        # The screens that are filled come before the first picture, which is theirs.
+        self.outputs.begin(options)
         self.pacing = Pacing(settings.frame_rate, settings.used_coarsest)
         device, self.shared, why = self._opened(device)
         self.studio = Studio(scene, device, self.pacing, window.wake)
@@ -80,8 +85,9 @@ class Viewer:
         self._set_motion(settings)
         self.player = Player(self.studio)
         self.controls = Controls(self.studio, settings, self.motion)
-        self.outputs = Outputs(self.window, self.events.append)
         self.studio.screens = self.outputs.shown_stereo
+        self.studio.resize(*self.outputs.picture_size(scene.stereo))
+        self.own_screen = OwnScreen(self.studio)
         self.pads = window.Pads()
         self.meter = Meter()
         self.small = gl.SmallTextures()
@@ -108,7 +114,6 @@ class Viewer:
             self.studio.go_to_frame(0.0)
         if not options.panels:
             self.ui.show.clear()
-        self.outputs.begin(options)
 
     # The loop
 
@@ -159,7 +164,7 @@ class Viewer:
         self._take_settings()
         self.controls.rest(now)
         self.files.tick(now)
-        self._follow()
+        self._follow(now)
         arrived = self.surface.update()
         if arrived:
             self._redraw = max(self._redraw, 1)
@@ -241,11 +246,17 @@ class Viewer:
             remark=lambda line: self.studio.tell(line, wrong=True),
         )
 
-    def _follow(self) -> None:
+    def _follow(self, now: float) -> None:
         """The studio learns the window's size, the surface what to show."""
         if not self.window.minimised:
             width, height = self.outputs.picture_size(self.studio.scene.stereo)
             self.studio.resize(width, height)
+            self.own_screen.look(
+                self.window.framebuffer[0],
+                now,
+                filling=self.outputs.filling,
+                shown=self.surface.shown is not None,
+            )
             self._rest(False)
         else:
             self._rest(True)
@@ -270,8 +281,11 @@ class Viewer:
             elif not hidden:
                 session.pause(False)
 
-    def _screen(self) -> dict[str, Any]:
-        wide = window.physical_width(self.window.monitor(), self.window.size[0])
+    def _screen(self, mode: Mode) -> dict[str, Any]:
+        """The width of one eye's picture where the window is, for a scene that names none."""
+        stereo = self.outputs.shown_stereo(Stereo(mode=mode))
+        part = image_of(stereo, self.outputs.picture_size(stereo))[0] / max(self.window.framebuffer[0], 1)
+        wide = window.physical_width(self.window.monitor(), round(part * self.window.size[0]))
         return {} if wide is None else {"screen_width": round(wide, 4)}
 
     def _mind_device(self) -> None:

@@ -174,9 +174,9 @@ class Deeds:
         self.viewer.use_device(choose(there[(place + 1) % len(there)].index))
 
     def _second_window(self) -> None:
-        if self.viewer.studio.scene.stereo is None:
-            self.scene.stereo_mode(2)
         self.viewer.outputs.open_second()
+        if self.viewer.outputs.second is not None and self.viewer.studio.scene.stereo is None:
+            self.scene.stereo_mode(2)  # now that it is known which screen is filled
 
     def _copy(self) -> None:
         self.viewer.window.clipboard(self.viewer.files.text())

@@ -104,6 +104,11 @@ class Outputs:
     # Sizes
 
     @property
+    def filling(self) -> bool:
+        """Whether the picture fills screens; else it is in a window whose size the user chooses."""
+        return self.first.filling or self.second is not None
+
+    @property
     def apart(self) -> bool:
         """Whether each eye has a screen, or a buffer, of its own."""
         return self.second is not None or self.quad

@@ -11,6 +11,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane
+from clfractal.scene.stereo import Mode
 from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box
 from clfractal.viewer.aim import Aim
 from clfractal.viewer.controls import Controls
@@ -18,7 +19,7 @@ from clfractal.viewer.motion import Motion
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
 
-STEREO_MODES = (
+STEREO_MODES: tuple[Mode | None, ...] = (
     None,
     "anaglyph",
     "split",
@@ -61,7 +62,7 @@ class SceneDeeds:
     ) -> None:
         self.studio, self.controls, self.motion, self.settings = studio, controls, motion, settings
         self.aim, self.now = aim, now
-        self.first_stereo: Callable[[], dict[str, Any]] = dict
+        self.first_stereo: Callable[[Mode], dict[str, Any]] = lambda mode: {}
         self._perspective: PerspectiveCamera | None = None
         self._kept: dict[str, Any] | None = None
         self.deeds: dict[str, Callable[[], None]] = {
@@ -327,11 +328,11 @@ class SceneDeeds:
             if stereo is None and not isinstance(self.studio.scene.camera, PerspectiveCamera):
                 return  # no other way would fit either
 
-    def _set_stereo(self, mode: str | None) -> bool:
+    def _set_stereo(self, mode: Mode | None) -> bool:
         if mode is None:
             self._kept = self.studio.value("stereo") or self._kept
             return self._edit({"stereo": None})
-        section = self.studio.value("stereo") or self._kept or self.first_stereo()
+        section = self.studio.value("stereo") or self._kept or self.first_stereo(mode)
         return self._edit({"stereo": {**section, "mode": mode}})
 
     def _of_stereo(self, key: str, change: Callable[[Any], Any]) -> None:

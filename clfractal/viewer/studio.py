@@ -8,7 +8,6 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Hashable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -217,22 +216,10 @@ class Studio(InFilm):
         """The window has another size, pixels; nothing happens if it is the same."""
         if (width, height) == self.viewport or width <= 0 or height <= 0:
             return
-        before = self.viewport
         self.viewport = (width, height)
         self.region = None
         if self._requested is not None:
-            self._follow_width(before)
             self.refresh()
-
-    def _follow_width(self, before: tuple[int, int]) -> None:
-        """A window of another width is another screen: `stereo.screen_width` follows, and what it shows keeps its depth."""
-        stereo = self.screens(self.scene.stereo)
-        if stereo is None:
-            return
-        ratio = image_of(stereo, self.viewport)[0] / image_of(stereo, before)[0]
-        wide = float(f"{self.value('stereo.screen_width') * ratio:.6g}")
-        with suppress(ClfractalError):
-            self.adjust({"stereo.screen_width": wide})
 
     def refresh(self, *, again: bool = False) -> None:
         """Asks for a picture of what is wanted now, unless it is there or under way already.

@@ -109,6 +109,7 @@ class Window:
     ) -> None:
         self.on_event = on_event
         self._before: tuple[int, int, int, int] | None = None
+        self._leaving: tuple[int, int] | None = None
         problems: list[str] = []
         glfw.set_error_callback(lambda _, text: problems.append(_text(text)))
         self.handle = self._made(size, share, quad) or (quad and self._made(size, share, False)) or None
@@ -210,6 +211,8 @@ class Window:
         self._framebuffer = (int(width), int(height))
         width, height = glfw.get_window_size(self.handle)
         self._size = (int(width), int(height))
+        if self._leaving is not None and self._size != self._leaving:
+            self._leaving = None
         self._iconified = bool(glfw.get_window_attrib(self.handle, glfw.ICONIFIED))
 
     @property
@@ -265,6 +268,11 @@ class Window:
         """Whether it fills a screen."""
         return self._before is not None
 
+    @property
+    def filling(self) -> bool:
+        """Whether its size is that of screens: also for the moment in which it is on its way back from them."""
+        return self.fullscreen or self._leaving is not None
+
     def fill(self, wanted: Sequence[Monitor]) -> None:
         """Becomes a borderless window over all of some screens."""
         if self._before is None:
@@ -295,6 +303,7 @@ class Window:
             return
         x, y, width, height = self._before
         self._before = None
+        self._leaving = self._size if self._size != (width, height) else None
         glfw.set_window_attrib(self.handle, glfw.FLOATING, False)
         glfw.set_window_attrib(self.handle, glfw.DECORATED, True)
         glfw.set_window_monitor(self.handle, None, x, y, width, height, glfw.DONT_CARE)

@@ -40,6 +40,8 @@ def needed(*programs: str) -> None:
         "Xvfb": "xvfb",
         "setxkbmap": "x11-xkb-utils",
         "xwininfo": "x11-utils",
+        "Xorg": "xserver-xorg-core, xserver-xorg-video-dummy",
+        "xrandr": "x11-xserver-utils",
     }
     found = [name for name in programs if shutil.which(name) is None]
     libraries = [name for name in ("glfw", "OpenGL", "imgui_bundle", "ruamel.yaml") if not _importable(name)]
@@ -64,14 +66,12 @@ class Display:
     """
 
     def __init__(self, folder: Path, size: tuple[int, int] = SIZE, *, managed: bool = False) -> None:
-        needed("Xvfb", "xdotool", "xwininfo", *(["openbox"] if managed else []))
+        needed("xdotool", "xwininfo", *(["openbox"] if managed else []))
         self.size = size
         folder.mkdir(parents=True, exist_ok=True)
         reading, writing = os.pipe()
-        width, height = size
-        # The screen lies in a file, in the format of xwd, where it can be read at any time.
-        command = ["Xvfb", "-displayfd", str(writing), "-screen", "0", f"{width}x{height}x24"]
-        command += ["-fbdir", str(folder), "-nocursor", "-noreset", "-nolisten", "tcp", "+extension", "GLX"]
+        command = [*self._server_command(folder), "-displayfd", str(writing)]
+        command += ["-nocursor", "-noreset", "-nolisten", "tcp", "+extension", "GLX"]
         with open(folder / "server.log", "wb") as log:
             self._server = subprocess.Popen(command, pass_fds=(writing,), stdout=log, stderr=log)
         os.close(writing)
@@ -80,13 +80,24 @@ class Display:
         assert number, (folder / "server.log").read_text()
         self.name = f":{number.decode()}"
         self._manager: subprocess.Popen[bytes] | None = None
-        self._memory = np.memmap(folder / "Xvfb_screen0", np.uint8, mode="r")
+        self._set_up(folder)
         if managed:
             with open(folder / "manager.log", "wb") as log:
                 self._manager = subprocess.Popen(
                     ["openbox", "--sm-disable"], env=self.environment(), stdout=log, stderr=log
                 )
             self._wait_for_manager()
+
+    def _server_command(self, folder: Path) -> list[str]:
+        """The server and what it is to have."""
+        needed("Xvfb")
+        width, height = self.size
+        # The screen lies in a file, in the format of xwd, where it can be read at any time.
+        return ["Xvfb", "-screen", "0", f"{width}x{height}x24", "-fbdir", str(folder)]
+
+    def _set_up(self, folder: Path) -> None:
+        """What is left to do once the server answers."""
+        self._memory = np.memmap(folder / "Xvfb_screen0", np.uint8, mode="r")
 
     def __enter__(self) -> Self:
         return self
