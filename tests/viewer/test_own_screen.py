@@ -13,7 +13,11 @@ formula: {name: mandelbulb, iterations: 3}
 camera: {position: [0, -4, 0]}
 stereo: {mode: split, screen_width: 0.7, screen_distance: 2}
 """
-FILM = "animation: {duration: 2, fps: 2, tracks: {stereo.screen_width: {keys: [{frame: 0, value: 0.7}, {frame: 3, value: 1}]}}}\n"
+FILM = """animation:
+  duration: 2
+  fps: 2
+  tracks: {stereo.screen_width: {keys: [{frame: 0, value: 0.7}, {frame: 3, value: 1}]}}
+"""
 
 
 class Desk:

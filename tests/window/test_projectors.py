@@ -134,9 +134,9 @@ def test_a_window_that_is_resized_is_another_screen_and_says_so(
         wait_for(lambda: window.pixels().shape == plain.shape, "the size")
 
         def told() -> bool:
-            """The line covers the top of the picture of before, and nothing else of it."""
+            """The line covers a part of the picture of before, and nothing else of it."""
             now = window.pixels()
-            return np.array_equal(now[100:], plain[100:]) and not np.array_equal(now[:100], plain[:100])
+            return np.array_equal(now[160:], plain[160:]) and not np.array_equal(now[:160], plain[:160])
 
         wait_for(told, "the line about it", 10)
         window.save()
