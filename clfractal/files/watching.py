@@ -20,7 +20,7 @@ class Watched:
 
     To miss nothing, watch a file before it is read. A change is told once, also if the file is only half written: when
     the rest follows, this is another change. A file that is missing, as for a moment when an editor renames, is no
-    change; it is one if another file appears in its place.
+    change; it is one if another file appears in its place. One that stays away is `missing`.
     """
 
     def __init__(
@@ -34,12 +34,18 @@ class Watched:
         self._clock = clock
         self._looked = clock()
         self._states: dict[Path, _State | None] = {}
+        self._absent: dict[Path, int] = {}
         self.follow(paths)
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """The files that are watched."""
         return tuple(self._states)
+
+    @property
+    def missing(self) -> tuple[Path, ...]:
+        """Files that were there, and were not found by the last two looks."""
+        return tuple(path for path, looks in self._absent.items() if looks >= 2)
 
     def follow(self, paths: Iterable[Path]) -> None:
         """Watches these files from now on; of files that were watched before, a change is still told."""
@@ -55,8 +61,11 @@ class Watched:
         if now - self._looked < self._interval:
             return False
         self._looked = now
-        before = dict(self._states)
-        self.accept()
+        before, found = dict(self._states), {path: _state(path) for path in self._states}
+        self._absent = {
+            path: self._absent.get(path, 0) + 1 for path in found if found[path] is None and before[path]
+        }
+        self._states = {path: found[path] or before[path] for path in found}
         return self._states != before
 
 

@@ -112,8 +112,8 @@ class Viewer:
         self.files.attach(self)
         if scene.animation is not None:
             self.studio.go_to_frame(0.0)
-        if not options.panels:
-            self.ui.show.clear()
+        if not options.panels or options.fullscreen or options.monitors is not None:
+            self.ui.show.clear()  # F2 brings the panels; who fills a screen or a projector wants the picture
 
     # The loop
 
@@ -263,7 +263,7 @@ class Viewer:
         self._mind_device()
         self.studio.tick()
         session = self.studio.session
-        told = (session.problem, session.progress, session.paused)
+        told = (session.problem, session.progress, session.paused, self.studio.messages[-1:])
         if told != self._told:
             self._told = told
             self.redraw()
@@ -340,9 +340,18 @@ class Viewer:
             self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
         )
         self._redraw_while_busy()
-        self.files.after_draw(framebuffer)
+        self.files.after_draw()
         self.outputs.swap()
         self.meter.swapped(time.perf_counter())
+
+    def picture_alone(self) -> Any:
+        """The picture that is shown, without what lies over it: uint8 of shape (height, width, 3)."""
+        self.outputs.draw(self.surface, False, lambda by: None)
+        pixels = self.outputs.read()
+        self.outputs.draw(
+            self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
+        )
+        return pixels
 
     def _panels_may_stay(self, now: float) -> bool:
         """Whether the panels of the frame before are shown again, while only the picture moves.

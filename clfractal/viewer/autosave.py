@@ -26,6 +26,7 @@ from clfractal.files.regular import read_text_file
 from clfractal.scene.load import SceneText, load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.saving import SceneSource, open_source, scene_text
+from clfractal.viewer.sources import same_file
 
 _VERSION = 1
 
@@ -99,10 +100,13 @@ class Autosave:
             os.close(self._lock)
             self._lock = None
 
-    def found(self) -> list[Recovered]:
+    def found(self, of: Path | None = None) -> list[Recovered]:
         """What windows that have ended left behind, the newest first; damaged files are removed.
 
         Each belongs to this process until it is discarded or released: another window that starts now does not find it.
+
+        Args:
+            of: the file that the scene came from; None: of any.
         """
         found = []
         try:
@@ -113,7 +117,9 @@ class Autosave:
             if path.stem == self._name or (lock := _taken(path)) is None:
                 continue
             recovered = _read(self._folder, path.stem, lock)
-            if recovered is None:
+            if recovered is not None and of is not None and not _came_from(recovered, of):
+                recovered.release()
+            elif recovered is None:
                 _remove(self._folder, path.stem)
                 _end_lock(lock, path)
             else:
@@ -196,6 +202,10 @@ def _read(folder: Path, name: str, lock: int) -> Recovered | None:
         )
     except (ClfractalError, ValueError, TypeError, KeyError):
         return None
+
+
+def _came_from(recovered: Recovered, path: Path) -> bool:
+    return recovered.path is not None and same_file(recovered.path, path)
 
 
 def _locked_file(path: Path) -> int:

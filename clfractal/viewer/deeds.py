@@ -80,6 +80,7 @@ class Deeds:
             "reload": files.reload,
             "copy": self._copy,
             "screenshot": files.screenshot,
+            "screenshot_panels": lambda: files.screenshot(panels=True),
             "export": files.export,
             "render_still": self._switch("stills"),
             "pause": self._pause,

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from clfractal import resources
-from clfractal.errors import ClfractalError, SceneError
+from clfractal.errors import SceneError
 from clfractal.files.atomic import check_output
-from clfractal.files.png import SCENE_KEY, write_png_pixels
-from clfractal.files.watching import Watched
-from clfractal.scene.load import dump_scene, load_scene
+from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.autosave import Autosave, Recovered
 from clfractal.viewer.options import Options
+from clfractal.viewer.reloading import Reloading, loaded_again
 from clfractal.viewer.saving import save_scene, scene_text
+from clfractal.viewer.shots import Shots, free_name
 from clfractal.viewer.sources import SceneSource, is_protected, open_source, suggested_name
 
 if TYPE_CHECKING:
@@ -34,8 +32,7 @@ class Files:
         source: where the scene came from.
         remarks: lines for the user about the start.
         wanted: a scene that is opened when it is clear what becomes of unsaved changes.
-        recovered: unsaved changes of windows that ended without saving; panels offer them.
-        reload_problem: why the file that changed on the disk cannot be shown; empty if it can.
+        recovered: unsaved changes to this scene, of windows that ended without saving; see `offered`.
     """
 
     def __init__(self, options: Options) -> None:
@@ -43,15 +40,14 @@ class Files:
         self.source = SceneSource()
         self.remarks: list[str] = []
         self.recovered: list[Recovered] = []
-        self.reload_problem = ""
         self.wanted: Path | None = None
         self._viewer: Viewer | None = None
         self._autosave = Autosave()
         self._autosaved = 0.0
         self._kept: Scene | None = None
-        self._watched = Watched(())
-        self._shot_ready = 0
-        self._stale = False
+        self._overrides, self._stereo = tuple(options.overrides), options.stereo
+        self._reloading = Reloading(self._again)
+        self._shots = Shots(options.shot)
         for path, kinds in ((options.shot, (".png",)), (options.save, (".yaml", ".yml"))):
             if path is not None:
                 check_output(path, kinds)
@@ -72,18 +68,15 @@ class Files:
         """
         options = self.options
         path = Path(options.scene) if options.scene else resources.folder("scenes") / _FIRST_SCENE
-        overrides = list(options.overrides)
         self.source = open_source(path)
-        self._watched = Watched(self.source.watched)
-        loaded = self.source.loaded
-        scene = (
-            loaded
-            if loaded is not None and not overrides
-            else load_scene(path, overrides=overrides, posed=False)
-        )
-        if options.stereo is not None:
-            scene = _with_stereo(scene, options.stereo)
-        return scene
+        self._reloading.begin(self.source)
+        return self._again(path, self.source)
+
+    def _again(self, path: Path, source: SceneSource) -> Scene:
+        """The scene of a file that was read; of the command line's one with the values from there."""
+        scene = loaded_again(path, source, self._overrides)
+        stereo = self._stereo
+        return scene if stereo is None else _with_stereo(scene, stereo)
 
     def attach(self, viewer: Viewer) -> None:
         """The window is there."""
@@ -93,8 +86,7 @@ class Files:
             viewer.studio.saved = self.source.loaded
         self._kept = viewer.studio.document
         self._title()
-        if self.options.shot is None and self.options.play is None:
-            self.recovered = self._autosave.found()
+        self._look_for_kept()
         if self.options.scene is None and self.options.shot is None:
             viewer.ui.show.add("gallery")
 
@@ -114,42 +106,36 @@ class Files:
         source = open_source(path)
         scene = source.loaded or load_scene(path, posed=False)
         self.take(source, scene, saved=scene)
+        self._look_for_kept()
         self.viewer.studio.tell(f"opened {path.name}")
 
     def take(self, source: SceneSource, scene: Scene, *, saved: Scene | None = None) -> None:
         """Shows a scene that was loaded; `saved`: what its file has, if that is another."""
         self.source = source
-        self.viewer.studio.open(scene)
+        self._overrides, self._stereo = (), None
+        studio = self.viewer.studio
+        studio.open(scene)
         if saved is not None:
-            self.viewer.studio.saved = saved
-        self._kept = self.viewer.studio.document
-        # What has changed while it was read is told with the next look.
-        self._watched = Watched(source.watched)
-        self._stale = source.changed_on_disk if source.path is not None else False
+            studio.saved = studio.opened = saved
+        self._kept = studio.document
+        self._reloading.begin(source)
         self._autosave.clear()
-        self.reload_problem = ""
         self._title()
 
     def reload(self) -> None:
-        """Loads the scene's file again, also when it did not change."""
-        if self.source.path is None:
-            self.viewer.studio.tell("the scene has no file", wrong=True)
-            return
-        self._watched.accept()
-        try:
-            source = open_source(self.source.path)
-            scene = source.loaded or load_scene(self.source.path, posed=False)
-        except ClfractalError as error:
-            self.reload_problem = str(error)
-            self.viewer.studio.tell(str(error), wrong=True)
-            return
-        self.reload_problem = ""
-        studio = self.viewer.studio
-        self.source = source
-        studio.set_document(scene)  # a step that can be undone: nothing is lost
-        studio.saved = source.loaded or scene
-        self._watched.follow(source.watched)
-        studio.tell(f"loaded {source.path.name if source.path else 'the scene'} again")
+        """Loads the scene's file again, also when it did not change; see `Reloading`."""
+        self.source = self._reloading.reload(self.source, self.viewer.studio)
+
+    @property
+    def offered(self) -> list[Recovered]:
+        """Unsaved changes to this scene that are offered now, the newest first: never over a projector's picture."""
+        return [] if self.viewer.outputs.fills_screens else self.recovered
+
+    def _look_for_kept(self) -> None:
+        """Looks for unsaved changes to the scene that was opened; those to other scenes wait until these are opened."""
+        self.put_off()
+        if self.options.shot is None and self.options.play is None:
+            self.recovered = self._autosave.found(self.source.path)
 
     def recover(self, found: Recovered) -> None:
         """Goes on with unsaved changes of a window that ended."""
@@ -157,13 +143,19 @@ class Files:
         source = found.source()
         self.take(source, scene, saved=source.loaded)
         self._autosave.write(source, scene)  # before the only copy goes away
-        self.recovered.remove(found)
-        found.discard()
+        self.discard(found)
+        self.put_off()
 
     def discard(self, found: Recovered) -> None:
         """Forgets unsaved changes of a window that ended."""
         self.recovered.remove(found)
         found.discard()
+
+    def put_off(self) -> None:
+        """Leaves unsaved changes for the next time that their scene is opened."""
+        for each in self.recovered:
+            each.release()
+        self.recovered = []
 
     # Saving
 
@@ -202,30 +194,21 @@ class Files:
         # In another folder maps and grids may have other names.
         studio.keep(self.source.loaded or scene)
         self._kept = studio.document
-        self._watched.follow(self.source.watched)
-        self._watched.accept()
+        self._overrides, self._stereo = (), None  # the file has them now
+        self._reloading.written(self.source)
         self._autosave.clear()
         self._title()
         studio.tell(f"saved {target}")
 
-    def screenshot(self) -> None:
-        """The next frame goes to a PNG beside the scene, or in the current folder."""
-        self._shot_to = self._free("png")
-
-    _shot_to: Path | None = None
+    def screenshot(self, *, panels: bool = False) -> None:
+        """The next frame goes to a PNG beside the scene, alone or with the panels over it."""
+        self._shots.take(self.source, panels=panels)
 
     def export(self) -> None:
-        """The picture with all channels, at the window's size, as EXR."""
-        target = self._free("exr")
+        """The picture with all channels, at the window's size, as EXR beside the scene."""
+        target = free_name(self.source, "exr")
         self.viewer.studio.render_still((target,))
         self.viewer.studio.tell(f"rendering {target.name} in the background")
-
-    def _free(self, ending: str) -> Path:
-        stem = self.source.path.stem if self.source.path is not None else "scene"
-        number = 1
-        while (found := Path.cwd() / f"{stem}-{number:03}.{ending}").exists():
-            number += 1
-        return found
 
     # Again and again
 
@@ -233,14 +216,13 @@ class Files:
         """Looks after the file on the disk and the safety copy."""
         viewer = self.viewer
         settings, studio = viewer.settings, viewer.studio
-        if settings.watch and (self._stale or self._watched.changed()):
-            self._stale = False
-            self._changed_on_disk()
+        if settings.watch:
+            self.source = self._reloading.look(self.source, studio)
         every = settings.autosave
         if every and now - self._autosaved >= every:
             self._autosaved = now
             document = studio.document
-            if document is not self._kept and studio.unsaved and not viewer.controls.dragging:
+            if document is not self._kept and studio.edited and not viewer.controls.dragging:
                 self._kept = document
                 self._autosave.write(self.source, document)
         self._title()
@@ -252,14 +234,6 @@ class Files:
     def patience(self) -> float:
         """How long the window's loop may sleep, seconds."""
         return 0.02 if self.options.shot is not None else 0.5
-
-    def _changed_on_disk(self) -> None:
-        studio = self.viewer.studio
-        if studio.unsaved:
-            studio.tell("the file has changed on the disk; F5 loads it (your changes can be undone to)")
-            self._watched.accept()
-        else:
-            self.reload()
 
     def ask_to_close(self) -> None:
         """Closes the window, or asks first if something is unsaved; asked while it asks, it closes."""
@@ -273,45 +247,19 @@ class Files:
         """Closes the window; unsaved changes are given up."""
         self.viewer.finished = True
 
-    def after_draw(self, framebuffer: tuple[int, int]) -> None:
+    def after_draw(self) -> None:
         """Takes screenshots of what was drawn and not yet shown."""
-        viewer = self.viewer
-        if self._shot_to is not None:
-            target, self._shot_to = self._shot_to, None
-            try:
-                _write(target, viewer.outputs.read(), viewer.studio.shown_scene)
-                viewer.studio.tell(f"saved {target.name}")
-            except ClfractalError as error:
-                viewer.studio.tell(str(error), wrong=True)
-        if self.options.shot is None:
-            return
-        shown, session = viewer.surface.shown, viewer.studio.session
-        if session.problem is not None and session.idle:
-            viewer.finished = True
-            raise session.problem
-        settled = shown is not None and shown.frame.finished and shown.frame.request == session.newest
-        current = settled and shown is not None and shown.look == viewer.studio.look
-        if current and viewer.inputs.played and not viewer.motion.active and session.idle:
-            # Panels need a few frames to find their sizes.
-            self._shot_ready += 1
-            if self._shot_ready < 4:
-                viewer.redraw()
-                return
-            _write(self.options.shot, viewer.outputs.read(), viewer.studio.shown_scene)
-            viewer.finished = True
-        else:
-            self._shot_ready = 0
+        self._shots.after_draw(self.viewer)
 
     def keep(self) -> None:
         """The window ends without being closed: what is unsaved is offered at the next start."""
-        if self._viewer is not None and self.options.shot is None and self.viewer.studio.unsaved:
+        if self._viewer is not None and self.options.shot is None and self.viewer.studio.edited:
             self._autosave.write(self.source, self.viewer.studio.document)
             self._autosave.release()
 
     def close(self) -> None:
         """A clean end: the safety copy is not needed any more."""
-        for each in self.recovered:
-            each.release()
+        self.put_off()
         self._autosave.close()
 
     def _title(self) -> None:
@@ -345,12 +293,3 @@ def _with_stereo(scene: Scene, word: str) -> Scene:
         raise SceneError(
             error.message, replace(error.where, file="--stereo", line=None, column=None)
         ) from error
-
-
-def _write(target: Path, pixels: Any, scene: Scene) -> None:
-    """Writes a screenshot, uint8 of shape (height, width, 3); it holds the scene, so that it can be opened again.
-
-    Raises:
-        FileError: it cannot be written.
-    """
-    write_png_pixels(target, np.ascontiguousarray(pixels), {SCENE_KEY: dump_scene(scene)})

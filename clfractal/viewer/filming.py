@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 from clfractal.errors import ClfractalError
@@ -17,6 +18,7 @@ from clfractal.viewer import film_place
 from clfractal.viewer.editing import edited, replaced
 from clfractal.viewer.film_place import FilmPlace, Keyed
 from clfractal.viewer.history import History, Kind
+from clfractal.viewer.kept_view import differ_in_more
 
 MOVING_SECONDS = 0.4
 """So long after a move more of it is expected."""
@@ -29,6 +31,7 @@ class InFilm(ABC):
         scene: as it is now. While a frame of its film is shown (`place`), it has the values of that frame in the places
             of its tracks; what is saved is `document`.
         saved: the document as its file has it.
+        opened: the document as it was opened, loaded again, or saved last: its file's, with values of the command line.
         place: the frame that is shown; None: the scene as it stands.
         auto_keys: whether a change of what a track moves sets a key at once.
         recording: whether a flight is recorded: then changes are no steps of undo, and set no keys.
@@ -37,7 +40,7 @@ class InFilm(ABC):
     history: History
 
     def __init__(self, scene: Scene) -> None:
-        self.scene = self.saved = scene
+        self.scene = self.saved = self.opened = scene
         self.place: FilmPlace | None = None
         self.auto_keys = self.recording = False
         self._moving_until = 0.0
@@ -78,24 +81,50 @@ class InFilm(ABC):
         return document is not self.saved and document != self.saved
 
     @property
+    def edited(self) -> bool:
+        """Whether anything but cameras was changed since it was opened: a move of the camera alone is nothing to keep."""
+        return differ_in_more(self.document, self.opened)
+
+    @property
     def frame_number(self) -> float | None:
         """The film's frame that is shown; None: the scene as it stands."""
         return self.place.frame if self.place is not None else None
 
     def keep(self, saved: Scene) -> None:
         """The document was saved, as this scene: names of files may be others now."""
-        elsewhere, self.saved = self.document.folder != saved.folder, saved
+        elsewhere = self.document.folder != saved.folder
+        self.saved = self.opened = saved
         if elsewhere or self.place is None or self.scene is self.place.posed:
             self._pose(saved, self.frame_number)
 
     def set_document(self, document: Scene) -> None:
         """Another document in the place of this one, as a step that can be undone; its film is shown where this one was."""
+        self._take(document)
+
+    def load_again(self, document: Scene, opened: Scene, saved: Scene) -> None:
+        """The same for what was loaded from the scene's file once more; a camera that was moved at a frame stays there.
+
+        Args:
+            document: with the cameras that are to be kept.
+            opened, saved: see there.
+        """
+        place, camera = self.place, self.scene.camera
+        moved = place is not None and camera != place.posed.camera
+        if self._take(document):
+            self.opened, self.saved = opened, saved
+        if moved and self.place is not None and type(camera) is type(self.scene.camera):
+            self.scene = self.scene.model_copy(update={"camera": camera})
+            self.refresh()
+
+    def _take(self, document: Scene) -> bool:
         before = self.document
         frame = self.frame_number
         if frame is None and before.animation is None and document.animation is not None:
             frame = 0.0
-        if self._pose(document, frame):
-            self.history.add(before, document)
+        if not self._pose(document, frame):
+            return False
+        self.history.add(before, document)
+        return True
 
     def adjust(self, values: Mapping[str, Any]) -> None:
         """Sets values that no track moves, as no step of undo and no unsaved change: they follow from the window.
@@ -111,6 +140,8 @@ class InFilm(ABC):
             scene = posed if self.scene is self.place.posed else scene
             self.place = FilmPlace(self.place.frame, rest, posed)
         self.scene = scene
+        with suppress(ClfractalError):
+            self.opened = edited(self.opened, values)
         if not unsaved:
             self.saved = self.document
 

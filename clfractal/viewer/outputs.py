@@ -101,6 +101,11 @@ class Outputs:
         self.first.use()
         self.first.unfill()
 
+    @property
+    def fills_screens(self) -> bool:
+        """Whether a screen shows nothing but the picture, as a projector does."""
+        return self.first.fullscreen or self.second is not None
+
     # Sizes
 
     @property

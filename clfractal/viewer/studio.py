@@ -140,7 +140,7 @@ class Studio(InFilm):
 
     def open(self, scene: Scene) -> None:
         """Shows a scene that was loaded, a film's first frame if it moves; its history begins anew."""
-        self.scene = self.saved = scene
+        self.scene = self.saved = self.opened = scene
         self.place = None
         self.history = History()
         self.problems.clear()

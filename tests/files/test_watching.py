@@ -119,3 +119,17 @@ def test_the_disk_is_looked_at_every_half_second_at_most(
         now[0] = frame / 60
         watched.changed()
     assert looks.count(files[0]) == 4
+
+
+def test_a_file_that_stays_away_is_missing(files: tuple[Path, Path], tmp_path: Path) -> None:
+    """Not for the moment in which an editor renames."""
+    watched = Watched([*files, tmp_path / "never"], clock=Clock())
+    files[0].rename(tmp_path / "aside")
+    assert not watched.changed()
+    assert not watched.missing
+    for _ in range(2):
+        assert not watched.changed()
+        assert [*watched.missing] == [files[0]]
+    (tmp_path / "aside").rename(files[0])
+    assert not watched.changed()
+    assert not watched.missing

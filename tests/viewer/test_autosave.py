@@ -117,13 +117,32 @@ def test_what_was_offered_and_not_taken_is_offered_again(
     monkeypatch.setenv("CLFRACTAL_CACHE", str(store.parent))
     first = Files(Options())
     first.recovered = Autosave(store).found()
-    assert len(first.recovered) == 1
+    (offered,) = first.recovered
     assert Autosave(store).found() == []
     first.close()
     (again,) = Autosave(store).found()
-    assert again.text == first.recovered[0].text
+    assert again.text == offered.text
     again.discard()
     assert Autosave(store).found() == []
+
+
+def test_only_changes_to_one_scene_are_asked_for(desk: Path, store: Path, tmp_path: Path) -> None:  # noqa: F811
+    """Those to other scenes wait for these; a link leads to the same scene."""
+    link = tmp_path / "link.yaml"
+    link.symlink_to(desk / "scene.yaml")
+    other = desk / "other.yaml"
+    other.write_text((desk / "scene.yaml").read_text())
+    for path, fov in ((desk / "scene.yaml", 20), (other, 30)):
+        own, source = Autosave(store), open_source(path)
+        assert own.write(source, present_of(source, fov))
+        own.release()
+    assert Autosave(store).found(tmp_path / "third.yaml") == []
+    (found,) = Autosave(store).found(link)
+    assert found.path == desk / "scene.yaml"
+    (rest,) = Autosave(store).found()
+    assert rest.path == other
+    for each in (found, rest):
+        each.discard()
 
 
 def test_an_error_keeps_the_work(desk: Path, store: Path) -> None:  # noqa: F811

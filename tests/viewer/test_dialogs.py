@@ -27,7 +27,7 @@ class FakeFiles:
 
     suggestion: Path
     source: Any = field(default_factory=lambda: SimpleNamespace(path=None))
-    recovered: list[Any] = field(default_factory=list)
+    offered: list[Any] = field(default_factory=list)
     refused: str = ""
     done: list[tuple[str, Any]] = field(default_factory=list)
 
@@ -48,13 +48,17 @@ class FakeFiles:
     def leave(self) -> None:
         self.done.append(("leave", None))
 
+    def put_off(self) -> None:
+        self.done.append(("put off", list(self.offered)))
+        self.offered.clear()
+
     def recover(self, found: Any) -> None:
         self._does("recover", found)
-        self.recovered.remove(found)
+        self.offered.remove(found)
 
     def discard(self, found: Any) -> None:
         self.done.append(("discard", found))
-        self.recovered.remove(found)
+        self.offered.remove(found)
 
 
 class Asked:
@@ -238,27 +242,51 @@ def test_the_window_stays_if_it_cannot_be_saved(asked: Asked) -> None:
     assert "no space left" in asked.ui.studio.messages[-1].text
 
 
-def test_kept_changes_are_offered_one_after_the_other(asked: Asked) -> None:
-    first, second = (SimpleNamespace(path=None, time=float(number)) for number in (2, 1))
-    asked.files.recovered = [first, second]
-    assert asked.shown() == {"Go on with them", "Discard"}
+def test_kept_changes_are_one_question(asked: Asked) -> None:
+    """However many windows have ended: the newest copy, and the older ones beside it."""
+    first, second, third = kept = [SimpleNamespace(path=None, time=float(number)) for number in (3, 2, 1)]
+    asked.files.offered = list(kept)
+    older = {text for text in asked.shown() if text.endswith(("##0", "##1"))}
+    assert asked.shown() - older == {"Go on with them", "Discard", "Later", "Discard all"}
+    assert len(older) == 2
+    asked.click(next(text for text in older if text.endswith("##1")))
+    assert asked.files.done == [("recover", third)]
     asked.click("Discard")
-    assert asked.files.recovered == [second]
+    assert asked.files.offered == [second]
+    assert "Discard all" not in asked.shown()
     asked.click("Go on with them")
-    assert asked.files.done == [("discard", first), ("recover", second)]
+    assert asked.files.done[1:] == [("discard", first), ("recover", second)]
     assert asked.shown() == set()
+
+
+def test_kept_changes_can_wait_or_go(asked: Asked) -> None:
+    kept = [SimpleNamespace(path=None, time=float(number)) for number in (2, 1)]
+    asked.files.offered = list(kept)
+    asked.click("Later")
+    assert asked.files.done == [("put off", kept)]
+    asked.files.offered = list(kept)
+    asked.click("Discard all")
+    assert asked.files.done[1:] == [("discard", each) for each in kept]
+
+
+def test_how_long_ago_something_was() -> None:
+    told = {20: "less than a minute", 70: "1 minute", 150: "2 minutes", 7100: "118 minutes", 7300: "2 hours"}
+    told |= {100_000: "28 hours", 259_200: "3 days"}
+    assert {seconds: dialogs.ago(seconds) for seconds in told} == {
+        seconds: f"{words} ago" for seconds, words in told.items()
+    }
 
 
 def test_changes_that_cannot_be_read_any_more_are_given_up(asked: Asked) -> None:
     lost = SimpleNamespace(path=Path("mine.yaml"), time=0.0)
-    asked.files.recovered = [lost]
+    asked.files.offered = [lost]
     asked.files.refused = "its map is missing"
     asked.click("Go on with them")
     assert "its map is missing" in asked.ui.studio.messages[-1].text
-    assert asked.files.recovered == []
+    assert asked.files.offered == []
 
 
 def test_the_first_question_is_that_of_leaving(asked: Asked) -> None:
-    asked.files.recovered = [SimpleNamespace(path=None, time=0.0)]
+    asked.files.offered = [SimpleNamespace(path=None, time=0.0)]
     asked.ui.show |= {"save", "open", "close"}
     assert asked.shown() == {"Save", "Discard", "Cancel"}

@@ -63,14 +63,14 @@ def test_full_screen_and_back(window: Window) -> None:
 
 def test_it_begins_in_full_screen(desktop: Display, folder: Path) -> None:
     (folder / "s.yaml").write_text(SURFACE)
-    with Window(desktop, folder, "s.yaml", "--fullscreen", "--no-panels") as found:
+    with Window(desktop, folder, "s.yaml", "--fullscreen") as found:
         wait_for(lambda: found.place == (0, 0, *SCREEN), "the full screen")
         shows_its_film(found)
 
 
 def test_over_all_chosen_monitors(desktop: Display, folder: Path) -> None:
     (folder / "s.yaml").write_text(SURFACE)
-    with Window(desktop, folder, "s.yaml", "--monitors", "1", "--no-panels") as found:
+    with Window(desktop, folder, "s.yaml", "--monitors", "1") as found:
         wait_for(lambda: found.place == (0, 0, *SCREEN), "the full screen")
         shows_its_film(found)
 

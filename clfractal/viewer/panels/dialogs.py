@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,12 @@ from clfractal.viewer.panels import buttons, layout, theme
 from clfractal.viewer.panels.ui import Ui
 
 if TYPE_CHECKING:
+    from clfractal.viewer.autosave import Recovered
     from clfractal.viewer.files import Files
 
 _WIDTH = 460.0
+# Older copies of unsaved changes that are listed.
+_MOST_OLDER = 3
 
 
 def draw(ui: Ui) -> None:
@@ -34,8 +38,8 @@ def draw(ui: Ui) -> None:
         _named(ui, files, "save", "Save the scene as", "Save", files.suggestion)
     elif "open" in ui.show:
         _named(ui, files, "open", "Open a scene", "Open", files.source.path or Path.cwd())
-    elif files.recovered:
-        _recovering(ui, files)
+    elif files.offered:
+        _recovering(ui, files, files.offered)
 
 
 def _begin(ui: Ui, title: str, told: str = "") -> None:
@@ -156,23 +160,54 @@ def _save_and_leave(ui: Ui, files: Files) -> None:
         files.leave()
 
 
-def _recovering(ui: Ui, files: Files) -> None:
-    found = files.recovered[0]
-    name = found.path.name if found.path is not None else "a new scene"
-    minutes = max(time.time() - found.time, 0.0) / 60
-    ago = f"{minutes:.0f} minutes" if minutes < 120 else f"{minutes / 60:.0f} hours"
+def _recovering(ui: Ui, files: Files, offered: Sequence[Recovered]) -> None:
+    """All copies of the scene's changes in one question, the newest first."""
+    newest, others = offered[0], offered[1:]
+    name = newest.path.name if newest.path is not None else "a new scene"
     _begin(
         ui,
         "Unsaved changes were kept",
-        f"A window ended {ago} ago without saving its changes to {name}.",
+        f"A window ended {ago(time.time() - newest.time)} without saving its changes to {name}.",
     )
     if buttons.button("Go on with them", primary=True):
-        try:
-            files.recover(found)
-        except ClfractalError as error:
-            ui.studio.tell(str(error), wrong=True)
-            files.discard(found)
+        _recover(ui, files, newest)
     layout.in_row()
     if buttons.button("Discard"):
-        files.discard(found)
+        files.discard(newest)
+    layout.in_row()
+    if buttons.button("Later"):
+        files.put_off()
+    if others:
+        imgui.dummy(imgui.ImVec2(0, 8))
+        imgui.text_colored(theme.vec(theme.DIM), "Older ones:")
+    for number, each in enumerate(others[:_MOST_OLDER]):
+        if buttons.button(f"{ago(time.time() - each.time)}##{number}"):
+            _recover(ui, files, each)
+        layout.in_row()
+    if others and buttons.button("Discard all"):
+        for each in list(offered):
+            files.discard(each)
     imgui.end()
+
+
+def _recover(ui: Ui, files: Files, found: Recovered) -> None:
+    try:
+        files.recover(found)
+    except ClfractalError as error:
+        ui.studio.tell(str(error), wrong=True)
+        files.discard(found)
+
+
+def ago(seconds: float) -> str:
+    """How long ago something was, in words."""
+    minutes = max(seconds, 0.0) / 60
+    if minutes < 1:
+        return "less than a minute ago"
+    number, unit = (
+        (minutes, "minute")
+        if minutes < 120
+        else (minutes / 60, "hour")
+        if minutes < 2880
+        else (minutes / 1440, "day")
+    )
+    return f"{number:.0f} {unit}{'' if round(number) == 1 else 's'} ago"

@@ -258,7 +258,7 @@ def _here(ui: Ui) -> Path | None:
 def _is_asked(ui: Ui) -> bool:
     """Whether a question is open, which comes before the gallery."""
     files: Any = ui.memory.get("files")
-    return bool(ui.show & {"open", "save", "close"}) or (files is not None and bool(files.recovered))
+    return bool(ui.show & {"open", "save", "close"}) or (files is not None and bool(files.offered))
 
 
 # Opening
