@@ -6,6 +6,7 @@ import errno
 import os
 import subprocess
 import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -261,7 +262,26 @@ def test_no_room_for_what_the_compiler_is_told(
     select.choose().loaded.clear()
     with file_size_limit(4096):
         ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
-    assert ended.is_one_line(2, "clfractal-", "cannot be written: File too large")
+    assert ended.is_one_line(2, "ulimit -f: allows files of 4096 bytes", "compiled programs")
+    (here / "old.png.partial").unlink(missing_ok=True)
+    assert untouched(here)
+
+
+def test_no_room_for_temporary_files(
+    here: Path, shell: InProcess, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is named that has none, and not one in it whose name nobody knows."""
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path_factory.mktemp("empty")))
+    monkeypatch.setenv("CLFRACTAL_LANES", "1")
+    select.choose().loaded.clear()
+
+    def full(path: Path, *_: object, **__: object) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_text", full)
+        ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
+    assert ended.is_one_line(2, f"{tempfile.gettempdir()}: has no room for temporary files: No space left")
     (here / "old.png.partial").unlink(missing_ok=True)
     assert untouched(here)
 

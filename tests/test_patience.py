@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from clfractal.commands import progress
+from clfractal.commands.film_count import FilmCount
 from clfractal.commands.progress import Patience, Reporter
 from clfractal.commands.shell import Shell
 from clfractal.device import activity
@@ -179,3 +180,29 @@ def test_what_began_last_is_told() -> None:
         assert found is not None
         assert found.what == "one"
     assert activity.current() is None
+
+
+def test_a_log_gets_a_line_for_each_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a render that takes hours, and of a film; and one a minute where a tenth takes longer."""
+    now = 0.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    for seconds, most in ((500.0, 10), (20.0, 10), (1.0, 0), (1000.0, 17), (36_000.0, 600)):
+        now, tiles = 0.0, 1000
+        shell, errors = shell_on(monkeypatch)
+        reporter = Reporter(shell, tiles)
+        for done in range(1, tiles + 1):
+            now = seconds * done / tiles
+            reporter(Progress(tiles, tiles_done=done))
+        lines = errors.getvalue().splitlines()
+        assert all(line.startswith("rendering: ") for line in lines)
+        assert most - 1 <= len(lines) <= most, (seconds, len(lines))
+
+    now = 0.0
+    shell, errors = shell_on(monkeypatch)
+    count = FilmCount(shell, 500, 0.0)
+    for frame in range(500):
+        now = 3.0 * frame
+        count.rendered(1)
+    told = [int(line.split()[1]) for line in errors.getvalue().splitlines()]
+    assert 20 <= len(told) <= 25, told  # a tenth takes 150 s
+    assert told == sorted(told)

@@ -20,6 +20,7 @@ import numpy as np
 from clfractal import arguments
 from clfractal.cluster import local
 from clfractal.cluster.dispatch import Dispatcher, Work
+from clfractal.cluster.guard import check_main
 from clfractal.cluster.link import ANSWER_SECONDS, Link, usual_key
 from clfractal.cluster.local import Place
 from clfractal.cluster.message import Array, Digests, Message, pack, unpack
@@ -79,7 +80,7 @@ class Cluster:
         security: Dask's certificates for `tls://`, a `distributed.Security`; None: those of Dask's configuration.
 
     Raises:
-        SceneError: the address is none, or needs certificates and there are none.
+        SceneError: the address is none, or needs certificates and there are none; `local:N` without that line.
         FileError: the package `distributed` is not installed, or a certificate is not there.
         DeviceError: status 3, the scheduler does not answer within 10 s.
     """
@@ -96,6 +97,8 @@ class Cluster:
         if not isinstance(address, str):
             arguments.refuse("address", "must be text such as tcp://HOST:8786 or local:4", address)
         self.place = Place.of(address)
+        if self.place.workers:
+            check_main(str(self.place))
         local.library()
         local.check_certificates(self.place, security)
         from clfractal.cluster.tasks import Seat

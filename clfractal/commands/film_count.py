@@ -6,18 +6,17 @@ import time
 from pathlib import Path
 from typing import Any
 
-from clfractal.commands.progress import shown_rate
+from clfractal.commands.progress import Lines, shown_rate
 from clfractal.commands.shell import Shell
 from clfractal.work.film_stats import FilmStats
-
-_LINE_SECONDS = 2.0
 
 
 class FilmCount:
     """How far a film is, and what its frames took; `begun` is when the command began, by `time.perf_counter`."""
 
     def __init__(self, shell: Shell, frames: int, begun: float) -> None:
-        self._shell, self._frames, self._begun, self._told = shell, frames, begun, begun
+        self._shell, self._frames, self._begun = shell, frames, begun
+        self._lines = Lines()
         self._first = begun  # when the first frame was done, for which programs are compiled
         self._rendered, self._rays = 0, 0
         self.stats = FilmStats()
@@ -34,14 +33,12 @@ class FilmCount:
         """Counts a frame; now and then it is told how many are left."""
         self._rendered += 1
         self._rays += rays
-        now = time.perf_counter()
         if self._rendered == 1:
-            self._first = now
+            self._first = time.perf_counter()
             return
         left = self._frames - self.stats.kept - self._rendered
-        if left and now - self._told > _LINE_SECONDS:
-            self._told = now
-            done = self._frames - left
+        done = self._frames - left
+        if left and self._lines.due(done / self._frames):
             self._shell.say(
                 f"animate: {done} of {self._frames} frames, {left * (self.seconds_each or 0):.0f} s left"
             )

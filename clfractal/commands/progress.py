@@ -19,6 +19,10 @@ BAR_AFTER_SECONDS = 0.5
 """Quick renders show no bar: loading the library that draws it takes longer than the render."""
 BAR_EVERY_SECONDS = 0.1
 LINE_EVERY_SECONDS = 2.0
+"""Lines, which stay, come no faster."""
+LINE_SHARE = 0.1
+LINE_SILENCE_SECONDS = 60.0
+"""A line comes with each tenth of the work, or after a minute without one."""
 
 
 SILENT_SECONDS = 2.0
@@ -68,6 +72,22 @@ class Patience:
                 silence = min(2 * silence, _LONGEST_SILENCE)
 
 
+class Lines:
+    """When a line about progress is due where lines stay: a log of a long course shall be short."""
+
+    def __init__(self) -> None:
+        self._told, self._share = time.monotonic(), 0.0
+
+    def due(self, share: float) -> bool:
+        """Whether a line is told now that so much of the work is done, 0 to 1; the next one counts from here."""
+        now = time.monotonic()
+        since = now - self._told
+        if since < LINE_EVERY_SECONDS or (share < self._share + LINE_SHARE and since < LINE_SILENCE_SECONDS):
+            return False
+        self._told, self._share = now, share
+        return True
+
+
 class Reporter:
     """Called with the state after each batch of tiles."""
 
@@ -76,19 +96,20 @@ class Reporter:
         self._tiles = tiles
         self._bar: Bar | None = None
         self._terminal = shell.terminal and not shell.quiet
-        self._every = BAR_EVERY_SECONDS if self._terminal else LINE_EVERY_SECONDS
-        self._next = time.monotonic() + (BAR_AFTER_SECONDS if self._terminal else LINE_EVERY_SECONDS)
+        self._next = time.monotonic() + BAR_AFTER_SECONDS
+        self._lines = Lines()
 
     def __call__(self, state: Progress) -> None:
         now = time.monotonic()
         self._shell.alive()
-        if self._shell.quiet or now < self._next or state.tiles_done >= state.tiles:
+        if self._shell.quiet or state.tiles_done >= state.tiles:
             return
-        self._next = now + self._every
+        share = state.tiles_done / max(state.tiles, 1)
         if self._terminal:
-            self._draw(state)
-        else:
-            share = state.tiles_done / max(state.tiles, 1)
+            if now >= self._next:
+                self._next = now + BAR_EVERY_SECONDS
+                self._draw(state)
+        elif self._lines.due(share):
             self._shell.say(f"rendering: {share:4.0%}, {rate(state)}, {_left(state)}")
 
     def close(self) -> None:

@@ -19,7 +19,8 @@ from clfractal import errors
 from clfractal.device import children
 from clfractal.device.child import ANSWER, NOISE, REQUEST
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError, FileError, Where
+from clfractal.errors import DeviceError
+from clfractal.files.atomic import file_error
 
 _NOISE_SHOWN = 20_000  # characters
 
@@ -78,7 +79,8 @@ def run(
     try:
         (folder / REQUEST).write_text(json.dumps(request), encoding="utf-8")
     except OSError as error:
-        raise FileError(f"cannot be written: {error.strerror}", Where(str(folder))) from error
+        # (The folder itself has a name that nobody knows, and is gone when this is read.)
+        raise file_error(folder.parent, "has no room for temporary files", error) from error
     status = _wait_for_child(folder, timeout_s, stopped)
     return _answer(folder, status, device.info.name, doing, timeout_s)
 

@@ -20,9 +20,12 @@ from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
-from clfractal.errors import Stopped
+from clfractal.errors import FileError, Stopped, Where
+from clfractal.files import system
 
 BUILD_TIMEOUT_S = 600.0
+LEAST_FILE_SIZE = 4 << 20
+"""Bytes; the largest programs take half of that, and PoCL keeps several files of each."""
 
 _REMARK_SECONDS = 1.5  # longer than a failing build takes, so that no remark precedes an error
 _FORMAT = 4  # of what is kept under a key
@@ -90,6 +93,7 @@ def build(
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
         DeviceError: the driver failed or aborted.
+        FileError: the process may write only files that are too small for programs.
         Stopped: `stopped` answered True.
     """
     start = time.perf_counter()
@@ -101,6 +105,7 @@ def build(
     program = device.loaded.get(key)
     if program is not None:
         return Program(device, program, _milliseconds(start), cached=True)
+    _check_file_sizes()
     # Of devices of one kind one compiles, and the others find it in the cache.
     with device.loaded.building, _alone(key, stopped):
         try:
@@ -111,6 +116,20 @@ def build(
             raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
     device.loaded.keep(key, program)
     return Program(device, program, _milliseconds(start), cached=cached)
+
+
+def _check_file_sizes() -> None:
+    """Drivers write their programs into files of their own, and abort where these may not be large enough.
+
+    Raises:
+        FileError: the files of this process may not.
+    """
+    limit = system.file_size_limit()
+    if limit is not None and limit < LEAST_FILE_SIZE:
+        raise FileError(
+            f"allows files of {limit} bytes; the files of compiled programs need {LEAST_FILE_SIZE}",
+            Where("ulimit -f"),
+        )
 
 
 @contextmanager

@@ -5,6 +5,7 @@ Also the one place where opening and writing files turns the system's errors int
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import stat
@@ -24,6 +25,9 @@ PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".webp")
 def file_error(path: str | Path, what: str, error: Exception | str) -> FileError:
     """One line such as `out.exr: cannot be written: No space left on device`."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    if isinstance(error, OSError) and error.errno == errno.EFBIG:
+        limit = system.file_size_limit()
+        reason += f": at most {limit} bytes are allowed here (ulimit -f)" if limit is not None else ""
     return FileError(f"{what}: {reason}" if reason else what, Where(str(path)))
 
 

@@ -2,7 +2,7 @@
 
 A document is built from the parser's events rather than by a loader: there is no recursion, only
 strings, numbers, booleans, lists and mappings are constructed, and an alias is counted as all the values that it expands
-to before it is used.
+to before it is used. The key `<<` merges other mappings into its own, as in YAML 1.1.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 import yaml
 
 from clfractal.errors import ClfractalError, SceneError, Where
-from clfractal.files.marks import MAX_DEPTH, Document, Node, dotted, node_from_plain
+from clfractal.files.marks import MAX_DEPTH, MERGE, Document, Node, dotted, node_from_plain
 from clfractal.files.regular import MAX_BYTES, read_text_file
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "read_document", "read_text_file", "read_value", "write_document"]
@@ -120,11 +120,13 @@ for _pattern in (_INT, _OTHER_BASES, _FLOAT, _NON_FINITE):
 
 @dataclass(slots=True)
 class _Open:
-    """A list or mapping that is being read."""
+    """A list or mapping that is being read; `merged`: mappings whose keys it takes over."""
 
     node: Node
     anchor: str | None
     key: str | None = None
+    merged: list[Node] = field(default_factory=list)
+    merges: bool = False
 
 
 class _Builder:
@@ -218,10 +220,11 @@ class _Builder:
             self.fail_at("a key must be a word", event)
         if event.anchor:
             self.fail_at("an anchor on a key is not allowed", event)
-        if event.value in top.node.value:
+        if event.value in top.node.keys:
             first = top.node.keys[event.value][0]
             self.fail_at(f"duplicate key {event.value[:60]!r}, first on line {first}", event)
         top.key = event.value
+        top.merges = event.value == MERGE and event.implicit[0]
         top.node.keys[event.value] = _start(event)
 
     def _alias(self, event: Any) -> Node:
@@ -249,13 +252,27 @@ class _Builder:
         top = self.stack[-1]
         if isinstance(top.node.value, list):
             top.node.value.append(node)
+        elif top.merges:
+            top.merged = self._to_merge(node, *top.node.keys[MERGE])
+            top.key, top.merges = None, False
         else:
             top.node.value[top.key] = node
             top.key = None
         top.node.size += node.size
 
+    def _to_merge(self, node: Node, line: int, column: int) -> list[Node]:
+        """The mappings that the value of `<<` names: one, or a list of them."""
+        found = node.value if isinstance(node.value, list) else [node]
+        if not all(isinstance(each.value, dict) for each in found):
+            self.fail(
+                "merges mappings: its value must be one, such as *name, or a list of them", line, column
+            )
+        return list(found)
+
     def _close(self, event: Any) -> None:
         open_ = self.stack.pop()
+        if open_.merged:
+            _merge(open_.node, open_.merged)
         open_.node.end = (event.end_mark.line + 1, event.end_mark.column + 1)
         if open_.anchor:
             self.anchors[open_.anchor] = open_.node
@@ -283,6 +300,19 @@ class _Builder:
 
     def _part(self, open_: _Open) -> str | int | None:
         return len(open_.node.value) if isinstance(open_.node.value, list) else open_.key
+
+
+def _merge(node: Node, merged: list[Node]) -> None:
+    """Puts the keys of other mappings before a mapping's own, which win; of several mappings the first one does."""
+    own, places = node.value, node.keys
+    node.value, node.keys = {}, {}
+    for each in merged:
+        for key, child in each.value.items():
+            if key not in node.value:
+                node.value[key] = child
+                node.keys[key] = each.keys[key]
+    node.value |= own
+    node.keys |= places
 
 
 def _start(event: Any) -> tuple[int, int]:

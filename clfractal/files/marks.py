@@ -10,6 +10,8 @@ from typing import Any
 from clfractal.errors import ClfractalError, SceneError, Where
 
 MAX_DEPTH = 100
+MERGE = "<<"
+"""The key whose value is a mapping, or a list of them, that a mapping takes over."""
 OPTION = "--set "
 
 
@@ -53,7 +55,7 @@ class Node:
         line, column: its first character, from 1; None in an option.
         end: the position after its last character, to order errors in the text.
         text_column: the column of a string's first character when its text stands on one line just as it is.
-        keys: position of each key of a mapping.
+        keys: position of each key of a mapping; also of the key that merges others, which is no key of the value.
         size: the number of nodes it expands to.
     """
 

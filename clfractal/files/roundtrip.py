@@ -8,7 +8,7 @@ what it should, because the text is written in a rare way, the whole text is wri
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from clfractal.errors import SceneError
@@ -16,7 +16,7 @@ from clfractal.files import spans
 from clfractal.files.document import read_document
 from clfractal.files.edits import Edits
 from clfractal.files.fragments import block_lines, fits, flow_text, number_text, same, text_scalar
-from clfractal.files.marks import Node
+from clfractal.files.marks import MERGE, Node
 from clfractal.files.spans import UnusualError
 
 _NONE = object()
@@ -30,7 +30,8 @@ def updated(
     A changed number or word is replaced in its place. A new key comes behind the others of its mapping (in front if it
     is the first one of `sparse`), a removed one goes with its comment. Entries of a list are matched by their values. A
     value that becomes its default stays, and is written. An alias whose value changes, or the anchor of which does,
-    becomes a value of its own.
+    becomes a value of its own. So do the keys that a mapping takes over by `<<` if the other mapping changes; if only the
+    mapping itself does, it gets the key besides.
 
     Args:
         text: YAML of a mapping that `read_document` accepts; or JSON, which it then stays.
@@ -178,16 +179,29 @@ class _Editor:
     def _mapping(self, node: spans.Mapping, read: Node, before: Any, after: Any, sparse: Any) -> bool:
         old = before if isinstance(before, Mapping) else {}
         names = [key.value for key in node.keys]
+        merges = [_is_merge(key) for key in node.keys]
+        taken = _taken_over(names, read) if any(merges) else ()
+        apart = any(merges) and self._apart(node, taken, after)
         # (A key that means nothing, such as `julia: null`, may be in neither of the two.)
-        kept = [name in after or name not in old for name in names]
+        kept = [
+            not apart if merging else name in after or name not in old
+            for name, merging in zip(names, merges, strict=True)
+        ]
         new = {
-            key: _child(sparse, key) if _child(sparse, key) is not _NONE else after[key]
+            key: _written_value(_child(old, key), after[key], _child(sparse, key), read.child(key))
             for key in after
-            if key not in names and self._needed(key, old, after, sparse)
+            if key not in names
+            and (
+                (apart or not same(_child(old, key), after[key]))
+                if key in taken
+                else self._needed(key, old, after, sparse)
+            )
         }
         if not names or not any(kept):
             return not names and not new
         for index, name in enumerate(names):
+            if merges[index]:
+                continue
             child = read.child(name)
             assert child is not None
             values = (_child(old, name), after.get(name, _NONE), _child(sparse, name))
@@ -201,6 +215,11 @@ class _Editor:
         else:
             self._block_mapping(node, kept, new, first)
         return True
+
+    def _apart(self, node: spans.Mapping, taken: Sequence[str], after: Mapping[str, Any]) -> bool:
+        """Whether a mapping can no longer take over keys: one is gone, or is another's that changes."""
+        names = {name for key, value in _pairs(node) if _is_merge(key) for name in _aliases(value)}
+        return bool(names & self.broken) or any(key not in after for key in taken)
 
     def _needed(self, key: str, before: Mapping[str, Any], after: Mapping[str, Any], sparse: Any) -> bool:
         """Whether a key that the text lacks has to be written."""
@@ -313,6 +332,30 @@ class _Editor:
         inner = node.entries if isinstance(node, spans.Sequence) else ()
         for child in node.values if isinstance(node, spans.Mapping) else inner:
             self._lost(child)
+
+
+def _is_merge(key: spans.Scalar) -> bool:
+    """Whether a key merges other mappings."""
+    return key.value == MERGE and not key.style
+
+
+def _taken_over(names: Sequence[str], read: Node) -> list[str]:
+    """The keys of a mapping that its text does not have, but those that it merges."""
+    return [key for key in read.value if key not in names]
+
+
+def _pairs(node: spans.Mapping) -> Iterator[tuple[spans.Scalar, spans.Node]]:
+    return zip(node.keys, node.values, strict=True)
+
+
+def _aliases(node: spans.Node) -> Iterator[str]:
+    """The names of all aliases in a value."""
+    if isinstance(node, spans.Alias):
+        yield node.name
+        return
+    inner = node.entries if isinstance(node, spans.Sequence) else ()
+    for child in node.values if isinstance(node, spans.Mapping) else inner:
+        yield from _aliases(child)
 
 
 def _written_value(before: Any, after: Any, sparse: Any, read: Node | None) -> Any:

@@ -34,6 +34,16 @@ class HeldError(Exception):
     """Another process holds the lock."""
 
 
+def file_size_limit() -> int | None:
+    """The most bytes that this process may write into one file (`ulimit -f`); None: as many as there is room for."""
+    if sys.platform == "win32":
+        return None
+    import resource
+
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
+
+
 def lock(descriptor: int, *, wait: bool = False) -> None:
     """Locks an open file against other processes until it is closed.
 

@@ -40,6 +40,8 @@ BAD_SHARE = 0.01
 _ALIKE = 0.004
 # Rays across and down the picture that are asked whether bounds are in sight.
 _RAYS = 33
+# Of the steps that marches may take, past which their limit is told.
+_MUCH = 1 / 3
 # Points of the bounds that are asked whether they escape, and applications after which they count as inside.
 _POINTS, _MOST_APPLICATIONS = 48, 200
 
@@ -131,6 +133,8 @@ def _of_view(seen: _Seen) -> list[str]:
     renderer = seen.scene.renderer
     if isinstance(renderer, CutPlaneRenderer):
         return _of_plane(seen, renderer)
+    if few := _of_steps(seen):
+        return [few]
     if seen.empty:
         why = (
             _why_no_volume(seen, renderer) if isinstance(renderer, VolumeRenderer) else _why_no_surface(seen)
@@ -145,6 +149,31 @@ def _of_view(seen: _Seen) -> list[str]:
             f" below {scale:.3g}, such as {scale / 2:.2g}, helps"
         )
     return found
+
+
+def _of_steps(seen: _Seen) -> str:
+    """That marches mostly take as many steps as they may, so that many end before they arrive; else empty."""
+    scene, renderer = seen.scene, seen.scene.renderer
+    if not isinstance(renderer, SurfaceRenderer) or renderer.search == "steps" or not seen.steps:
+        return ""
+    center, radius = scene.bounds
+    met = [_meets_ball(view.camera, np.array(center), radius).mean() for view in seen.views]
+    through = seen.rays * (float(np.mean(met)) if seen.whole else 1.0)
+    # Where a surface is hit others begin: as many as there can be, so that their steps do not look like those of rays.
+    if isinstance(scene.lighting, PathLighting):
+        each = 2 * scene.lighting.bounces
+    else:
+        occlusion = scene.surface.ambient_occlusion
+        shadows = sum(light.rays or 1 for light in scene.lights if light.shadow)
+        each = 1 + shadows + (occlusion.rays if occlusion is not None else 0)
+    marches = max(through + seen.hits * each, 1.0)
+    if seen.steps < _MUCH * marches * renderer.max_steps:
+        return ""
+    mean = min(seen.steps / marches, float(renderer.max_steps))
+    return (
+        f"rays take {mean:.3g} of at most {renderer.max_steps} steps on the average, so many end before they"
+        " arrive; a larger renderer.max_steps shows more"
+    )
 
 
 def _of_lighting(scene: Scene) -> list[str]:
@@ -367,12 +396,18 @@ def _rays(view: View, towards: Floats) -> tuple[Floats, Floats]:
 
 
 def _sees_ball(view: View, center: Floats, radius: float) -> bool:
+    return bool(_meets_ball(view, center, radius).any())
+
+
+def _meets_ball(view: View, center: Floats, radius: float) -> npt.NDArray[np.bool_]:
+    """Which of some rays all over the picture go through a ball."""
     origins, directions = _rays(view, center)
     offset = center - origins
     along = np.einsum("ij,ij->i", offset, directions)
     beside = np.einsum("ij,ij->i", offset, offset) - along**2
     reach = np.sqrt(np.maximum(radius**2 - beside, 0))
-    return bool(((beside < radius**2) & (along + reach > 0)).any())
+    met: npt.NDArray[np.bool_] = (beside < radius**2) & (along + reach > 0)
+    return met
 
 
 def _sees_box(view: View, low: Floats, high: Floats) -> bool:

@@ -53,7 +53,8 @@ def test_system_errors_become_one_line_that_names_the_file(tmp_path: Path) -> No
         open(beside, "wb") as stream,
     ):
         stream.write(b"x" * 5000)
-    assert str(caught.value) == f"{target}: cannot be written: File too large"
+    told = f"{target}: cannot be written: File too large: at most 1000 bytes are allowed here (ulimit -f)"
+    assert str(caught.value) == told
     assert target.read_bytes() == b"old"
     assert contents(tmp_path) == ["a.png"]
 

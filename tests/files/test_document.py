@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -228,3 +229,60 @@ class TestFiles:
         for name in ("nothing.yaml", "a\0b", "x" * 5000):
             with pytest.raises(FileError, match="cannot be read"):
                 read_text_file(Path(name))
+
+
+# --- merges ---
+
+
+def test_keys_are_merged_as_in_yaml_1_1() -> None:
+    """The same as a library of YAML 1.1 reads, apart from words and numbers."""
+    text = """
+a: &a {x: 1, y: [1, 2], z: {deep: 1}}
+b: &b {y: 5, w: 6}
+one: {<<: *a, x: 7}
+late: {x: 7, <<: *a}
+several: {<<: [*b, *a], own: 1}
+chained: &c {<<: *b, y: 8}
+written: {<<: {x: 3}, y: 4}
+"""
+    found = read_document(text).plain()
+    assert found == yaml.safe_load(text)
+    assert list(found["one"]) == ["x", "y", "z"]
+    twice = read_document(f"{text}twice: {{<<: *c}}\n").plain()["twice"]  # which that library gets wrong
+    assert twice == found["chained"] == {"y": 8, "w": 6}
+    assert read_document("a: {'<<': 1}").plain() == {
+        "a": {"<<": 1}
+    }  # a word in quotes is a key like any other
+
+
+def test_an_error_in_what_was_merged_is_where_it_was_written() -> None:
+    document = read_document("a: &a\n  x: 1\n  y: 2\nb:\n  <<: *a\n  z: 3\n", "s.yaml")
+    assert document.where(("b", "y")).line == 3
+    assert document.where(("b",), key="y").line == 3
+    assert document.where(("b",), key="z").line == 6
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "a: {<<: 3}",
+            "s:1:5: a.<<: merges mappings: its value must be one, such as *name, or a list of them",
+        ),
+        ("a: &a [1]\nb: {<<: *a}", "s:2:5: b.<<: merges mappings"),
+        ("a: &a {<<: *a}", "contains itself"),
+        ("a: &a {x: 1}\nb: {<<: *a, <<: *a}", "s:2:13: b: duplicate key '<<', first on line 2"),
+        ("b: {<<: *a}", "unknown alias *a"),
+    ],
+)
+def test_what_cannot_be_merged(text: str, message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        read_document(text, "s")
+    assert message in str(caught.value)
+
+
+def test_merges_count_for_what_they_repeat() -> None:
+    lines = ["a0: &a0 {" + ", ".join(f"k{i}: 1" for i in range(1000)) + "}"]
+    lines += [f"a{n}: &a{n} {{x{n}: [*a{n - 1}, *a{n - 1}], <<: *a{n - 1}}}" for n in range(1, 12)]
+    with pytest.raises(SceneError, match="holds more than 100,000 values"):
+        read_document("\n".join(lines))

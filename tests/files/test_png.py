@@ -168,7 +168,7 @@ def test_full_disk_leaves_the_earlier_file(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
     path.write_bytes(b"old")
     with (
-        pytest.raises(FileError, match=r"a\.png: cannot be written: File too large$"),
+        pytest.raises(FileError, match=r"a\.png: cannot be written: File too large: at most 20000 bytes"),
         file_size_limit(20000),
     ):
         write(path, linear(200, 200))

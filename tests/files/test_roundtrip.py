@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from clfractal.files.document import read_document
 from clfractal.files.fragments import flow_text, number_text, same, text_scalar
 from clfractal.files.roundtrip import updated, written
+from clfractal.scene.load import load_scene
 
 scalars = (
     st.none()
@@ -312,3 +313,54 @@ def test_rare_forms_are_written_anew(text: str) -> None:
     before = read_document(text).plain()
     after = {**before, "a": 5}
     assert same(read_document(updated(text, before, after)).plain(), after)
+
+
+MERGING = """# head
+a: &a {x: 1, y: [1, 2]}   # base
+b:
+  <<: *a     # as a
+  z: 3
+c: {<<: *a, x: 5}
+d:
+  <<: [*a, {w: 9, x: 0}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("change", "kept"),
+    [
+        (lambda data: data["b"].update(z=4), ["<<: *a     # as a\n  z: 4", "c: {<<: *a, x: 5}", "[*a, {w"]),
+        (lambda data: data["b"].update(x=4), ["  x: 4\n", "<<: *a     # as a", "c: {<<: *a, x: 5}"]),
+        (lambda data: data["c"].update(y=[3]), ["c: {<<: *a, x: 5, y: [3]}", "<<: *a     # as a"]),
+        (lambda data: data["d"].update(w=8), ["<<: [*a, {w: 9, x: 0}]\n  w: 8"]),
+        (lambda data: data["a"].update(x=7), ["a: &a {x: 7, y: [1, 2]}   # base", "b:\n  x: 1\n  z: 3"]),
+        (lambda data: data["b"].pop("x"), ["c: {<<: *a, x: 5}", "b:\n  y: [1, 2]\n  z: 3"]),
+        (lambda data: data.pop("a"), ["# head", "b:", "z: 3"]),
+    ],
+)
+def test_merges_stay_where_they_can(change: Callable[[Any], None], kept: list[str]) -> None:
+    before = read_document(MERGING).plain()
+    after = copy.deepcopy(before)
+    change(after)
+    text = updated(MERGING, before, after)
+    assert read_document(text).plain() == after
+    for part in kept:
+        assert part in text, text
+
+
+def test_keys_of_a_scene_that_were_merged_are_saved() -> None:
+    """A light that takes over the keys of another is edited; then the other."""
+    text = (
+        "version: 1\nformula: {name: hast}\ncamera: {}\nlights:\n  - &key {type: point, position: [9, 0, 0]}\n"
+        "  - {<<: *key, intensity: 0.5}  # fill\n"
+    )
+    scene = load_scene(text)
+    assert [light.intensity for light in scene.lights] == [1, 0.5]
+    before, after = scene.resolved(), scene.resolved()
+    assert before["lights"][1]["position"] == before["lights"][0]["position"] == [9, 0, 0]
+    after["lights"][1]["position"] = [0, 9, 0]
+    saved = updated(text, before, after)
+    assert "{<<: *key, intensity: 0.5, position: [0, 9, 0]}  # fill" in saved
+    assert load_scene(saved).resolved() == after
+    after["lights"][0]["intensity"] = 2
+    assert load_scene(updated(text, before, after)).resolved() == after

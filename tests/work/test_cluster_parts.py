@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import multiprocessing
+import subprocess
 import sys
 from pathlib import Path, PureWindowsPath
 
@@ -13,11 +15,13 @@ from hypothesis import strategies as st
 
 import clfractal
 from clfractal.cluster.fingerprint import fingerprint
+from clfractal.cluster.guard import check_main
 from clfractal.cluster.local import Place
 from clfractal.cluster.message import Array, Digests, pack, unpack
 from clfractal.cluster.sizes import SECONDS, Pace
+from clfractal.errors import SceneError
 from clfractal.work.engine import Engine
-from tests.shell import SCENE, InProcess
+from tests.shell import SCENE, InProcess, environment
 
 
 @pytest.mark.parametrize(
@@ -145,3 +149,51 @@ def test_the_pace_follows_what_is_measured() -> None:
         pace.learn(10, 4, 1.0)  # what comes now is ten times as heavy
     assert pace.bundle(4, 100_000, 2, 4096) in (9, 10)
     assert pace.bundle(8, 100_000, 2, 4096) in (4, 5)
+
+
+PROGRAM = """import clfractal
+{line}
+{indent}with clfractal.Cluster("local:2") as cluster:
+{indent}    print("made")
+"""
+
+
+@pytest.mark.parametrize("line", ["", "if True:", "if cluster := 3:"])
+def test_a_program_without_its_guard_is_told_in_a_line(line: str, tmp_path: Path) -> None:
+    """Nothing is started: neither processes, nor what they would write."""
+    (tmp_path / "program.py").write_text(PROGRAM.format(line=line, indent="    " if line else ""))
+    ended = subprocess.run(
+        [sys.executable, "-P", "program.py"], cwd=tmp_path, env=environment(), capture_output=True, text=True
+    )
+    assert ended.returncode == 1
+    assert ended.stderr.count("\n") < 12
+    assert "distributed" not in ended.stderr
+    last = ended.stderr.splitlines()[-1]
+    assert last.startswith("clfractal.errors.SceneError: cluster: local:2 starts processes")
+    assert last.endswith('below `if __name__ == "__main__":`')
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "if __name__ == '__main__':\n    check_main('local:2')\n",
+        "def work():\n    check_main('local:2')\nif '__main__' == __name__:\n    work()\n",
+        "if __name__ != '__main__':\n    raise SystemExit\ncheck_main('local:2')\n",
+    ],
+)
+def test_a_program_with_a_guard_may_start_processes(text: str, tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text("from clfractal.cluster.guard import check_main\n" + text)
+    for how in (
+        ["program.py"],
+        ["-c", "from clfractal.cluster.guard import check_main; check_main('local:1')"],
+    ):
+        ended = subprocess.run(
+            [sys.executable, "-P", *how], cwd=tmp_path, env=environment(), capture_output=True, text=True
+        )
+        assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_a_process_that_runs_the_program_again_starts_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(multiprocessing.current_process(), "_inheriting", True, raising=False)
+    with pytest.raises(SceneError, match="below `if __name__"):
+        check_main("local:2")

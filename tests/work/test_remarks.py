@@ -125,6 +125,16 @@ def test_steps_that_end_inside(engine: Engine) -> None:
     assert of(engine, bold, renderer={**rough, "step_scale": 0.1}) == ()
 
 
+def test_steps_that_are_too_few(engine: Engine) -> None:
+    def limited(steps: int, **more: Any) -> tuple[str, ...]:
+        return of(engine, renderer={"type": "surface", "max_steps": steps}, **more)
+
+    for steps in (1, 3):
+        one(limited(steps), f"of at most {steps} steps", "a larger renderer.max_steps shows more")
+    one(limited(1, camera={"position": [0, -4, 0], "fov": 5}), "renderer.max_steps")
+    assert limited(60) == ()
+
+
 def test_volumes_that_show_nothing(engine: Engine, tmp_path: Path) -> None:
     beyond = {**VOLUME, "box": {"center": [5, 0, 0], "size": 2}}
     one(
