@@ -29,9 +29,9 @@ def updated(
 
     A changed number or word is replaced in its place. A new key comes behind the others of its mapping (in front if it
     is the first one of `sparse`), a removed one goes with its comment. Entries of a list are matched by their values. A
-    value that becomes its default stays, and is written. An alias whose value changes, or the anchor of which does,
-    becomes a value of its own. So do the keys that a mapping takes over by `<<` if the other mapping changes; if only the
-    mapping itself does, it gets the key besides.
+    value that becomes its default stays, and is written. Anchors and their aliases stay as long as they stand for equal
+    values; an alias that stands for another one becomes a value of its own. So do the keys that a mapping takes over by
+    `<<` if the other mapping changes; if only the mapping itself does, it gets the key besides.
 
     Args:
         text: YAML of a mapping that `read_document` accepts; or JSON, which it then stays.
@@ -118,7 +118,8 @@ class _Editor:
         tree: its values and where they stand.
         root: the same values as `read_document` reads them, aliases resolved.
         has_sparse: whether defaults are known, so that they need not be written.
-        broken: anchors whose value changes or goes away, so that their aliases become values.
+        broken: anchors that go away, so that their aliases become values.
+        anchored: what each anchor stands for from now on: whether that has changed, the value, and without defaults.
     """
 
     def __init__(self, text: str, root: Node, has_sparse: bool) -> None:
@@ -128,6 +129,7 @@ class _Editor:
         self.has_sparse = has_sparse
         self.json_only = _is_json(text)
         self.broken: set[str] = set()
+        self.anchored: dict[str, tuple[bool, Any, Any]] = {}
         self.edits = Edits(text)
 
     def edited(self, before: Any, after: Any, sparse: Any) -> str:
@@ -139,6 +141,7 @@ class _Editor:
         while True:
             known = set(self.broken)
             self.edits = Edits(self.text)
+            self.anchored.clear()
             self._mapping(self.tree, self.root, before, after, sparse)
             if self.broken == known:
                 return self.edits.applied()
@@ -148,14 +151,14 @@ class _Editor:
 
     def _value(self, node: spans.Node, read: Node, before: Any, after: Any, sparse: Any) -> bool:
         """Edits a value inside its place; False if it has to be replaced as a whole."""
-        if isinstance(node, spans.Alias):
-            if same(before, after) and node.name not in self.broken:
-                return True
-            self.edits.replace(node.start, node.end, self._flow(_written_value(before, after, sparse, read)))
-            return True
         changed = not same(before, after)
-        if changed and node.anchor:
-            self.broken.add(node.anchor)
+        if isinstance(node, spans.Alias):
+            if not self._is_still(node.name, changed, after, sparse):
+                text = self._flow(_written_value(before, after, sparse, read))
+                self.edits.replace(node.start, node.end, text)
+            return True
+        if node.anchor:
+            self.anchored[node.anchor] = (changed, after, sparse)
         if isinstance(node, spans.Mapping) and isinstance(after, Mapping):
             return self._mapping(node, read, before, after, sparse)
         if isinstance(node, spans.Sequence) and isinstance(after, list):
@@ -163,6 +166,17 @@ class _Editor:
         if changed and isinstance(node, spans.Scalar) and not isinstance(after, (Mapping, list)):
             return self._scalar(node, after)
         return not changed
+
+    def _is_still(self, name: str, changed: bool, after: Any, sparse: Any) -> bool:
+        """Whether an alias stands for its anchor's value as it did."""
+        if name in self.broken:
+            return False
+        if name not in self.anchored:
+            return not changed  # it lies in what is written in a short way, and so has not been looked into
+        anchor_changed, value, short = self.anchored[name]
+        # (Sections of two kinds have other defaults.)
+        equal = same(value, after) or (sparse is not _NONE and short is not _NONE and same(short, sparse))
+        return equal or not (changed or anchor_changed)
 
     def _scalar(self, node: spans.Scalar, after: Any) -> bool:
         if node.start == node.end or node.style in ("|", ">"):
@@ -173,7 +187,7 @@ class _Editor:
             new = number_text(after, node.value)
         else:
             new = self._flow(after)
-        self.edits.replace(node.start, node.end, new)
+        self.edits.replace(spans.value_start(self.text, node), node.end, new)
         return True
 
     def _mapping(self, node: spans.Mapping, read: Node, before: Any, after: Any, sparse: Any) -> bool:
@@ -181,7 +195,10 @@ class _Editor:
         names = [key.value for key in node.keys]
         merges = [_is_merge(key) for key in node.keys]
         taken = _taken_over(names, read) if any(merges) else ()
-        apart = any(merges) and self._apart(node, taken, after)
+        given = self._given(node)
+        apart = any(merges) and self._apart(
+            node, taken, given, {k: v for k, v in after.items() if k not in names}
+        )
         # (A key that means nothing, such as `julia: null`, may be in neither of the two.)
         kept = [
             not apart if merging else name in after or name not in old
@@ -192,7 +209,7 @@ class _Editor:
             for key in after
             if key not in names
             and (
-                (apart or not same(_child(old, key), after[key]))
+                (apart or (key not in given and not same(_child(old, key), after[key])))
                 if key in taken
                 else self._needed(key, old, after, sparse)
             )
@@ -216,10 +233,28 @@ class _Editor:
             self._block_mapping(node, kept, new, first)
         return True
 
-    def _apart(self, node: spans.Mapping, taken: Sequence[str], after: Mapping[str, Any]) -> bool:
-        """Whether a mapping can no longer take over keys: one is gone, or is another's that changes."""
+    def _given(self, node: spans.Mapping) -> dict[str, Any]:
+        """What a mapping takes over from others that change."""
+        found: dict[str, Any] = {}
+        for key, value in _pairs(node):
+            for name in _aliases(value) if _is_merge(key) else ():
+                changed, given, _ = self.anchored.get(name, (False, None, None))
+                if changed and isinstance(given, Mapping):
+                    found = {**given, **found}
+        return found
+
+    def _apart(
+        self, node: spans.Mapping, taken: Sequence[str], given: Mapping[str, Any], after: Mapping[str, Any]
+    ) -> bool:
+        """Whether a mapping can no longer take over keys: one is gone, or another's has a value that is not this one's.
+
+        Args:
+            after: without the keys that the mapping has itself.
+        """
         names = {name for key, value in _pairs(node) if _is_merge(key) for name in _aliases(value)}
-        return bool(names & self.broken) or any(key not in after for key in taken)
+        if names & self.broken or any(key not in after for key in taken):
+            return True
+        return any(not same(given[key], after[key]) for key in given.keys() & after.keys())
 
     def _needed(self, key: str, before: Mapping[str, Any], after: Mapping[str, Any], sparse: Any) -> bool:
         """Whether a key that the text lacks has to be written."""
@@ -279,8 +314,8 @@ class _Editor:
             assert child is not None
             entry = node.entries[i]
             if not self._value(entry, child, old[i], after[j], _child(sparse, j)):
-                self._lost(entry)
-                self.edits.replace(entry.start, entry.end, self._flow(texts[j]))
+                self._lost_within(entry)
+                self.edits.replace(spans.value_start(self.text, entry), entry.end, self._flow(texts[j]))
         if not node.flow:
             self._block_sequence(
                 node, gone, {place: [texts[j] for j in added] for place, added in new.items()}
@@ -306,29 +341,35 @@ class _Editor:
     def _whole(self, node: spans.Mapping, index: int, value: Any) -> None:
         """Replaces all of a mapping's value."""
         old, colon = node.values[index], node.colons[index]
-        self._lost(old)
+        self._lost_within(old)
         text = self._flow(value)
+        anchor = "" if isinstance(old, spans.Alias) or not old.anchor else f"&{old.anchor}"
+        if anchor:
+            text = f"{anchor} {text}"
         if node.flow or colon < 0:
             self.edits.replace(old.start, old.end, text if old.start < old.end else ": "[colon >= 0 :] + text)
             return
         column = self.edits.column(node.keys[index].start)
         on_line = "\n" not in self.text[colon : old.start] and "\r" not in self.text[colon : old.start]
-        one_line = not value or fits(value, self.edits.column(colon) + 2)
+        one_line = not value or fits(value, self.edits.column(colon) + 2 + len(anchor))
+        first = f" {text if one_line else anchor}".rstrip()
         lines = [] if one_line else block_lines(value, column + 2)
         if on_line:
-            self.edits.replace(colon + 1, old.end, f" {text}" if one_line else "")
+            self.edits.replace(colon + 1, old.end, first)
             self.edits.insert_lines_after(old.end, lines)
         else:
-            self.edits.replace(colon + 1, colon + 1, f" {text}" if one_line else "")
+            self.edits.replace(colon + 1, colon + 1, first)
             self.edits.insert_lines_after(colon, lines)
             self.edits.remove(self.edits.next_line(colon), self.edits.next_line(old.end))
 
     def _lost(self, node: spans.Node) -> None:
         """Remembers the anchors of a value that goes away."""
-        if isinstance(node, spans.Alias):
-            return
-        if node.anchor:
+        if not isinstance(node, spans.Alias) and node.anchor:
             self.broken.add(node.anchor)
+        self._lost_within(node)
+
+    def _lost_within(self, node: spans.Node) -> None:
+        """The same for a value that another one takes the place of: its own anchor is the new one's."""
         inner = node.entries if isinstance(node, spans.Sequence) else ()
         for child in node.values if isinstance(node, spans.Mapping) else inner:
             self._lost(child)

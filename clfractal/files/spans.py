@@ -95,6 +95,13 @@ def parse(text: str) -> Mapping:
     return root
 
 
+def value_start(text: str, node: Node) -> int:
+    """Where a node's value begins, behind its anchor."""
+    return (
+        node.start if isinstance(node, Alias) or node.anchor is None else _after_properties(text, node.start)
+    )
+
+
 def _ends(event: Any) -> bool:
     return type(event).__name__ in ("SequenceEndEvent", "MappingEndEvent")
 

@@ -84,6 +84,7 @@ class Files:
         viewer.ui.memory["files"] = self
         if self.source.loaded is not None:
             viewer.studio.saved = self.source.loaded
+        viewer.studio.shared_in_text = lambda: self.source.shared
         self._kept = viewer.studio.document
         self._title()
         self._look_for_kept()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,6 +17,7 @@ from clfractal.files.inputs import noting
 from clfractal.scene.load import SceneText, load_scene, read_text
 from clfractal.scene.model import Scene
 from clfractal.viewer.named import formula_files
+from clfractal.viewer.shared import Group, groups_of
 
 Kind = Literal["scene", "picture", "shipped", "none"]
 
@@ -51,6 +53,11 @@ class SceneSource:
         except SceneError:
             return None
         return section.plain() if section is not None else None
+
+    @cached_property
+    def shared(self) -> tuple[Group, ...]:
+        """The values that the text names once and uses at several places."""
+        return groups_of(self.text)
 
     @property
     def watched(self) -> tuple[Path, ...]:

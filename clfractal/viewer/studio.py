@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Hashable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from clfractal.viewer.live import with_live
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.picking import Pick, picked
 from clfractal.viewer.session import Session
+from clfractal.viewer.shared import Group, Shared
 from clfractal.viewer.tracked import TrackedError, check_tracked
 from clfractal.viewer.viewport import image_of, render_key
 from clfractal.work.show import Look
@@ -68,6 +70,7 @@ class Studio(InFilm):
         problems: dotted path -> what was wrong with the value that was last tried there.
         viewport: width and height of what the window shows, pixels.
         messages: lines for the user, the newest last.
+        shared_in_text: what the scene's text has once and uses at several places.
         screens: how the screens show a scene's pair; eyes with a screen each have another way than the scene's.
     """
 
@@ -79,6 +82,8 @@ class Studio(InFilm):
         self.messages: list[Message] = []
         self.viewport = (1280, 720)
         self.screens: Callable[[Stereo | None], Stereo | None] = lambda stereo: stereo
+        self.shared_in_text: Callable[[], tuple[Group, ...]] = tuple
+        self._shared = Shared()
         self.region: tuple[int, int, int, int] | None = None
         self.smooth = True
         self.stills: list[Still] = []
@@ -101,7 +106,7 @@ class Studio(InFilm):
         On a mistake the scene stays as it was, and `problems` tells what is wrong with each path.
         """
         try:
-            changed = edited(self.scene, values)
+            changed = self._tied(edited(self.scene, values))
         except ClfractalError as error:
             tracked = isinstance(error, TrackedError)
             of_film = not tracked and (error.where.path or "").startswith("animation.")
@@ -132,10 +137,17 @@ class Studio(InFilm):
             except ClfractalError as error:
                 self.tell(error.message, wrong=True)
                 return
+        try:
+            changed = self._tied(changed)
+        except ClfractalError as error:
+            self.tell(f"camera: {error}", wrong=True)
+            return
         self._replace(changed, gesture)
 
     def set_scene(self, scene: Scene, gesture: str | None = None) -> None:
         """Another scene in the place of this one, as a step that can be undone (a variation, for example)."""
+        with suppress(ClfractalError):  # what cannot be the same at all places of a shared value becomes two
+            scene = self._tied(scene)
         self._replace(scene, gesture)
 
     def open(self, scene: Scene) -> None:
@@ -327,6 +339,14 @@ class Studio(InFilm):
         for still in self.stills:
             still.finish_writing()
 
+    def _tied(self, changed: Scene) -> Scene:
+        """An edited scene in which what is one thing in its text still is.
+
+        Raises:
+            ClfractalError: the new value is not possible at another of its places.
+        """
+        return self._shared.tied(self.scene, changed, self.shared_in_text())
+
     def _replace(self, scene: Scene, gesture: str | None) -> None:
         scene, place = self._auto_keyed(scene)
         if not self.recording:
@@ -340,6 +360,7 @@ class Studio(InFilm):
         if step is None:
             return False
         sections = step.after if redo else step.before
+        present = self.scene
         try:
             self._put_back(sections, step.frame)
         except ClfractalError as error:
@@ -350,6 +371,7 @@ class Studio(InFilm):
             self.history.redo(kind)
         else:
             self.history.undo(kind)
+        self._shared.follow(present, self.scene, self.shared_in_text())
         self._moving_until = 0.0
         self.refresh()
         return True

@@ -286,6 +286,18 @@ def test_an_edit_does_not_leak_through_an_alias() -> None:
     own = "{k: 1, l: 2}"
     expected = ALIASES.replace("{k: 1", "{k: 3").replace("*x", own)
     assert edited(ALIASES, "a['a'] = {'k': 3, 'l': 2}") == expected
+    # What is the same as before everywhere is one thing.
+    both = "a['a'] = a['c'] = {'k': 3, 'l': 2}"
+    assert edited(ALIASES, both) == ALIASES.replace("{k: 1", "{k: 3").replace("b: *x", f"b: {own}")
+    every = "a['a'] = a['b'] = a['c'] = {'k': 3, 'm': 5}"
+    assert edited(ALIASES, every) == ALIASES.replace("{k: 1, l: 2}", "{k: 3, m: 5}")
+    assert edited(ALIASES, "a['a'] = a['b'] = a['c'] = 7") == ALIASES.replace("{k: 1, l: 2}", "7")
+    assert edited("a: &x 1\nb: *x\n", "a['a'] = a['b'] = 2") == "a: &x 2\nb: *x\n"
+    assert edited("a: &x 1\nb: *x\n", "a['a'] = a['b'] = {'k': [1]}") == "a: &x {k: [1]}\nb: *x\n"
+    long = ["a long text that needs a line of its own " + "x" * 60] * 3
+    grown = edited("a: &x 1\nb: *x\n", f"a['a'] = a['b'] = {long!r}")
+    assert grown.startswith("a: &x\n  - ")
+    assert grown.endswith("\nb: *x\n")
     assert "e: [1, 2]" in edited(ALIASES, "del a['d']")
     assert edited(ALIASES, "del a['e']") == ALIASES.replace("e: *y\n", "")
 
@@ -334,6 +346,10 @@ d:
         (lambda data: data["c"].update(y=[3]), ["c: {<<: *a, x: 5, y: [3]}", "<<: *a     # as a"]),
         (lambda data: data["d"].update(w=8), ["<<: [*a, {w: 9, x: 0}]\n  w: 8"]),
         (lambda data: data["a"].update(x=7), ["a: &a {x: 7, y: [1, 2]}   # base", "b:\n  x: 1\n  z: 3"]),
+        (
+            lambda data: [data[key].update(y=[8]) for key in data],
+            ["a: &a {x: 1, y: [8]}   # base", "  <<: *a     # as a", "c: {<<: *a, x: 5}", "<<: [*a, {w: 9"],
+        ),
         (lambda data: data["b"].pop("x"), ["c: {<<: *a, x: 5}", "b:\n  y: [1, 2]\n  z: 3"]),
         (lambda data: data.pop("a"), ["# head", "b:", "z: 3"]),
     ],

@@ -136,7 +136,7 @@ def test_a_window_that_is_resized_is_another_screen_and_says_so(
         def told() -> bool:
             """The line covers a part of the picture of before, and nothing else of it."""
             now = window.pixels()
-            return np.array_equal(now[160:], plain[160:]) and not np.array_equal(now[:160], plain[:160])
+            return np.array_equal(now[210:], plain[210:]) and not np.array_equal(now[:210], plain[:210])
 
         wait_for(told, "the line about it", 10)
         window.save()
