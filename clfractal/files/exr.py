@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import struct
+import sys
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import redirect_stdout
 from io import StringIO
@@ -103,7 +104,7 @@ def read_exr(path: str | Path, *, tiles: bool = False) -> tuple[dict[str, npt.ND
         # For pixels that cannot be read the library only prints a line, on Python's standard output.
         with (
             redirect_stdout(StringIO()) as said,
-            OpenEXR.File(os.fspath(path), separate_channels=True) as file,
+            OpenEXR.File(library_name(path), separate_channels=True) as file,
         ):
             planes = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
         if said.getvalue():
@@ -113,6 +114,28 @@ def read_exr(path: str | Path, *, tiles: bool = False) -> tuple[dict[str, npt.ND
             "is damaged: its pixels cannot be read", Where(str(path)), details=str(error)
         ) from error
     return planes, header.values()
+
+
+def library_name(path: str | Path, *, shown: str | Path | None = None) -> bytes:
+    """A path as the library takes it: in the bytes that the system itself uses.
+
+    Text it would encode as UTF-8, whatever the system does: it crashes on names that are no UTF-8, and where names have
+    another encoding it writes to another place. On Windows it expects UTF-8, which half of a pair of UTF-16 has no form in.
+
+    Args:
+        shown: the path that a message names, if it is another one.
+
+    Raises:
+        FileError: the path has no such form.
+    """
+    if sys.platform != "win32":
+        return os.fsencode(path)
+    try:
+        return os.fspath(path).encode()
+    except UnicodeEncodeError as error:
+        raise FileError(
+            "the name of the file or of a folder above it is not valid Unicode", Where(str(shown or path))
+        ) from error
 
 
 def _plain_header(
@@ -188,7 +211,7 @@ def _write_pixels(
         return rows
 
     OpenEXR.set_global_thread_count(min(4, os.cpu_count() or 1))
-    file = _library(path, OpenEXR.OutputFile, os.fspath(beside), plain)
+    file = _library(path, OpenEXR.OutputFile, library_name(beside, shown=path), plain)
     try:
         for band in bands:
             waiting.append(band)
