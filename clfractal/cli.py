@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from clfractal.commands.shell import Shell
 
-INTERRUPTED = 130
-
 
 def main() -> None:
     """Runs the program and ends the process.
@@ -36,7 +34,7 @@ def main() -> None:
             os.write(2, b"clfractal: interrupted\n")
 
     try:
-        interrupt.watch(last_words, INTERRUPTED)
+        interrupt.watch(last_words)
         from clfractal.commands.shell import Shell
 
         shell = Shell(owns_process=True)
@@ -45,7 +43,7 @@ def main() -> None:
     except KeyboardInterrupt:
         # While this is handled the traceback keeps every object of the driver alive: none is waited for.
         last_words()
-        os._exit(INTERRUPTED)
+        os._exit(interrupt.status())
     os._exit(status)
 
 

@@ -10,6 +10,9 @@ from dataclasses import dataclass, replace
 STATUS_BAD_INPUT = 2
 STATUS_DEVICE_FAILED = 3
 STATUS_INTERRUPTED = 130
+STATUS_SIGNALLED = (
+    128  # and the number of the signal, as shells have it; STATUS_INTERRUPTED is that of Ctrl-C
+)
 
 
 @dataclass(frozen=True, slots=True)

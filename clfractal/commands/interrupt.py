@@ -1,4 +1,7 @@
-"""Ctrl-C: ends the program within half a second, even in the middle of a kernel or a compilation.
+"""Interrupts: end the program within half a second, even in the middle of a kernel or a compilation.
+
+Ctrl-C is one; so is what batch systems, containers, service managers and `timeout` send before they kill, and what a
+terminal sends that closes. All take the same course: what is done is kept, and one line says how to go on.
 
 Python handles a signal only in the main thread and between two of its own instructions, but a call into a driver
 may last long. So there are two reactions. The first is KeyboardInterrupt, which lets every `finally` do its work.
@@ -16,8 +19,18 @@ from collections.abc import Callable
 from contextlib import suppress
 from types import FrameType
 
+from clfractal.errors import STATUS_SIGNALLED
+
 GRACE_SECONDS = 0.35
 """How long the orderly way may take. A child process that compiles is given 0.25 s by Python itself."""
+
+SIGNALS = tuple(
+    getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # the last is Ctrl-Break of Windows
+    if hasattr(signal, name)
+)
+
+_came: int = signal.SIGINT
 
 
 def _sleep_on() -> None:
@@ -25,39 +38,51 @@ def _sleep_on() -> None:
 
 
 wake: Callable[[], None] = _sleep_on
-"""Called from another thread when Ctrl-C has come: makes a main thread that waits outside of Python go on."""
+"""Called from another thread when an interrupt has come: makes a main thread that waits outside of Python go on."""
 
 
-def watch(last_words: Callable[[], None], status: int) -> None:
-    """From now on Ctrl-C raises KeyboardInterrupt once, and ends the process with `status` soon after.
+def status() -> int:
+    """The exit status for the signal that came, by the shells' convention: 128 and its number; without one that of Ctrl-C."""
+    return STATUS_SIGNALLED + _came
 
-    `last_words` is called before the process is ended by force. If the process was started with
-    interrupts ignored (`nohup`, a shell's `&`), they stay ignored.
+
+def watch(last_words: Callable[[], None]) -> None:
+    """From now on the first of the signals raises KeyboardInterrupt, and ends the process with `status()` soon after.
+
+    `last_words` is called before the process is ended by force. Signals that were ignored when the process was started
+    (by `nohup`, a shell's `&`) stay ignored.
     """
-    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    watched = [each for each in SIGNALS if signal.getsignal(each) != signal.SIG_IGN]
+    if not watched:
         return
     reading, writing = os.pipe()
     if hasattr(os, "set_blocking"):  # not on Windows before Python 3.12, which does not ask for it either
         with suppress(OSError):
             os.set_blocking(writing, False)
-    signal.signal(signal.SIGINT, _raise_once)
+
+    def raise_once(number: int, _frame: FrameType | None) -> None:
+        global _came
+        _came = number
+        for each in watched:
+            signal.signal(each, _ignore)
+        raise KeyboardInterrupt
+
+    for each in watched:
+        signal.signal(each, raise_once)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    _thread.start_new_thread(_end_by_force, (reading, last_words, status))
-
-
-def _raise_once(_number: int, _frame: FrameType | None) -> None:
-    signal.signal(signal.SIGINT, _ignore)
-    raise KeyboardInterrupt
+    _thread.start_new_thread(_end_by_force, (reading, frozenset(watched), last_words))
 
 
 def _ignore(_number: int, _frame: FrameType | None) -> None:
-    """A second Ctrl-C must not stop the clean-up after the first one (SIG_IGN would be inherited by child processes)."""
+    """A second signal must not stop the clean-up after the first one (SIG_IGN would be inherited by child processes)."""
 
 
-def _end_by_force(reading: int, last_words: Callable[[], None], status: int) -> None:
-    while os.read(reading, 1) != bytes([signal.SIGINT]):
+def _end_by_force(reading: int, watched: frozenset[int], last_words: Callable[[], None]) -> None:
+    global _came
+    while (came := os.read(reading, 1)[0]) not in watched:
         pass
+    _came = came
     wake()
     time.sleep(GRACE_SECONDS)
     last_words()
-    os._exit(status)
+    os._exit(status())

@@ -43,6 +43,7 @@ def main() -> None:
     """Do what the requests ask and leave at once, without a driver's clean-up, which may hang or crash."""
     # Drivers write to the descriptors 1 and 2 as they like.
     done = os.dup(1)
+    _leave_signals_to_the_parent()
     _die_with(int(sys.argv[1]))
     _leave_no_core()
     folders: queue.SimpleQueue[Path] = queue.SimpleQueue()
@@ -63,6 +64,13 @@ def _listen(folders: queue.SimpleQueue[Path]) -> None:
     while line := os.read(0, _LONGEST_LINE):
         folders.put(Path(os.fsdecode(line.rstrip(b"\r\n"))))
     os._exit(0)
+
+
+def _leave_signals_to_the_parent() -> None:
+    """Batch systems tell every process of a job to end; the parent decides, and must not take it for a driver's failure."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
 
 
 def _leave_no_core() -> None:

@@ -37,6 +37,13 @@ def sleep_job(request: dict[str, Any]) -> None:
     time.sleep(600)
 
 
+def signalled_job(request: dict[str, Any]) -> str:
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            os.kill(os.getpid(), getattr(signal, name))
+    return "done"
+
+
 def slow_echo_job(request: dict[str, Any]) -> list[Any]:
     time.sleep(0.1)
     return echo_job(request)
@@ -313,6 +320,12 @@ def test_a_driver_that_aborts_while_building(
     assert capfd.readouterr() == ("", "")
     monkeypatch.delenv(child.TEST_ABORT)
     assert not build(device, text, flags=math_flags("float32")).cached
+
+
+@pytest.mark.skipif(os.name != "posix", reason="os.kill ends a process at once on Windows")
+def test_the_parent_decides_about_signals(device: Device) -> None:
+    """Batch systems send them to every process of a job: a child that they ended would look like a driver that aborts."""
+    assert _run(device, "signalled_job") == "done"
 
 
 _PARENT = """
