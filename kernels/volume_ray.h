@@ -26,15 +26,18 @@ typedef struct {
     real near, far;         // distances along the ray; it ends before `far`
 } grid_ray;
 
+// A direction in voxels along the grid's own axes.
+INLINE vec grid_own(__constant const struct Grid *about, vec a) {
+    return vec_of(vec_dot(a, vec_splat(about->own_x)), vec_dot(a, vec_splat(about->own_y)), vec_dot(a, vec_splat(about->own_z)));
+}
+
 INLINE real safe_inverse(real a) { return R(1.0) / pick(less(fabs(a), R(1e-20)), R(1e-20), a); }
 
 // The part of a ray within the grid; lanes that miss it are not in the result.
 INLINE mask enter(ray r, world w, grid_ray *g) {
     __constant const struct Grid *about = w.grid.about;
-    const vec scale = vec_splat(about->scale);
-    const vec offset = vec_sub(r.origin, vec_splat(about->corner));
-    const vec origin = vec_of(offset.x * scale.x, offset.y * scale.y, offset.z * scale.z);
-    const vec direction = vec_of(r.direction.x * scale.x, r.direction.y * scale.y, r.direction.z * scale.z);
+    const vec origin = grid_own(about, vec_sub(r.origin, vec_splat(about->corner)));
+    const vec direction = grid_own(about, r.direction);
     const vec inverse = vec_of(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
     const vec first = vec_of(-origin.x * inverse.x, -origin.y * inverse.y, -origin.z * inverse.z);
     const vec last = vec_of(((real)((scalar)about->sides[0]) - origin.x) * inverse.x,

@@ -3,9 +3,7 @@
 #if PLANES > 0
 // The plane at which a ray begins, or -1 where it begins outside the grid.
 INLINE real in_grid(ray r, real face, __constant const struct Grid *about) {
-    const vec offset = vec_sub(vec_along(r.origin, r.near, r.direction), vec_splat(about->corner));
-    const vec scale = vec_splat(about->scale);
-    const vec p = vec_of(offset.x * scale.x, offset.y * scale.y, offset.z * scale.z);
+    const vec p = grid_own(about, vec_sub(vec_along(r.origin, r.near, r.direction), vec_splat(about->corner)));
     const mask inside = less_equal(R(0.0), fmin(p.x, fmin(p.y, p.z))) & less_equal(p.x, (real)((scalar)about->sides[0])) &
                         less_equal(p.y, (real)((scalar)about->sides[1])) & less_equal(p.z, (real)((scalar)about->sides[2]));
     return pick(inside, face, R(-1.0));

@@ -210,8 +210,11 @@ INLINE void store_samples(neighbourhood *n, brick_place at, __constant const str
             const int middle = MIDDLE_SLOT(done) * LINES + y;
             const wide gx = smoothed(along_x + middle, LINES), gy = smoothed(along_y + middle, LINES);
             const wide gz = differed(plain + middle, LINES);
-            const wide_uint packed = packed_normal(gx * extent->stretch[0], gy * extent->stretch[1], gz * extent->stretch[2],
-                                                   alpha[middle]);
+            // In the scene, to which the inverse transposed of the grid's steps brings a gradient.
+            const wide nx = gx * extent->normal_x[0] + gy * extent->normal_y[0] + gz * extent->normal_z[0];
+            const wide ny = gx * extent->normal_x[1] + gy * extent->normal_y[1] + gz * extent->normal_z[1];
+            const wide nz = gx * extent->normal_x[2] + gy * extent->normal_y[2] + gz * extent->normal_z[2];
+            const wide_uint packed = packed_normal(nx, ny, nz, alpha[middle]);
             store_normal(at.normal + BRICK_SIDE * (BRICK_SIDE * done + at.first_line + y) + at.own, packed);
         }
     }

@@ -71,7 +71,7 @@ class ObjectGrids:
         place = placed(each, grid)
         found = {
             **NO_GRID,
-            "grid_sides": place.counts,
+            "grid_sides": place.place.shape,
             "grid": begin + self._files[each.file],
             "bricks": begin + self._files[each.file] + grid.values.size,
             "voxel": place.voxel,

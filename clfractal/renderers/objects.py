@@ -60,7 +60,7 @@ OBJECT = Struct(
         Field("asked", "int", 0, "1: along paths it is asked for as lights are"),
         Field("radiance", "real", 3, "of one that is asked for, linear Rec. 709"),
         Field("luminance", "real", 0, "of that"),
-        Field("sides", "real", 3, "of a solid: how long its own axes are, scene units"),
+        Field("sides", "real", 3, "of a solid: how far its sides are from its middle, scene units"),
         Field("wave_x", "real", WAVES, "changes of phase, radians by scene unit"),
         Field("wave_y", "real", WAVES, ""),
         Field("wave_height", "real", WAVES, "scene units"),
@@ -154,11 +154,15 @@ def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
         "sides": (1.0, 1.0, 1.0),
         **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
     }
-    if isinstance(each, (Solid, VolumeObject)):
-        ends = each.axes if isinstance(each, Solid) else placed(each, scene.grids[each.file]).axes
+    if isinstance(each, Solid):
         # The axes stand at right angles: each one's own number is the product with it by its square.
-        axes = [np.array(axis) / np.dot(axis, axis) for axis in ends]
-        row["sides"] = tuple(length(axis) for axis in ends)
+        axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
+        row["sides"] = tuple(length(axis) for axis in each.axes)
+    elif isinstance(each, VolumeObject):
+        # Those of a grid may be oblique. Its sides are as far from its middle as it is thick.
+        place = placed(each, scene.grids[each.file]).place
+        axes = list(2 * place.inverse / np.array(place.shape)[:, None])
+        row["sides"] = tuple(1 / float(np.linalg.norm(axis)) for axis in axes)
     elif isinstance(each, FormulaObject):
         axes = [np.array(axis) for axis in AXES]
     else:

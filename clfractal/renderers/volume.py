@@ -53,8 +53,15 @@ SHADOW_LIFT = 1.5
 GRID = Struct(
     "Grid",
     [
-        Field("corner", "real", 3, "the box's least corner, in the picture's scene units"),
-        Field("scale", "real", 3, "voxels per scene unit"),
+        Field("corner", "real", 3, "its first corner, in the picture's scene units"),
+        Field(
+            "own_x",
+            "real",
+            3,
+            "from scene units to voxels along its own axes, which may be turned and oblique",
+        ),
+        Field("own_y", "real", 3, ""),
+        Field("own_z", "real", 3, ""),
         Field("sides", "int", 3, "voxels along x, y and z"),
         Field("bricks", "int", 3, "bricks along x, y and z"),
         Field("pool_bricks", "int", 0, "stored bricks in each buffer"),
@@ -221,8 +228,7 @@ class VolumeKernel(TileKernel):
         return grid_from_dense(
             given.values,
             device,
-            corner=given.corner,
-            spacing=given.spacing,
+            place=given.place,
             threshold=least_visible(settings, given),
             normal_radius=settings.normal_radius,
             on_compile=on_compile,
@@ -263,15 +269,14 @@ def least_visible(settings: VolumeRenderer, given: GivenGrid) -> float | None:
 
 def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[Any]:
     """Where the grid lies in the picture: in the first box, whatever is zoomed to."""
-    shown, _ = used_boxes(scene, settings_of(scene))
-    middle = np.array(shown.center)
-    if scene.given is not None:
-        middle = np.array(grid.corner) + np.array(grid.spacing) * np.array(grid.shape) / 2
-    # A resolution that does not divide the box evenly goes past it a little.
-    size = np.array(grid.spacing) * np.array(grid.shape) * _zoom(scene)
+    place = grid.place
+    if scene.given is None:
+        shown, _ = used_boxes(scene, settings_of(scene))
+        # A resolution that does not divide the box evenly goes past it a little.
+        place = place.moved(shown.center, _zoom(scene))
     values = {
-        "corner": middle - size / 2,
-        "scale": np.array(grid.shape) / size,
+        "corner": place.corner,
+        **dict(zip(("own_x", "own_y", "own_z"), place.inverse, strict=True)),
         "sides": grid.shape,
         "bricks": grid.bricks,
         "pool_bricks": grid.parts.part_slots,
@@ -287,7 +292,7 @@ def volume_record(
     voxel = float(min(grid.spacing)) * _zoom(scene)
     # Paths count in sides of a voxel.
     step = voxel if has_paths(scene) else settings.step * voxel
-    longest = float(np.linalg.norm(np.array(grid.spacing) * np.array(grid.shape))) * _zoom(scene)
+    longest = grid.place.diagonal * _zoom(scene)
     per_sample = (grid.range[1] - grid.range[0]) / full_sample(grid)
     low, high = ((value - grid.range[0]) / per_sample for value in value_range(scene, grid))
     least, most = grid.range if scene.given is None else (scene.given.low, scene.given.high)

@@ -1,4 +1,4 @@
-"""Grids from files that volume scenes and objects show: they are read, turned along the axes, and kept with the scene."""
+"""Grids from files that volume scenes and objects show: they are read, given a place, and kept with the scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
-from clfractal.scene.base import Vector
+from clfractal.scene.grid_place import GridPlace, vector_of
 
 if TYPE_CHECKING:
     from clfractal.scene.volume import Box, VolumeRenderer
@@ -23,25 +23,26 @@ _WHERE = Where(path="renderer.file")
 
 @dataclass(frozen=True, eq=False)
 class GivenGrid:
-    """Values on a grid along the axes.
+    """Values on a grid, and where it is.
 
     Attributes:
-        values: shape (nz, ny, nx), x, y and z growing with the index.
-        corner: the least corner of the box, scene units.
-        spacing: sides of a voxel, scene units.
+        values: shape (nz, ny, nx). Each axis of the array is the one of the file that follows x, y or z most closely, and
+            goes the same way: of a grid along the axes x, y and z grow with the index.
+        place: of the grid.
         low, high: the least and largest finite value.
     """
 
     values: npt.NDArray[Any]
-    corner: Vector
-    spacing: Vector
+    place: GridPlace
     low: float
     high: float
 
     @cached_property
     def digest(self) -> str:
-        """A text that differs for different values."""
-        return hashlib.sha256(np.ascontiguousarray(self.values).data).hexdigest()
+        """A text that differs for different values, and for the same ones in another place."""
+        found = hashlib.sha256(np.ascontiguousarray(self.values).data)
+        found.update(repr(self.place).encode())
+        return found.hexdigest()
 
 
 def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
@@ -56,8 +57,6 @@ def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
 
 def read_grid(file: str, folder: Path, where: Where, box: Box | None = None) -> GivenGrid:
     """The grid of a file beside a scene that was loaded from `folder`, in a box or in its own place.
-
-    A grid whose axes are tilted is shown as if they were the axes of space.
 
     Raises:
         FileError: at `where`, for a file out of the folder, or whatever is wrong with it.
@@ -80,26 +79,20 @@ def _read(path: Path, where: Where, box: Box | None) -> GivenGrid:
     # Which axis of space each axis of the array follows most closely, and whether it runs against it.
     order = _order(directions)
     values = values.transpose([2 - order[2], 2 - order[1], 2 - order[0]])
-    rows = directions[list(order)]
-    spacing = np.linalg.norm(rows, axis=1)
-    flipped = [bool(rows[axis, axis] < 0) for axis in range(3)]
+    steps = directions[list(order)]
+    flipped = np.diag(steps) < 0
     values = values[tuple(slice(None, None, -1 if flipped[axis] else 1) for axis in (2, 1, 0))]
-    shape = np.array(values.shape[::-1])
-    ends = np.stack(
-        [
-            volume.origin,
-            volume.origin + (shape - 1) @ (spacing[:, None] * np.eye(3) * np.where(flipped, -1, 1)[:, None]),
-        ]
-    )
-    corner = ends.min(axis=0) - spacing / 2
+    nx, ny, nz = shape = values.shape[::-1]
+    # An axis that is flipped begins where it ended.
+    first = volume.origin + (np.where(flipped, np.array(shape) - 1, 0)[:, None] * steps).sum(axis=0)
+    steps = np.where(flipped[:, None], -steps, steps) + 0.0  # (no -0, which files would show)
+    x, y, z = (vector_of(step) for step in steps)
+    place = GridPlace(vector_of(first - steps.sum(axis=0) / 2), (x, y, z), (nx, ny, nz))
     if box is not None:
-        size = spacing * shape
         # As large as fits into the box, in its middle.
-        scale = float((np.array(box.sides) / size).min())
-        spacing = spacing * scale
-        corner = np.array(box.center) - spacing * shape / 2
+        place = place.moved(box.center, float((np.array(box.sides) / place.box).min()))
     low, high = _range(values)
-    return GivenGrid(values, _vector(corner), _vector(spacing), low, high)
+    return GivenGrid(values, place, low, high)
 
 
 def _order(directions: npt.NDArray[np.float64]) -> tuple[int, int, int]:
@@ -121,8 +114,3 @@ def _range(values: npt.NDArray[Any]) -> tuple[float, float]:
         if finite.size:
             low, high = min(low, float(finite.min())), max(high, float(finite.max()))
     return (low, high) if low < high else (0.0, 1.0) if low > high else (low - 0.5, low + 0.5)
-
-
-def _vector(array: npt.NDArray[np.float64]) -> Vector:
-    x, y, z = (float(value) for value in array)
-    return x, y, z

@@ -196,11 +196,7 @@ class Scene(Section):
         if isinstance(renderer, VolumeRenderer):
             given = self.given
             if given is not None:
-                sides = [
-                    side * count for side, count in zip(given.spacing, given.values.shape[::-1], strict=True)
-                ]
-                x, y, z = (corner + side / 2 for corner, side in zip(given.corner, sides, strict=True))
-                return Extent.box((x, y, z), (sides[0], sides[1], sides[2]))
+                return given.place.extent
             if renderer.box is not None:
                 return Extent.box(renderer.box.center, renderer.box.sides)
         return Extent(*self.bounds)

@@ -11,6 +11,7 @@ import numpy as np
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
 from clfractal.scene.given import GivenGrid, read_grid
+from clfractal.scene.grid_place import GridPlace, vector_of
 from clfractal.scene.objects import MAX_VALUES, AnyObject, VolumeObject, turned_axes
 
 
@@ -61,39 +62,24 @@ class PlacedGrid:
 
     Attributes:
         grid: its values.
-        middle: scene units.
-        axes: from its middle to the ends of its own three axes, scene units.
+        place: where they are.
     """
 
     grid: GivenGrid
-    middle: Vector
-    axes: tuple[Vector, Vector, Vector]
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Voxels along its own axes."""
-        nz, ny, nx = self.grid.values.shape
-        return nx, ny, nz
+    place: GridPlace
 
     @property
     def voxel(self) -> float:
         """The least side of a voxel, scene units: the length over which a cloud has its opacity."""
-        return min(
-            2 * float(np.linalg.norm(axis)) / count
-            for axis, count in zip(self.axes, self.counts, strict=True)
-        )
+        return min(self.place.spacing)
 
     def value(self, point: Vector) -> float | None:
-        """The value at a point, interpolated; None out of the box."""
-        own = [
-            sum((p - m) * a for p, m, a in zip(point, self.middle, axis, strict=True))
-            / sum(a * a for a in axis)
-            for axis in self.axes
-        ]
-        if max(abs(x) for x in own) > 1:
+        """The value at a point, interpolated; None out of the grid."""
+        counts = np.array(self.place.shape)
+        own = self.place.own(point)
+        if (own < 0).any() or (own > counts).any():
             return None
-        counts = np.array(self.counts)
-        place = np.clip((np.array(own) + 1) * counts / 2 - 0.5, 0, counts - 1)
+        place = np.clip(own - 0.5, 0, counts - 1)
         first = np.minimum(place.astype(int), np.maximum(counts - 2, 0))
         found, values = 0.0, self.grid.values
         for corner in np.ndindex(2, 2, 2):
@@ -104,16 +90,13 @@ class PlacedGrid:
 
 
 def placed(each: VolumeObject, grid: GivenGrid) -> PlacedGrid:
-    """Where an object has its grid: its middle at `position`, and turned and scaled about that."""
-    sides = np.array(grid.spacing) * grid.values.shape[::-1]
+    """Where an object has its grid: as its file has it, its middle at `position`, and scaled and turned about that."""
+    steps = np.array(grid.place.steps)
     if each.size is not None:
-        sides = sides * (each.size / sides.max())
-    half = sides / 2 * each.scale
-    x, y, z = (
-        (float(a * h), float(b * h), float(c * h))
-        for (a, b, c), h in zip(turned_axes(each.rotation), half, strict=True)
-    )
-    return PlacedGrid(grid, each.position, (x, y, z))
+        steps = steps * (each.size / np.linalg.norm(grid.place.edges, axis=1).max())
+    # The factors are along the axes of the file's own space, which then are turned.
+    x, y, z = (vector_of(step) for step in steps * each.scale @ np.array(turned_axes(each.rotation)))
+    return PlacedGrid(grid, GridPlace((0.0, 0.0, 0.0), (x, y, z), grid.place.shape).moved(each.position))
 
 
 def used_level(each: VolumeObject, grid: GivenGrid) -> float:

@@ -3,7 +3,7 @@
 Scene units and degrees. Plain arithmetic without NumPy, so that reading a scene is quick.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import atan2, degrees, hypot, inf, radians, tan
@@ -73,16 +73,23 @@ def shifted(
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """What is to be seen: a ball, or the box with these sides, along the axes, that the ball goes round; scene units."""
+    """What is to be seen: a ball, or the block, from its middle to these corners, that the ball goes round; scene units."""
 
     center: Vector
     radius: float
-    sides: Vector | None = None
+    corners: tuple[Vector, ...] | None = None
 
     @classmethod
     def box(cls, center: Vector, sides: Vector) -> "Extent":
-        """A box."""
-        return cls(center, length(sides) / 2, sides)
+        """A box along the axes."""
+        x, y, z = sides
+        return cls.block(center, ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)))
+
+    @classmethod
+    def block(cls, center: Vector, edges: Sequence[Vector]) -> "Extent":
+        """A block with these three edges, whichever way they go."""
+        corners = tuple(_sum(*zip(signs, edges, strict=True)) for signs in product((-0.5, 0.5), repeat=3))
+        return cls(center, max(length(corner) for corner in corners), corners)
 
 
 def framing(
@@ -90,7 +97,7 @@ def framing(
 ) -> tuple[Vector, float | None]:
     """Where a camera stands that shows a ball in 90 % of the picture's smaller side, its middle being the target.
 
-    Of a box the corners are seen: 90 % of the picture's height or width, whatever it fills first.
+    Of a block the corners are seen: 90 % of the picture's height or width, whatever it fills first.
 
     Args:
         along: the camera's `axes`.
@@ -107,11 +114,8 @@ def framing(
     needed, slope = radius / narrow, 0.0 if fov is None else tan(radians(fov) / 2)
     # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
     distance = _CLEAR * radius if fov is None else radius * hypot(1.0, 1.0 / (narrow * slope))
-    if shown.sides is not None:
-        corners = [
-            tuple(dot((x / 2, y / 2, z / 2), each) for each in along)
-            for x, y, z in product(*((-side, side) for side in shown.sides))
-        ]
+    if shown.corners is not None:
+        corners = [tuple(dot(corner, each) for each in along) for corner in shown.corners]
         halves = [max(abs(up), abs(right) / aspect) / FILLED for _, right, up in corners]
         needed = max(halves)
         if fov is not None:

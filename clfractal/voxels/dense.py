@@ -12,10 +12,10 @@ import pyopencl as cl
 
 from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
-from clfractal.scene.base import Vector
+from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels import programs
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
-from clfractal.voxels.lattice import BRICK, Lattice, pack_places
+from clfractal.voxels.lattice import BRICK, bricks_of, pack_places
 from clfractal.voxels.octree import empty_cubes
 from clfractal.voxels.pool import allocate, plan_pools
 from clfractal.voxels.store import extent_buffer
@@ -28,8 +28,7 @@ def grid_from_dense(
     array: npt.ArrayLike,
     device: Device,
     *,
-    corner: Vector,
-    spacing: Vector,
+    place: GridPlace,
     threshold: float | None = None,
     opaque: float | None = None,
     normal_radius: int = 1,
@@ -42,8 +41,7 @@ def grid_from_dense(
         array: real numbers of shape (nz, ny, nx), at least one along each axis; uint8 is kept as it is, any other type
             becomes float32.
         device: where the grid shall be.
-        corner: the least corner of the box: voxel (0, 0, 0) has its middle half a voxel from it, scene units.
-        spacing: sides of a voxel, scene units.
+        place: where the voxels are; of the array's shape.
         threshold: bricks whose values are all at or below it cannot be seen and are not stored; None stores all.
         opaque: least value that counts as inside (a normal's fourth byte); None: what is above `threshold`, or all.
         normal_radius: of the low-pass filter before normals, voxels, 0 to 4.
@@ -61,9 +59,10 @@ def grid_from_dense(
         raise ValueError(f"values must be real numbers, got {values.dtype}")
     kind: Kind = "byte" if values.dtype in (np.uint8, np.bool_) else "float"
     values = values.astype(np.uint8 if kind == "byte" else np.float32, copy=False)
-    nz, ny, nx = values.shape
-    lattice = Lattice(corner, spacing, (nx, ny, nz))
-    visible = np.ones(lattice.bricks[::-1], np.bool_)
+    nx, ny, nz = values.shape[::-1]
+    if (nx, ny, nz) != place.shape:
+        raise ValueError(f"a place of {place.shape} voxels is none of values of shape {values.shape}")
+    visible = np.ones(bricks_of(place.shape)[::-1], np.bool_)
     if threshold is not None:
         # NaN is not above any number, so it is invisible.
         visible = _brick_maximum(values) > threshold
@@ -80,7 +79,7 @@ def grid_from_dense(
     parts = plan_pools(device, stored, sizes, others, f"a grid of {nx} x {ny} x {nz} voxels")
     built = programs.build_all(device, [build], on_compile)[0]
     pools = [allocate(device, parts, size, "the grid") for size in sizes]
-    slabs = _Slabs(device, lattice, values, built, opaque if opaque is not None else least, normal_radius)
+    slabs = _Slabs(device, place, values, built, opaque if opaque is not None else least, normal_radius)
     milliseconds = 0.0
     z, y, x = np.nonzero(visible)
     for (first, after), value_part, normal_part in zip(parts.ranges(), *pools, strict=True):
@@ -103,7 +102,7 @@ def grid_from_dense(
         float(min(threshold, float(np.fmin.reduce(values, axis=None)))) if threshold is not None else 0.0
     )
     return Grid(
-        lattice,
+        place,
         kind,
         (0.0, 255.0) if kind == "byte" else (0.0, 1.0),
         device,
@@ -124,13 +123,13 @@ class _Slabs:
     def __init__(
         self,
         device: Device,
-        lattice: Lattice,
+        place: GridPlace,
         values: npt.NDArray[Any],
         built: programs.Built,
         opaque: float,
         normal_radius: int,
     ) -> None:
-        self.device, self.lattice, self.values = device, lattice, values
+        self.device, self.place, self.values = device, place, values
         self.built, self.opaque, self.reach = built, opaque, normal_radius + 1
         self.layers = max(SLAB_BYTES // (BRICK * values[0].nbytes) - 2, 1)
 
@@ -158,7 +157,7 @@ class _Slabs:
             slab = self.device.buffer(part.nbytes, "a slab of the grid", read_only=True)
             places = pack_places(x[place:after], y[place:after], z[place:after])
             bricks = self.device.buffer(places.nbytes, "places", read_only=True)
-            extent = extent_buffer(self.device, self.lattice, 1.0, np.inf, self.opaque, bottom)
+            extent = extent_buffer(self.device, self.place, 1.0, np.inf, self.opaque, bottom)
             with self.device.failures("storing the grid"):
                 cl.enqueue_copy(self.device.queue, slab, part.reshape(-1))
                 cl.enqueue_copy(self.device.queue, bricks, places)

@@ -11,7 +11,8 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.select import Device
-from clfractal.voxels.lattice import BRICK, BRICK_SIDE, BRICK_STRIDE, Lattice, Shape
+from clfractal.scene.grid_place import GridPlace
+from clfractal.voxels.lattice import BRICK, BRICK_SIDE, BRICK_STRIDE, Shape, bricks_of
 from clfractal.voxels.pool import Parts
 
 Kind = Literal["byte", "float"]
@@ -53,13 +54,13 @@ class GridStats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grid:
-    """Voxels of a box.
+    """Voxels of a box, or of a block that is turned or oblique.
 
     A brick is 8 x 8 x 8 cells between middles of voxels. A stored one has 9 x 9 x 9 samples, voxels 8b to 8b + 8 along
     each axis (past the grid's end the last repeats), x fastest, then y, then z, in a slot of BRICK_STRIDE samples.
 
     Attributes:
-        lattice: where the voxels are.
+        place: where the voxels are.
         kind: how samples are kept, `byte` or `float`.
         range: the least and the largest value that a voxel can have. Of `byte` the samples 0 and 255 stand for them;
             of `float` the samples are the values (of a given array of floats the range is 0 to 1, whatever it holds).
@@ -79,7 +80,7 @@ class Grid:
         stats: what filling took.
     """
 
-    lattice: Lattice
+    place: GridPlace
     kind: Kind
     range: tuple[float, float]
     device: Device
@@ -95,23 +96,23 @@ class Grid:
 
     @property
     def shape(self) -> Shape:
-        """Voxels along x, y and z."""
-        return self.lattice.shape
+        """Voxels along the grid's own axes."""
+        return self.place.shape
 
     @property
     def bricks(self) -> Shape:
-        """Bricks along x, y and z."""
-        return self.lattice.bricks
+        """Bricks along these."""
+        return bricks_of(self.place.shape)
 
     @property
     def corner(self) -> tuple[float, float, float]:
-        """The least corner of the box, scene units."""
-        return self.lattice.corner
+        """The outer corner of the first voxel, scene units."""
+        return self.place.corner
 
     @property
     def spacing(self) -> tuple[float, float, float]:
         """Sides of a voxel, scene units."""
-        return self.lattice.spacing
+        return self.place.spacing
 
     def dense(self) -> npt.NDArray[Any]:
         """All values as stored, uint8 or float32 of shape (nz, ny, nx); `background` where nothing is stored."""

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.scene.base import Vector
+from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.volume import MAX_RESOLUTION, Box
 
 # Cells along the side of a brick, samples along it, and the room that a brick's samples take.
@@ -42,7 +43,14 @@ EXTENT = Struct(
         Field("whole", "float", 0, "least value of a voxel that is inside as a whole"),
         Field("opaque", "float", 0, "least value of a voxel that counts as inside"),
         Field("scale", "float", 0, "factor from a voxel's value to what is stored"),
-        Field("stretch", "float", 3, "the least spacing over that along x, y and z"),
+        Field(
+            "normal_x",
+            "float",
+            3,
+            "what a difference of values along the grid's x adds to a gradient in the scene",
+        ),
+        Field("normal_y", "float", 3, ""),
+        Field("normal_z", "float", 3, ""),
     ],
 )
 
@@ -63,15 +71,18 @@ class Lattice:
 
     @property
     def bricks(self) -> Shape:
-        """Stored bricks along x, y and z: each spans 8 cells between middles of voxels."""
-        x, y, z = ((n + BRICK - 2) // BRICK for n in self.shape)
-        return max(x, 1), max(y, 1), max(z, 1)
+        """Stored bricks along x, y and z."""
+        return bricks_of(self.shape)
 
     @property
     def evaluated_bricks(self) -> Shape:
-        """Bricks of 8 voxels, each voxel in one: one more along an axis where the last layer is only shared."""
-        x, y, z = (-(-n // BRICK) for n in self.shape)
-        return x, y, z
+        """Bricks of 8 voxels along x, y and z."""
+        return evaluated_bricks_of(self.shape)
+
+    @property
+    def place(self) -> GridPlace:
+        """The same as any grid's place."""
+        return GridPlace.along_axes(self.corner, self.spacing, self.shape)
 
     def axes(self, precision: Precision, sub_points: int = 1) -> npt.NDArray[Any]:
         """Coordinates of voxels' points: all x, then y, then z, each sub-point's after the other's.
@@ -101,6 +112,18 @@ class Lattice:
             "step_scale": step_scale,
         }
         return LATTICE.value(precision, values)
+
+
+def bricks_of(shape: Shape) -> Shape:
+    """Stored bricks along the axes of a grid: each spans 8 cells between middles of voxels."""
+    x, y, z = ((n + BRICK - 2) // BRICK for n in shape)
+    return max(x, 1), max(y, 1), max(z, 1)
+
+
+def evaluated_bricks_of(shape: Shape) -> Shape:
+    """Bricks of 8 voxels, each voxel in one: one more along an axis where the last layer is only shared."""
+    x, y, z = (-(-n // BRICK) for n in shape)
+    return x, y, z
 
 
 def lattice_of(box: Box, resolution: int | Shape) -> Lattice:

@@ -13,8 +13,16 @@ import pyopencl as cl
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
+from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
-from clfractal.voxels.lattice import BRICK_STRIDE, EXTENT, Lattice, Places, pack_places
+from clfractal.voxels.lattice import (
+    BRICK_STRIDE,
+    EXTENT,
+    Lattice,
+    Places,
+    evaluated_bricks_of,
+    pack_places,
+)
 from clfractal.voxels.octree import empty_cubes, touched
 from clfractal.voxels.pool import allocate, plan_pools
 from clfractal.voxels.programs import Built
@@ -74,7 +82,7 @@ def store(
         DeviceError: status 2 if what is kept does not fit.
         Stopped: the token was set.
     """
-    extent = extent_buffer(device, lattice, evaluated.scale, evaluated.whole, evaluated.opaque)
+    extent = extent_buffer(device, lattice.place, evaluated.scale, evaluated.whole, evaluated.opaque)
     count = len(evaluated.places)
     milliseconds = refining = 0.0
     within = (evaluated.at < np.array(lattice.bricks)).all(axis=1)
@@ -192,7 +200,7 @@ def store(
         normals_ms=refining,
     )
     return Grid(
-        lattice,
+        lattice.place,
         kept,
         range,
         device,
@@ -212,20 +220,21 @@ def _tell_from(tell: Callable[[str, int, int], None], stage: str, before: int, t
 
 
 def extent_buffer(
-    device: Device, lattice: Lattice, scale: float, whole: float, opaque: float, first_layer: int = 0
+    device: Device, place: GridPlace, scale: float, whole: float, opaque: float, first_layer: int = 0
 ) -> cl.Buffer:
     """The struct of the kernels that store bricks, on the device."""
-    least = min(lattice.spacing)
+    # Of a length that is about 1 in voxels, whatever the scene's unit: only the gradient's direction matters.
+    across = min(place.spacing) * place.inverse
     record = EXTENT.value(
         "float32",
         {
-            "bricks": lattice.evaluated_bricks,
-            "last": [n - 1 for n in lattice.shape],
+            "bricks": evaluated_bricks_of(place.shape),
+            "last": [n - 1 for n in place.shape],
             "first_layer": first_layer,
             "whole": whole,
             "opaque": opaque,
             "scale": scale,
-            "stretch": [least / spacing for spacing in lattice.spacing],
+            **dict(zip(("normal_x", "normal_y", "normal_z"), across, strict=True)),
         },
     )
     buffer = device.buffer(record.nbytes, "the grid's extent", read_only=True)

@@ -134,11 +134,10 @@ def given(scene: Scene) -> Volume | None:
     found = scene.given
     if found is None:
         return None
-    spacing = np.array(found.spacing)
     return Volume(
         found.values,
-        np.array(found.corner) + spacing / 2,
-        np.diag(spacing),
+        found.place.first_voxel,
+        np.array(found.place.steps),
         inputs=scene.files,
         remarks=remarks_of_grid(scene, found.values),
     )
@@ -161,7 +160,6 @@ def refuse_resolution(resolution: object) -> None:
 def _volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
     """The grid's values as they are stored, with where they are and the scene that made them."""
     settings = volume_settings(job.scene)
-    corner, spacing = np.array(grid.corner), np.array(grid.spacing)
     texts = {
         # One line, and no colon before a space: VTK's reader would take the text before it for a field's name.
         SCENE_KEY: _one_line(job.resolved()),
@@ -170,7 +168,8 @@ def _volume(grid: Grid, job: Job, coloring: Coloring) -> Volume:
         # What the bytes 0 and 255 stand for; floats are the value's own numbers.
         "range": f"{grid.range[0]:g} {grid.range[1]:g}",
     }
-    return Volume(grid.dense(), corner + spacing / 2, np.diag(spacing), texts, job.scene.files)
+    place = grid.place
+    return Volume(grid.dense(), place.first_voxel, np.array(place.steps), texts, job.scene.files)
 
 
 def _one_line(plain: Any) -> str:

@@ -21,6 +21,7 @@ from clfractal.pictures.tiles import Region
 from clfractal.renderers.plan import PlannedView
 from clfractal.scene.checks import inside_solid, used_boxes
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -241,9 +242,9 @@ def _why_no_volume(seen: _Seen, renderer: VolumeRenderer) -> str:
         return _ONLY_NAN
     if given is None and (beyond := _beyond(scene, renderer)):
         return beyond
-    low, high = _shown_box(scene, renderer)
-    if not any(_sees_box(view.camera, low, high) for view in seen.views):
-        middle = _point((low + high) / 2)
+    shown = _shown_place(scene, renderer)
+    if not any(_sees(view.camera, shown) for view in seen.views):
+        middle = _point(shown.middle)
         return f"no ray meets the volume; its box is not in the picture: turn camera.target to {middle}"
     if not seen.whole:
         return ""
@@ -365,14 +366,13 @@ def _in_zoom(scene: Scene, renderer: VolumeRenderer, point: Floats) -> Floats:
     return found
 
 
-def _shown_box(scene: Scene, renderer: VolumeRenderer) -> tuple[Floats, Floats]:
-    """The corners of the box that is shown."""
+def _shown_place(scene: Scene, renderer: VolumeRenderer) -> GridPlace:
+    """The place of the box that is shown, in which a box is one voxel."""
     given = scene.given
     if given is not None:
-        corner = np.array(given.corner)
-        return corner, corner + np.array(given.spacing) * np.array(given.values.shape[::-1])
+        return given.place
     box = used_boxes(scene, renderer)[0]
-    return np.array(box.center) - np.array(box.sides) / 2, np.array(box.center) + np.array(box.sides) / 2
+    return GridPlace.along_axes((0.0, 0.0, 0.0), box.sides, (1, 1, 1)).moved(box.center)
 
 
 def _rays(view: View, towards: Floats) -> tuple[Floats, Floats]:
@@ -410,10 +410,11 @@ def _meets_ball(view: View, center: Floats, radius: float) -> npt.NDArray[np.boo
     return met
 
 
-def _sees_box(view: View, low: Floats, high: Floats) -> bool:
-    origins, directions = _rays(view, (low + high) / 2)
+def _sees(view: View, place: GridPlace) -> bool:
+    origins, directions = _rays(view, place.middle)
+    origins, directions = place.own(origins), directions @ place.inverse.T
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = np.stack([(low - origins) / directions, (high - origins) / directions])
+        ends = np.stack([-origins / directions, (np.array(place.shape) - origins) / directions])
     enter, leave = np.fmin(*ends).max(axis=1), np.fmax(*ends).min(axis=1)
     return bool(((enter < leave) & (leave > 0)).any())
 

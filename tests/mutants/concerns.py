@@ -34,7 +34,7 @@ kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog rend
 kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
 kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/objects.h: render/objects render/objects_light
-kernels/object_grids.h: render/object_grids
+kernels/object_grids.h: render/object_grids render/turned_grids
 kernels/clouds.h: render/clouds
 kernels/medium_light.h: render/clouds render/volume_paths
 kernels/volume_bounds.h: render/volume_paths
@@ -65,8 +65,8 @@ kernels/pixel.h: render/surface_samples render/passes render/surface_light
 kernels/points.cl: render/points formulas/counts
 kernels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
 kernels/gather.h: render/volume_rays render/volume_surface
-kernels/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/volume_bits
-kernels/voxels*: voxels/ render/volume_surface
+kernels/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/volume_bits render/turned_grids
+kernels/voxels*: voxels/ render/volume_surface render/turned_grids
 kernels/tiles.h: render/tiles_bits render/surface_samples
 kernels/*: numbers/ render/surface_analytic render/surface_light
 clfractal/commands/*: cli bad_input exchange stereo_shell
@@ -78,6 +78,8 @@ clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text for
 clfractal/optics/*: render/view render/stereo_views render/surface_analytic
 clfractal/pictures/*: render/film render/film_store render/compose render/anaglyph render/paste render/compose_files
 clfractal/renderers/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
+clfractal/scene/grid_place.py: render/turned_grids
+clfractal/scene/given.py: render/turned_grids scene/volume_scenes
 clfractal/scene/*: scene/ bad_input
 clfractal/voxels/*: voxels/ render/volume_rays render/volume_bits
 clfractal/work/var*: work/variations vary_shell

@@ -16,7 +16,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import BALL_ITERATIONS, Floats, rays, shoot, stacked
-from tests.render.volumes import keep, middles, to_box, value_at
+from tests.render.volumes import keep, middles, own_rays, to_box, value_at
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -28,6 +28,8 @@ SIGMA = -np.log(1 - OPACITY) / VOXEL  # per scene unit, of a value of 1
 CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
 TURNED: dict[str, Any] = {"rotation": [20, -35, 50], "scale": [1, 1.3, 0.8], "position": [0.2, 0, 0.1]}
 WHITE: dict[str, Any] = {"background": {"top": [1, 1, 1], "bottom": [1, 1, 1]}}
+# Steps of a grid that is turned, oblique and left-handed.
+OBLIQUE = VOXEL * np.array([[0.9, 0.4, 0.1], [0.5, -0.8, 0.2], [0.1, 0.3, 1.0]])
 BLACK: dict[str, Any] = {"background": {"top": [0, 0, 0], "bottom": [0, 0, 0]}}
 
 
@@ -38,6 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     spacing = [VOXEL] * 3
     keep(path / "cube.nrrd", np.ones((VOXELS,) * 3, np.float32), [-1] * 3, spacing)
     keep(path / "waves.nrrd", waves(), [-1] * 3, spacing)
+    keep(path / "oblique.nrrd", waves(), [0] * 3, OBLIQUE)
     distance = np.linalg.norm(middles((VOXELS,) * 3, [-1] * 3, spacing), axis=-1)
     keep(path / "ball.nrrd", np.clip(2 - 2 * distance, 0, 1).astype(np.float32), [-1] * 3, spacing)
     return path
@@ -89,11 +92,8 @@ def depth_of(scene: Scene, name: str, values: npt.NDArray[Any], origin: Floats, 
     """The optical depth of a cloud on rays, by the values at many places; in units of SIGMA."""
     each = volumes_of(scene.objects)[name]
     place = placed(each, scene.grids[each.file])
-    axes, sides = np.array(place.axes), np.array(place.counts)
-    own = axes / (axes**2).sum(1, keepdims=True)
-    first = ((origin - np.array(place.middle)) @ own.T + 1) * sides / 2
-    step = (direction @ own.T) * sides / 2
-    near, far = to_box(first, step, np.zeros(3), sides.astype(float))
+    first, step = own_rays(place.place, origin, direction)
+    near, far = to_box(first, step, np.zeros(3), np.array(place.place.shape, float))
     way = np.maximum(far - near, 0)
     depth: Floats = np.zeros(way.shape)
     count = 600
@@ -127,6 +127,16 @@ def test_what_comes_through(device: Device, folder: Path, precision: Precision, 
     assert_alike(film["R"], expected, 1024)
     # Alpha and colour are means of the same samples.
     np.testing.assert_allclose(film["A"], 1 - film["R"], atol=1e-5)
+
+
+def test_what_comes_through_an_oblique_cloud(device: Device, folder: Path) -> None:
+    """exp(-depth) again; opacity is that of a voxel's shortest side."""
+    scene = scene_of(folder, {"cloud": cloud("oblique.nrrd", **TURNED)}, samples=1024, **WHITE)
+    origin, direction, _ = rays(scene)
+    # (The second axis of the array goes down, so it is turned round.)
+    expected = np.exp(-depth_of(scene, "cloud", waves()[:, ::-1], origin, direction))
+    assert expected.min() < 0.5
+    assert_alike(light_of(scene, device)[..., 0], expected, 1024)
 
 
 @pytest.mark.combination

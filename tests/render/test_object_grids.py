@@ -26,7 +26,7 @@ from tests.render.shots import (
     shoot,
     to_sphere,
 )
-from tests.render.volumes import keep, middles, to_box, value_at
+from tests.render.volumes import keep, middles, own_rays, to_box, value_at
 
 TURNED: dict[str, Any] = {"rotation": [20, -35, 50], "position": [0.1, 0.2, -0.1], "scale": [1, 1.3, 0.8]}
 ROUGH = np.random.default_rng(3).uniform(0, 1, (9, 13, 20)).astype(np.float32)
@@ -68,21 +68,19 @@ def scene_of(
     )
 
 
-def own_rays(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
+def placed_rays(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
     """Rays in voxels from the corner of the grid, the way per scene unit; what brings to its own axes; and its sides."""
     (each,) = volumes_of(scene.objects).values()
-    place = placed(each, scene.grids[each.file])
+    place = placed(each, scene.grids[each.file]).place
     origin, direction, _ = rays(scene)
-    axes = np.array(place.axes)
-    own = axes / (axes**2).sum(1, keepdims=True)  # from scene units to those of the box
-    sides = np.array(place.counts)
-    first = ((origin - np.array(place.middle)) @ own.T + 1) * sides / 2
-    return first, (direction @ own.T) * sides / 2, own, sides
+    first, step = own_rays(place, origin, direction)
+    own = np.asarray(np.linalg.inv(np.array(place.steps)).T, np.float64)
+    return first, step, own, np.array(place.shape, float)
 
 
 def met(scene: Scene, values: npt.NDArray[Any], level: float) -> tuple[Floats, Floats]:
     """Distances (infinity: none) and normals of the surface, by looking at many places and halving."""
-    first, step, own, sides = own_rays(scene)
+    first, step, own, sides = placed_rays(scene)
     near, far = to_box(first, step, np.zeros(3), sides.astype(float))
     far = np.maximum(near, far)
 
@@ -110,7 +108,7 @@ def met(scene: Scene, values: npt.NDArray[Any], level: float) -> tuple[Floats, F
             end[..., axis] = np.clip(end[..., axis] + way, 0.5, sides[axis] - 0.5)
         apart = ends[1][..., axis] - ends[0][..., axis]
         rise[..., axis] = (value_at(values, ends[1]) - value_at(values, ends[0])) / np.maximum(apart, 1e-9)
-    normal = (-rise * sides / 2) @ own
+    normal = -rise @ own
     # A wall of the box cuts what is above the level.
     box = 2 * p / sides - 1
     wall = np.abs(box).max(-1) > 1 - 1e-9

@@ -14,12 +14,13 @@ import clfractal.renderers.volume
 from clfractal.device.select import Device
 from clfractal.errors import SceneError
 from clfractal.renderers.volume import brick_bounds
+from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.blocks import brick_ranges
 from clfractal.voxels.dense import grid_from_dense
 from tests.render.shots import Floats, rays, shoot, stacked
-from tests.render.volumes import keep, middles, to_box, value_at
+from tests.render.volumes import in_voxels, keep, middles, to_box, value_at
 from tests.scene.test_environment import write_map
 
 pytestmark = pytest.mark.light
@@ -29,6 +30,8 @@ VOXEL = SIDE / VOXELS
 CORNER, SIDES = np.full(3, -SIDE / 2), np.full(3, SIDE)
 CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
 COLOR = np.array([0.9, 0.6, 0.2])
+# Steps of a grid that is turned, oblique and left-handed.
+OBLIQUE = VOXEL * np.array([[0.9, 0.4, 0.1], [0.5, -0.8, 0.2], [0.1, 0.3, 1.0]])
 OPACITY = 0.12
 SIGMA = -np.log(1 - OPACITY) / VOXEL  # per scene unit
 SUN = np.array([-0.5, 0.6, -0.8]) / np.linalg.norm([-0.5, 0.6, -0.8])
@@ -41,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     spacing = [VOXEL] * 3
     keep(path / "cube.nrrd", np.ones((VOXELS,) * 3, np.float32), CORNER, spacing)
     keep(path / "waves.nrrd", waves(), CORNER, spacing)
+    keep(path / "oblique.nrrd", waves(), -OBLIQUE.sum(0) * VOXELS / 2, OBLIQUE)
     distance = np.linalg.norm(middles((VOXELS,) * 3, CORNER, spacing), axis=-1)
     keep(path / "ball.nrrd", (distance < 0.85).astype(np.float32), CORNER, spacing)
     return path
@@ -120,15 +124,19 @@ def test_what_comes_through(device: Device, folder: Path) -> None:
     np.testing.assert_allclose(film["A"], 1 - film["R"], atol=1e-5)
 
 
-def test_bounds_may_be_loose(device: Device, folder: Path) -> None:
-    """Where the density goes up and down within a brick, its integral decides, by NumPy."""
-    scene = medium(folder, file="waves.nrrd", samples=1024, **BLACK, **WHITE)
-    origin, direction, near, far = within(scene)
+@pytest.mark.parametrize(("file", "steps"), [("waves.nrrd", VOXEL * np.eye(3)), ("oblique.nrrd", OBLIQUE)])
+def test_bounds_may_be_loose(device: Device, folder: Path, file: str, steps: Floats) -> None:
+    """Where the density goes up and down within a brick, its integral decides, by NumPy; in an oblique grid, too."""
+    scene = medium(folder, file=file, samples=1024, **BLACK, **WHITE)
+    origin, direction, _ = rays(scene)
+    first, way = in_voxels(origin + steps.sum(0) * VOXELS / 2, steps), in_voxels(direction, steps)
+    near, far = to_box(first, way, np.zeros(3), np.full(3, float(VOXELS)))
+    long = np.maximum(far - near, 0)
+    shortest = np.linalg.norm(steps, axis=1).min()
     depth = np.zeros(near.shape)
     for part in (np.arange(1500) + 0.5) / 1500:
-        places = origin + (near + part * (far - near))[..., None] * direction
-        value = value_at(waves(), (places - CORNER) / VOXEL)
-        depth += -np.log(1 - OPACITY * value) / VOXEL * (far - near) / 1500
+        value = value_at(waves(), np.nan_to_num(first + (near + part * long)[..., None] * way))
+        depth += -np.log(1 - OPACITY * value) / shortest * long / 1500
     assert_alike(light_of(scene, device)[..., 0], np.exp(-depth), 0.5 / 32)
 
 
@@ -320,7 +328,11 @@ def test_bounds_hold(device: Device, folder: Path) -> None:
     scene = medium(folder, file="waves.nrrd")
     values = np.asarray(waves())
     grid = grid_from_dense(
-        values, device, corner=tuple(CORNER), spacing=(VOXEL,) * 3, threshold=0.0, normal_radius=1
+        values,
+        device,
+        place=GridPlace.along_axes((-SIDE / 2,) * 3, (VOXEL,) * 3, (VOXELS,) * 3),
+        threshold=0.0,
+        normal_radius=1,
     )
     ranges = brick_ranges(grid)
     bounds = brick_bounds(scene, grid, ranges)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.volume import Volume, write_volume
+from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import BALL, BALL_ITERATIONS, Floats, rays
@@ -44,9 +45,26 @@ def middles(shape: Sequence[int], corner: npt.ArrayLike, spacing: npt.ArrayLike)
 
 
 def keep(path: Path, values: npt.NDArray[Any], corner: npt.ArrayLike, spacing: npt.ArrayLike) -> None:
-    """Writes a grid along the axes."""
+    """Writes a grid; `spacing`: sides of a voxel along the axes, or the three steps of a turned grid."""
+    steps = steps_of(spacing)
+    write_volume(path, Volume(values, np.asarray(corner, float) + steps.sum(0) / 2, steps))
+
+
+def steps_of(spacing: npt.ArrayLike) -> Floats:
+    """Steps from voxel to voxel, shape (3, 3), of a grid along the axes or of any other."""
     sides = np.asarray(spacing, float)
-    write_volume(path, Volume(values, np.asarray(corner, float) + sides / 2, np.diag(sides)))
+    return np.diag(sides) if sides.ndim == 1 else sides
+
+
+def in_voxels(vectors: Floats, spacing: npt.ArrayLike) -> Floats:
+    """Vectors of the scene, shape (..., 3), in voxels along the grid's own axes."""
+    found = np.linalg.solve(steps_of(spacing).T, vectors.reshape(-1, 3).T)
+    return np.asarray(found.T.reshape(vectors.shape), np.float64)
+
+
+def own_rays(place: GridPlace, origin: Floats, direction: Floats) -> tuple[Floats, Floats]:
+    """Rays in voxels from the first corner of a grid, and their way per scene unit."""
+    return in_voxels(origin - place.corner, place.steps), in_voxels(direction, place.steps)
 
 
 def volume_scene(
@@ -114,16 +132,18 @@ def composited(
     Args:
         look: of values their opacity for a voxel's side, and their colour.
     """
-    low, sides = np.asarray(corner, float), np.asarray(spacing, float)
+    steps = steps_of(spacing)
     origin, direction, _ = rays(scene)
-    near, far = to_box(origin, direction, low, sides * values.shape[::-1])
-    length = step * sides.min()
+    first, way = in_voxels(origin - np.asarray(corner, float), steps), in_voxels(direction, steps)
+    shape = np.array(values.shape[::-1], float)
+    near, far = to_box(first, way, np.zeros(3), shape)
+    length = step * np.linalg.norm(steps, axis=1).min()
     through = np.ones(near.shape)
     color = np.zeros((*near.shape, 3))
-    for number in range(int(np.linalg.norm(sides * values.shape[::-1]) / length) + 2):
+    for number in range(int(np.linalg.norm(steps, axis=1) @ shape / length) + 2):
         t = near + number * length
         going = (t < far) & (through > 1 - limit)
-        places = (origin + t[..., None] * direction - low) / sides
+        places = first + t[..., None] * way
         opacity, tint = look(value_at(values, np.where(going[..., None], places, 0), nearest=nearest))
         share = np.where(going, 1 - (1 - opacity) ** step, 0)
         color += (through * share)[..., None] * tint

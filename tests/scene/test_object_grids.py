@@ -137,18 +137,19 @@ def loaded(folder: Path, more: str = "") -> Scene:
 def test_a_volume_is_placed_by_its_middle_and_its_longest_side(folder: Path) -> None:
     scene = loaded(folder)
     (each,) = volumes_of(scene.objects).values()
-    place = placed(each, scene.grids["v.nrrd"])
-    assert place.counts == (6, 5, 4)
+    found = placed(each, scene.grids["v.nrrd"])
+    place = found.place
+    assert place.shape == (6, 5, 4)
     # 0.6 x 1 x 1.2: the longest side becomes 3, then each its own factor.
     half = np.array([1.5, 2.5, 3.0]) * [1, 2, 0.5] / 2
-    np.testing.assert_allclose(np.array(place.axes), (rotation_of((20, -35, 50)) * half).T, atol=1e-12)
-    assert place.voxel == pytest.approx(min(2 * half / [6, 5, 4]))
+    np.testing.assert_allclose(place.edges / 2, (rotation_of((20, -35, 50)) * half).T, atol=1e-12)
+    assert found.voxel == pytest.approx(min(2 * half / [6, 5, 4]))
     random = np.random.default_rng(2)
     for own in random.uniform(-1, 1, (20, 3)):
-        x, y, z = np.array(place.middle) + own @ np.array(place.axes)
+        x, y, z = np.array([3, 1, -2]) + own @ place.edges / 2
         expected = value_at(VALUES, (own + 1) * [3, 2.5, 2])
-        assert place.value((x, y, z)) == pytest.approx(float(expected), abs=1e-5)
-    assert place.value((30.0, 0.0, 0.0)) is None
+        assert found.value((x, y, z)) == pytest.approx(float(expected), abs=1e-5)
+    assert found.value((30.0, 0.0, 0.0)) is None
 
 
 def test_a_scene_with_a_volume_is_written_and_read_again(folder: Path) -> None:

@@ -384,7 +384,7 @@ def test_grids_go_along_with_what_belongs_to_them(tmp_path: Path, other: Path, k
         assert again.given is not None
         assert source.loaded.given is not None
         assert again.given.digest == source.loaded.given.digest
-        assert again.given.spacing == source.loaded.given.spacing
+        assert again.given.place == source.loaded.given.place
         if number == 1:
             assert files(other) == sorted(["copy.yaml", *expected[kind]])
             # Now another grid has the name.

@@ -14,12 +14,12 @@ from clfractal.device.structs import Precision
 from clfractal.formulas import reference
 from clfractal.formulas.chain import Chain
 from clfractal.renderers.lanes import best_lanes
+from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
-from clfractal.voxels.lattice import Lattice
 
 Floats = npt.NDArray[np.float64]
 
@@ -45,6 +45,15 @@ def volume_scene(formula: str | Mapping[str, Any], iterations: int, **renderer: 
     )
 
 
+def place_of(
+    values: object, spacing: tuple[float, float, float], corner: tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> GridPlace:
+    """A place along the axes for an array; for what is none a place of one voxel."""
+    shape = np.asarray(values).shape
+    nz, ny, nx = shape if len(shape) == 3 else (1, 1, 1)
+    return GridPlace.along_axes(corner, spacing, (nx, ny, nz))
+
+
 def filled(
     scene: Scene, *, lanes: int | None = None, precision: Precision = "float32", **options: Any
 ) -> Grid:
@@ -60,12 +69,12 @@ def differing_voxels(first: Grid, second: Grid) -> int:
     return int(np.count_nonzero(first.dense() != second.dense()))
 
 
-def voxel_points(lattice: Lattice, offset: tuple[float, float, float] = (0.5, 0.5, 0.5)) -> Floats:
+def voxel_points(place: GridPlace, offset: tuple[float, float, float] = (0.5, 0.5, 0.5)) -> Floats:
     """Points of voxels, shape (nz, ny, nx, 3), written down from the definition."""
-    nx, ny, nz = lattice.shape
+    nx, ny, nz = place.shape
     z, y, x = np.meshgrid(np.arange(nz), np.arange(ny), np.arange(nx), indexing="ij")
     index = np.stack([x, y, z], axis=-1)
-    points: Floats = np.array(lattice.corner) + (index + np.array(offset)) * np.array(lattice.spacing)
+    points: Floats = np.array(place.corner) + (index + np.array(offset)) * np.array(place.spacing)
     return points
 
 

@@ -18,7 +18,7 @@ from clfractal.renderers.volume import (
 )
 from clfractal.voxels.blocks import BLOCK_BYTES, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
-from tests.voxels.grids import device, filled, volume_scene
+from tests.voxels.grids import device, filled, place_of, volume_scene
 
 RAMPS = {
     "from 0.2": [{"at": 0.2, "opacity": 0}, {"at": 0.8, "opacity": 1}],
@@ -39,7 +39,7 @@ def test_blocks_against_their_definition(
         values[3, 4, 5] = np.nan
     slots = 3 * 4 * 4
     monkeypatch.setattr(device(), "info", replace(device().info, max_alloc=736 * 4 * -(-slots // parts)))
-    grid = grid_from_dense(values, device(), corner=(0, 0, 0), spacing=(1, 1, 1))
+    grid = grid_from_dense(values, device(), place=place_of(values, (1, 1, 1)))
     assert len(grid.values) == parts
     found = np.empty(BLOCK_BYTES * grid.parts.slots, np.uint8)
     cl.enqueue_copy(device().queue, found, seen_blocks(grid, 60.0))

@@ -26,7 +26,7 @@ def check_inside(grid: Any, scene: Any, share: float = ROUNDED) -> None:
     assert dense.shape == (nz, ny, nx)
     assert dense.dtype == np.uint8
     assert set(np.unique(dense)) <= {0, 255}
-    expected = inside(scene.chain, voxel_points(grid.lattice), scene.formula.iterations)
+    expected = inside(scene.chain, voxel_points(grid.place), scene.formula.iterations)
     assert 0.005 < expected.mean() < 0.995
     assert (dense.astype(bool) != expected).mean() <= share
 
@@ -66,7 +66,7 @@ def test_float64() -> None:
     zoom = [{"center": [-0.75, 0.0, 0.05], "scale": 2e3}, {"center": [-0.75, 0.0, 0.05], "scale": 5e5}]
     deep = volume_scene("hast", 20, resolution=24, zoom=zoom)
     grid = filled(deep, precision=precision)
-    expected = inside(deep.chain, voxel_points(grid.lattice), 20)
+    expected = inside(deep.chain, voxel_points(grid.place), 20)
     np.testing.assert_array_equal(grid.dense() > 0, expected)
 
 
@@ -103,7 +103,7 @@ def test_coverage_is_the_share_of_points_inside() -> None:
     share = np.zeros((24, 24, 24))
     thirds = (1 / 6, 0.5, 5 / 6)
     for x, y, z in itertools.product(thirds, thirds, thirds):
-        share += inside(scene.chain, voxel_points(grid.lattice, (x, y, z)), 12)
+        share += inside(scene.chain, voxel_points(grid.place, (x, y, z)), 12)
     off = np.abs(grid.dense() - np.rint(share / 27 * 255))
     assert (off > 0).mean() < 1e-3
     assert off.max() <= 20  # two of 27 points
@@ -120,7 +120,7 @@ def test_iterations_are_smooth_counts() -> None:
     scene = volume_scene("hast", 16, store="float", **settings)
     grid = filled(scene, lanes=accepted_lanes(device(), "float32")[-1])
     assert (grid.table_entries >= 0).all()
-    at = voxel_points(grid.lattice)
+    at = voxel_points(grid.place)
     lanes = accepted_lanes(device(), "float32")[-1]
     expected = points.distances(scene.chain, at.reshape(-1, 3), 16, device=device(), lanes=lanes).smooth
     expected = np.minimum(expected, 16)

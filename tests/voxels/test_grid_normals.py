@@ -11,7 +11,7 @@ import pytest
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.grid import Grid
 from tests.render.shots import BALL, BALL_ITERATIONS
-from tests.voxels.grids import Floats, decoded, device, filled, volume_scene, voxel_points
+from tests.voxels.grids import Floats, decoded, device, filled, place_of, volume_scene, voxel_points
 
 BINOMIAL = {
     0: [1],
@@ -85,7 +85,7 @@ def test_normals_of_shares_and_of_values_of_others() -> None:
     check_colors(grid, gradient_colors(grid.dense(), 1))
     np.testing.assert_array_equal(grid.dense_normals()[..., 3] == 255, grid.dense() >= 127.5)
     values = np.random.default_rng(5).normal(size=(20, 9, 17)).astype(np.float32)
-    given = grid_from_dense(values, device(), corner=(0, 0, 0), spacing=(1, 1, 1), normal_radius=2)
+    given = grid_from_dense(values, device(), place=place_of(values, (1, 1, 1)), normal_radius=2)
     check_colors(given, gradient_colors(values.astype(float), 2))
 
 
@@ -116,7 +116,7 @@ def angles(kind: str, **settings: Any) -> Floats:
     assert surface.sum() > 10_000
     if kind != "gradient":
         assert there[surface].all()
-    at = voxel_points(grid.lattice)
+    at = voxel_points(grid.place)
     chosen = surface & there
     cosine = (vectors * at).sum(-1)[chosen] / np.linalg.norm(vectors[chosen], axis=-1)
     cosine /= np.linalg.norm(at[chosen], axis=-1)

@@ -35,7 +35,7 @@ def scene_of(objects: dict[str, Any], formula: dict[str, Any] | None = None, **s
 
 def check(scene: Scene, **options: Any) -> Any:
     grid = filled(scene, **options)
-    expected = belongs(scene, voxel_points(grid.lattice))
+    expected = belongs(scene, voxel_points(grid.place))
     assert 0.02 < expected.mean() < 0.9
     assert (grid.dense().astype(bool) != expected).mean() <= ROUNDED
     return grid
@@ -62,7 +62,7 @@ def test_values_are_shares_of_what_is_joined() -> None:
     for z in (0.25, 0.75):
         for y in (0.25, 0.75):
             for x in (0.25, 0.75):
-                share += belongs(scene, voxel_points(grid.lattice, (x, y, z)))
+                share += belongs(scene, voxel_points(grid.place, (x, y, z)))
     off = np.abs(grid.dense() - np.rint(share / 8 * 255))
     assert (off > 0).mean() < 1e-3
     assert ((share > 0) & (share < 8)).mean() > 0.02
@@ -119,7 +119,7 @@ def test_what_flows_together_is_where_its_smooth_minimum_is_below_0() -> None:
     formula = {"inline": SOLIDS, "iterations": 3}
     drop = {"type": "sphere", "position": [0.9, -0.7, 0.4], "radius": 0.35, "join": "smooth_union"}
     grid = filled(scene_of({"drop": {**drop, "smoothness": 0.4}}, formula, resolution=64))
-    at = voxel_points(grid.lattice)
+    at = voxel_points(grid.place)
     parts = np.maximum(solids(at), 0), a_sphere([0.9, -0.7, 0.4], 0.35)(at)
     expected = smooth(*parts, 0.4) <= 0
     assert (grid.dense().astype(bool) != expected).mean() <= 2e-4  # its distances are estimates
@@ -136,7 +136,7 @@ def test_counts_are_the_largest_of_what_is_beside_each_other() -> None:
         objects, {"name": "hast", "iterations": 16}, value="iterations", store="float", resolution=24
     )
     grid = filled(scene)
-    at = voxel_points(grid.lattice).reshape(-1, 3)
+    at = voxel_points(grid.place).reshape(-1, 3)
 
     def counts(chain: Any, at: Floats, limit: int) -> Floats:
         found = points.distances(chain, at, limit, device=device(), lanes=4)
@@ -163,7 +163,7 @@ def test_normals_are_those_of_the_distance(normals: str) -> None:
     settings = {"resolution": 48, "box": {"size": 2.2}, "normals": normals, "value": "inside"}
     scene = scene_of(objects, {"inline": BALL, "iterations": 20}, **settings)
     grid = filled(scene)
-    at = voxel_points(grid.lattice)
+    at = voxel_points(grid.place)
     shown, known = decoded(grid.dense_normals())
     shown /= np.maximum(np.linalg.norm(shown, axis=-1, keepdims=True), 1e-9)
     near = known & (np.abs(cut_ball(at)) < 0.04)

@@ -10,7 +10,7 @@ import pytest
 from clfractal.voxels import programs
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.grid import Grid
-from tests.voxels.grids import device, filled, volume_scene
+from tests.voxels.grids import device, filled, place_of, volume_scene
 
 
 def of_bits() -> Grid:
@@ -29,7 +29,7 @@ def of_counts() -> Grid:
 
 def of_an_array() -> Grid:
     values = np.random.default_rng(3).normal(size=(19, 25, 33)).astype(np.float32)
-    return grid_from_dense(values, device(), corner=(0, 0, 0), spacing=(1, 1, 2), normal_radius=2)
+    return grid_from_dense(values, device(), place=place_of(values, (1, 1, 2)), normal_radius=2)
 
 
 @pytest.mark.parametrize("made", [of_bits, of_shares, of_counts, of_an_array])

@@ -12,6 +12,7 @@ import pytest
 
 from clfractal.commands.progress import Reporter
 from clfractal.device.select import Device
+from clfractal.files.volume import Volume, write_volume
 from clfractal.pictures.film import Film
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -143,6 +144,19 @@ def test_volumes_that_show_nothing(engine: Engine, tmp_path: Path) -> None:
         "radius 1.5 around [0, 0, 0]",
     )
     one(of(engine, camera=AWAY, renderer=VOLUME), "no ray meets the volume; its box is not in the picture")
+    # A bar along the diagonal of the picture, which would be in it if it went along its axis.
+    bar = Volume(
+        np.ones((4, 4, 40), np.float32),
+        np.array([-5.0, -5.0, -0.2]),
+        np.array([[0.25, 0.25, 0], [-0.1, 0.1, 0], [0, 0, 0.1]]),
+    )
+    write_volume(tmp_path / "bar.nrrd", bar)
+    plain = scene_of(
+        BALL, {"position": [3, -4, 9], "target": [3, -4, 0], "up": [0, 1, 0], "fov": 30}, SIZE
+    ).resolved()
+    plain["renderer"] = {"type": "volume", "file": "bar.nrrd"}
+    beside: Scene = load_scene(plain, folder=tmp_path)
+    one(engine.render(beside).remarks, "its box is not in the picture: turn camera.target to [-0.2")
     clear = {**VOLUME, "transfer": {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0}]}}
     hidden = of(engine, renderer=clear, background="transparent")
     one(hidden, "nothing of the volume is visible, so alpha is 0 everywhere; renderer.transfer.opacity is 0")
