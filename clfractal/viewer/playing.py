@@ -8,6 +8,7 @@ from clfractal.scene.parts import AnyCamera
 from clfractal.viewer import timeline
 from clfractal.viewer.studio import Studio
 from clfractal.viewer.thinning import Sample, flight
+from clfractal.viewer.words import counted
 
 _CAMERA = ("position", "target", "up")
 
@@ -255,4 +256,4 @@ class Player:
                 for key in animation.tracks["camera.position"].keys or ()
                 if self._start <= animation.frame_of(key) <= self._start + samples[-1].frame + 1
             )
-            studio.tell(f"recorded {samples[-1].frame / animation.fps:.1f} s of flight as {count} keys")
+            studio.tell(f"recorded {samples[-1].frame / animation.fps:.1f} s of flight as {counted(count, 'key')}")

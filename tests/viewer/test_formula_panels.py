@@ -10,7 +10,7 @@ pytest.importorskip("imgui_bundle")
 
 from clfractal.errors import ClfractalError, FormulaError
 from clfractal.formulas import catalog
-from clfractal.viewer.panels import formula, formula_editor
+from clfractal.viewer.panels import formula, formula_editor, formula_library
 from clfractal.viewer.panels.formula_editor import Editing
 from clfractal.viewer.panels.ui import Ui
 from tests.viewer.panel_harness import Stage, headless, make_ui
@@ -23,7 +23,7 @@ def _context() -> Iterator[None]:
 
 
 def test_every_formula_can_be_chosen_and_edited_as_text() -> None:
-    for name in formula.titles():
+    for name in formula_library.titles():
         ui, _ = make_ui("scenes/mandelbulb.yaml")
         assert ui.studio.edit({"formula": {"name": name, "iterations": 12}}), name
         text = formula_editor.text_of(ui.studio.scene.formula)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from imgui_bundle import imgui
@@ -11,6 +11,9 @@ from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.ui import Ui
 
 T = TypeVar("T")
+
+_AROUND = 6.0
+"""Points around the words of segments."""
 
 
 def button(
@@ -120,32 +123,45 @@ def choose(name: str, words: Mapping[T, str], current: T, width: float) -> T | N
 
 
 def segments(name: str, words: Mapping[T, str], current: T, width: float) -> T | None:
-    """Choices side by side; the one that was clicked, if it is another."""
+    """Choices side by side, in as many rows as all their words need; the one that was clicked, if it is another."""
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
+    rows = rows_of([imgui.calc_text_size(text).x for text in words.values()], width)
+    in_row = -(-len(words) // rows)
+    each_width = width / in_row
     draw = imgui.get_window_draw_list()
-    far = imgui.ImVec2(corner.x + width, corner.y + height)
+    far = imgui.ImVec2(corner.x + width, corner.y + rows * height)
     draw.add_rect_filled(corner, far, theme.packed(theme.FRAME), 5.0)
-    each_width = width / len(words)
     found: T | None = None
+    imgui.begin_group()
     for number, (each, text) in enumerate(words.items()):
-        if number:
-            imgui.same_line(0, 0)
+        row, column = divmod(number, in_row)
+        left, top = corner.x + column * each_width, corner.y + row * height
+        imgui.set_cursor_screen_pos(imgui.ImVec2(left, top))
         if imgui.invisible_button(f"##{name}.{each}", imgui.ImVec2(each_width, height)) and each != current:
             found = each
-        left = corner.x + number * each_width
         if each == current:
             draw.add_rect_filled(
-                imgui.ImVec2(left + 2, corner.y + 2),
-                imgui.ImVec2(left + each_width - 2, far.y - 2),
+                imgui.ImVec2(left + 2, top + 2),
+                imgui.ImVec2(left + each_width - 2, top + height - 2),
                 theme.packed(theme.ACCENT_DIM),
                 4.0,
             )
         color = theme.TEXT if each == current or imgui.is_item_hovered() else theme.DIM
-        shown = clipped(text, each_width - 6)
+        shown = clipped(text, each_width - _AROUND)
         size = imgui.calc_text_size(shown)
-        place = imgui.ImVec2(left + (each_width - size.x) / 2, corner.y + (height - size.y) / 2)
+        place = imgui.ImVec2(left + (each_width - size.x) / 2, top + (height - size.y) / 2)
         draw.add_text(place, theme.packed(color), shown)
+    imgui.end_group()
     return found
+
+
+def rows_of(widths: Sequence[float], width: float) -> int:
+    """The fewest rows in which words, that are so many points wide, stand whole in fields of equal width."""
+    for rows in range(1, len(widths) + 1):
+        in_row = -(-len(widths) // rows)
+        if max(widths) + _AROUND <= width / in_row:
+            return rows
+    return len(widths)
 
 
 def text_box(ui: Ui, name: str, text: str, width: float, prompt: str = "") -> str | None:

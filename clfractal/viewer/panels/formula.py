@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 from imgui_bundle import imgui
@@ -12,7 +10,7 @@ from clfractal.formulas import catalog
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Link
 from clfractal.formulas.model import BoundFormula, Parameter
 from clfractal.formulas.turns import MAX_START
-from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import formula_library, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
@@ -51,13 +49,6 @@ def draw(ui: Ui) -> None:
     w.field(ui, "formula.distance_bailout", start=far, auto=f"{far:.4g}, its own")
 
 
-@cache
-def titles() -> Mapping[str, str]:
-    """The library's formulas: name -> title, by title."""
-    found = {name: str(catalog.description(name).get("title", name)) for name in catalog.names()}
-    return dict(sorted(found.items(), key=lambda each: each[1].lower()))
-
-
 def chain_path(ui: Ui) -> str | None:
     """Where the scene holds the members of its chain; None for a formula that is none, or a chain of the library."""
     formula = ui.studio.scene.formula
@@ -73,7 +64,7 @@ def _choice(ui: Ui) -> None:
     formula = ui.studio.scene.formula
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
     wide, height = imgui.get_content_region_avail().x, imgui.get_frame_height()
-    text = titles().get(formula.name or "", ui.studio.scene.chain.title or "Own formula")
+    text = formula_library.titles().get(formula.name or "", ui.studio.scene.chain.title or "Own formula")
     about = ui.studio.scene.chain.first.formula.description if len(ui.studio.scene.chain.links) == 1 else ""
     with theme.measures(button_text_align=(0.0, 0.5)):
         if w.button(
@@ -88,45 +79,10 @@ def _choice(ui: Ui) -> None:
     w.in_row(4)
     if w.icon_button(theme.LINK, "Make a chain of it: formulas in turn", enabled=chain_path(ui) is None):
         _open_chain(ui)
-    name = library(ui, "##library", formula.name or "", single=False)
+    name = formula_library.chosen(ui, "##library", formula.name or "", single=False)
     if name is not None:
         # Parameters and constants are those of the formula before; how far it is iterated is not.
-        ui.studio.edit({"formula": {"name": name, "iterations": formula.iterations}})
-
-
-def library(ui: Ui, popup: str, current: str, *, single: bool) -> str | None:
-    """The library, to search in and to choose from; the name that was clicked.
-
-    Args:
-        single: without chains, and only with as many variables as the scene's formula has.
-    """
-    imgui.set_next_window_size(imgui.ImVec2(280, 330))
-    if not imgui.begin_popup(popup):
-        return None
-    found = None
-    if imgui.is_window_appearing():
-        ui.memory["formula.search"] = ""
-        imgui.set_keyboard_focus_here()
-    text = w.search(ui, "formula.search", "Find a formula").strip().lower()
-    imgui.begin_child("##formulas", imgui.ImVec2(0, 0))
-    for name, title in titles().items():
-        if text not in f"{name} {title}".lower() or (single and not _fits(ui, name)):
-            continue
-        if imgui.selectable(f"{title}##{name}", name == current)[0]:
-            found = name
-        w.tip(str(catalog.description(name).get("description", "")).strip())
-    imgui.end_child()
-    if found is not None:
-        imgui.close_current_popup()
-    imgui.end_popup()
-    return found
-
-
-def _fits(ui: Ui, name: str) -> bool:
-    """Whether a formula of the library can be a member of the scene's chain."""
-    if catalog.is_chain(name):
-        return False
-    return len(catalog.load(name).variables) == ui.studio.scene.chain.size
+        formula_library.take(ui.studio, {"name": name, "iterations": formula.iterations})
 
 
 # Parameters
@@ -251,7 +207,7 @@ def _members(ui: Ui, root: str) -> None:
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
     if w.button("Add a formula", icon=theme.PLUS, width=-1, enabled=len(members) < MAX_LINKS):
         imgui.open_popup("##member")
-    name = library(ui, "##member", "", single=True)
+    name = formula_library.chosen(ui, "##member", "", single=True)
     if name is not None:
         ui.studio.edit({root: [*members, {"name": name, "count": 1}]})
 

@@ -13,6 +13,7 @@ from clfractal.viewer.panels import cards, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.shelf import Entry, Shelf
+from clfractal.viewer.words import counted
 from clfractal.work.thumbnails import SAMPLES, SIZE
 
 KINDS = {"all": "All", "surface": "Surfaces", "volume": "Volumes", "cut": "Cut planes", "stereo": "Stereo"}
@@ -120,7 +121,7 @@ def _top(ui: Ui, state: Gallery) -> None:
         imgui.text("Gallery")
     imgui.same_line(0, 10)
     count = sum(1 for entry in state.shelf.entries if matches(entry, state.kind, _text(ui)))
-    words = f"{count} scene" if count == 1 else f"{count} scenes"
+    words = counted(count, "scene")
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.vec(theme.FAINT), words)
     close = imgui.get_frame_height()

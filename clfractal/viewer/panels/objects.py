@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined, VolumeObject
-from clfractal.viewer.panels import formula, maps, theme, transfer
+from clfractal.viewer.panels import formula, formula_library, maps, theme, transfer
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
@@ -183,10 +183,10 @@ def _formula(ui: Ui, name: str, each: FormulaObject) -> None:
     path, chain = f"objects.{name}.formula", ui.studio.scene.joined_chains[name]
     if not w.filtering(ui):
         imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
-        text = formula.titles().get(each.formula.name or "", chain.title or "Own formula")
+        text = formula_library.titles().get(each.formula.name or "", chain.title or "Own formula")
         if w.button(f"{text}##{path}", width=-1, about="Choose another formula"):
             imgui.open_popup(f"##library {path}")
-        found = formula.library(ui, f"##library {path}", each.formula.name or "", single=False)
+        found = formula_library.chosen(ui, f"##library {path}", each.formula.name or "", single=False)
         if found is not None:
             ui.studio.edit({path: {"name": found, "iterations": each.formula.iterations}})
             return
