@@ -80,6 +80,18 @@ def check_places(scene: Scene, number: int) -> None:
         raise SceneError(found, Where(path=f"lights.{number}.threshold"))
 
 
+def usual_threshold(scene: Scene, share: float = 0.5) -> float | None:
+    """How near to a trap at the origin the orbits of so much of a scene's surface come; None if none of it was found."""
+    searched = _searched(scene, SetLight.model_validate({"type": "set"}))
+    formula, iterations, (center, radius), trap = searched[:4]
+    chain = catalog.resolve(json.loads(formula), None, Where(path="formula"))
+    iterations = min(iterations, _MOST_APPLICATIONS)
+    start = _in_ball(np.random.default_rng(0), _FEW, center, radius)
+    surface, _ = descended(chain, start, iterations, TOLERANCE * radius)
+    near = trap_distances(chain, surface, iterations, Trap.model_validate_json(trap))
+    return float(np.quantile(near, share)) if len(near) else None
+
+
 Searched = tuple[str, int, tuple[tuple[float, float, float], float], str, float, int, str, int]
 
 

@@ -373,7 +373,7 @@ class Viewer:
         self.pick = None if imgui.get_io().want_capture_mouse else self.pick_at(*self.inputs.pointer)
         imgui.new_frame()
         ui = self.ui
-        ui.size, ui.scale, ui.pick = size, scale, self.pick
+        ui.size, ui.scale, ui.pick, ui.shown = size, scale, self.pick, self.surface.shown
         ui.speed = replace(self.meter.speed, way="shared" if self.surface.shared else "copied")
         self._draw_marks(scale)
         self._draw_panels(ui)

@@ -256,4 +256,6 @@ class Player:
                 for key in animation.tracks["camera.position"].keys or ()
                 if self._start <= animation.frame_of(key) <= self._start + samples[-1].frame + 1
             )
-            studio.tell(f"recorded {samples[-1].frame / animation.fps:.1f} s of flight as {counted(count, 'key')}")
+            studio.tell(
+                f"recorded {samples[-1].frame / animation.fps:.1f} s of flight as {counted(count, 'key')}"
+            )

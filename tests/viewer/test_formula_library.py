@@ -109,7 +109,8 @@ def _height(scene: object) -> float:
 
 
 def test_a_camera_that_a_film_moves_stays() -> None:
-    text = "{fps: 10, duration: 1, tracks: {camera.position: {keys: [{time: 0, value: [0, -3, 0]}, {time: 1, value: [0, -5, 0]}]}}}"
+    keys = "[{time: 0, value: [0, -3, 0]}, {time: 1, value: [0, -5, 0]}]"
+    text = f"{{fps: 10, duration: 1, tracks: {{camera.position: {{keys: {keys}}}}}}}"
     ui, _ = make_ui(load_scene("scenes/mandelbulb.yaml", overrides=[f"animation={text}"], posed=False))
     before = ui.studio.scene.camera
     assert formula_library.take(ui.studio, {"name": "mandelbox", "iterations": 8})

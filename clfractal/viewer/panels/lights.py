@@ -7,7 +7,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight, SetLight, SmallLight
-from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import first, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
@@ -17,6 +17,25 @@ from clfractal.viewer.panels.ui import Ui
 _OWN = ("falloff", "direction", "angle", "softness", "up", "radius", "width", "height", "visible")
 # Of lights on the set.
 _PLACES = ("threshold", "count", "spacing", "radius", "height", "visible", "seed")
+
+
+KINDS = {
+    "directional": "Sun",
+    "point": "Point",
+    "spot": "Spot",
+    "sphere": "Ball",
+    "rectangle": "Area",
+    "set": "Set",
+}
+"""Kinds of lights, as they are called."""
+_ABOUT = {
+    "directional": "from infinitely far away",
+    "point": "from a point",
+    "spot": "in a cone",
+    "sphere": "of a ball",
+    "rectangle": "of a rectangle",
+    "set": "of many balls on the set",
+}
 
 
 def summary(ui: Ui) -> str:
@@ -59,7 +78,7 @@ def _line(index: int, light: Any, chosen: bool) -> bool:
     draw.add_circle_filled(middle, 6.0, theme.packed((*codes, 1.0)))
     draw.add_circle(middle, 6.0, theme.packed((1, 1, 1, 0.25)))
     y = corner.y + (height - imgui.get_font_size()) / 2
-    name = light.type.capitalize()
+    name = KINDS[light.type]
     draw.add_text(imgui.ImVec2(corner.x + 31, y), theme.packed(theme.TEXT), f"{name} {index + 1}")
     text = f"{light.intensity:.3g}"
     place = imgui.ImVec2(corner.x + wide - imgui.calc_text_size(text).x - 8, y)
@@ -71,11 +90,11 @@ def _buttons(ui: Ui, chosen: int) -> None:
     lights = [plain(light) for light in ui.studio.scene.lights]
     room = len(lights) < MAX_LIGHTS
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
-    if w.button("Directional", icon=theme.PLUS, enabled=room, about="Add light from infinitely far away"):
-        _set(ui, [*lights, {"type": "directional"}], len(lights))
-    w.in_row(4)
-    if w.button("Point", icon=theme.PLUS, enabled=room, about="Add light from a point"):
-        _set(ui, [*lights, {"type": "point", "position": _free_place(ui)}], len(lights))
+    if w.button("Add a light", icon=theme.PLUS, enabled=room, about="Add a light where it is seen"):
+        imgui.open_popup("##lights")
+    kind = _kinds_popup()
+    if kind is not None:
+        _add(ui, kind, lights)
     w.in_row(4)
     if w.icon_button(theme.COPY, "Duplicate", enabled=bool(lights) and room):
         _set(ui, [*lights, lights[chosen]], len(lights))
@@ -88,53 +107,41 @@ def _buttons(ui: Ui, chosen: int) -> None:
         ui.act("lights")
 
 
-def _set(ui: Ui, lights: list[Any], chosen: int) -> None:
-    if ui.studio.edit({"lights": lights}):
+def _kinds_popup() -> str | None:
+    """The kind of light that is chosen of the list, once it is."""
+    found = None
+    if imgui.begin_popup("##lights"):
+        for kind, title in KINDS.items():
+            if imgui.selectable(f"{title}##{kind}", False)[0]:
+                found = kind
+            w.tip(f"Light {_ABOUT[kind]}")
+        imgui.end_popup()
+    return found
+
+
+def _add(ui: Ui, kind: str, lights: list[Any]) -> None:
+    """Adds a light of a kind, and shows where it is."""
+    if _set(ui, [*lights, first.light(ui, kind)], len(lights)) and kind != "set":
+        ui.show.add("lights")
+
+
+def _set(ui: Ui, lights: list[Any], chosen: int) -> bool:
+    done = ui.studio.edit({"lights": lights})
+    if done:
         ui.memory["light"] = chosen
-
-
-def _free_place(ui: Ui) -> list[float]:
-    """Outside the bounds, on the camera's side and above."""
-    scene = ui.studio.scene
-    center, radius = scene.bounds
-    away = [p - c for p, c in zip(scene.camera.position, center, strict=True)]
-    size = max(sum(x * x for x in away) ** 0.5, 1e-9)
-    return [
-        float(f"{c + 2 * radius * x / size + (radius if axis == 2 else 0):.4g}")
-        for axis, (c, x) in enumerate(zip(center, away, strict=True))
-    ]
+    return done
 
 
 def _light(ui: Ui, index: int) -> None:
     path, light = f"lights.{index}", ui.studio.scene.lights[index]
-    width = w.row(
-        ui,
-        "Type",
-        path=f"{path}.type",
-        tip="from infinitely far away, a point, a cone, a ball, a rectangle, or many balls on the set",
-    )
+    about = ", ".join(f"{title}: {_ABOUT[kind]}" for kind, title in KINDS.items())
+    width = w.row(ui, "Type", path=f"{path}.type", tip=about)
     if width is not None:
-        words = {
-            "directional": "Sun",
-            "point": "Point",
-            "spot": "Spot",
-            "sphere": "Ball",
-            "rectangle": "Area",
-            "set": "Set",
-        }
-        found = w.segments(f"{path}.type", words, light.type, width)
+        found = w.segments(f"{path}.type", KINDS, light.type, width)
         if found is not None:
-            common = {
-                name: plain(getattr(light, name)) for name in ("color", "temperature", "intensity", "shadow")
-            }
-            old = getattr(light, "position", None)
-            more = (
-                {}
-                if found in ("directional", "set")
-                else {"position": plain(old) if old else _free_place(ui)}
-            )
-            ui.studio.edit({path: {"type": found, **common, **more}})
+            ui.studio.edit({path: first.light(ui, found, light)})
             return
+        w.problem(ui, path)
     w.fields(ui, path, ("color", "temperature", "intensity"))
     if isinstance(light, DirectionalLight):
         w.field(ui, f"{path}.direction", step=0.01)

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined, VolumeObject
-from clfractal.viewer.panels import formula, formula_library, maps, theme, transfer
+from clfractal.viewer.panels import first, formula, formula_library, maps, theme, transfer
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
@@ -85,25 +85,7 @@ def _line(name: str, each: AnyObject, chosen: bool) -> bool:
 def _buttons(ui: Ui, chosen: str | None) -> None:
     objects = ui.studio.scene.objects
     room = len(objects) < MAX_OBJECTS
-    center, radius = ui.studio.scene.bounds
-    place = [float(f"{x:.4g}") for x in (center[0], center[1], center[2] - radius)]
-    size = float(f"{radius / 3:.2g}")
-    first: dict[str, dict[str, Any]] = {
-        "plane": {"position": place},
-        "water": {"position": place, "waves": {"height": size / 6, "length": 2 * size}},
-        "sphere": {"position": place, "radius": size},
-        "box": {"position": place, "size": [2 * size] * 3},
-        "cylinder": {"position": place, "radius": size, "height": 4 * size},
-        "formula": {
-            "position": [float(f"{x:.4g}") for x in (center[0] + 2 * radius, *center[1:])],
-            "formula": {"name": "mandelbulb", "iterations": 8},
-        },
-        "volume": {
-            "position": [float(f"{x:.4g}") for x in (center[0] + 2 * radius, *center[1:])],
-            "size": float(f"{2 * radius:.2g}"),
-        },
-    }
-    for number, (kind, values) in enumerate(first.items()):
+    for number, kind in enumerate(_KINDS):
         if number % _IN_A_ROW:
             w.in_row(4)
         else:
@@ -115,10 +97,10 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
                 ui.memory["grid files"] = grid_files(ui.studio.scene.folder)
                 imgui.open_popup("##grids")
             else:
-                _add(ui, kind, {"type": kind, **values})
+                _add(ui, kind, {"type": kind, **first.objects(ui)[kind]})
     file = _file_popup(ui)
     if file is not None:
-        _add(ui, "volume", {"type": "volume", "file": file, **first["volume"]})
+        _add(ui, "volume", {"type": "volume", "file": file, **first.objects(ui)["volume"]})
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove", enabled=chosen is not None):
         left = {name: plain(each) for name, each in objects.items() if name != chosen}

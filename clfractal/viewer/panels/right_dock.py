@@ -24,6 +24,11 @@ def width_of(ui: Ui) -> float:
     return min(max(0.21 * ui.size[0], theme.DOCK_RIGHT), _WIDEST, ui.size[0] - 2 * theme.MARGIN)
 
 
+def is_open(ui: Ui) -> bool:
+    """Whether any of its parts is open."""
+    return not ui.show.isdisjoint(_PARTS)
+
+
 def fit(ui: Ui) -> None:
     """Closes the parts that have been open longest, until the others have room; before they are drawn."""
     order: list[str] = ui.memory.setdefault("right_dock", [])

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.viewer.display import Shown
 from clfractal.viewer.keys import KeyMap
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.settings import Settings
@@ -50,6 +51,7 @@ class Ui:
         size: of the area that panels may use, in points: the window, or one eye's half of it.
         scale: framebuffer pixels for a point, times the user's scale of panels.
         pick: what lies under the pointer; None over panels or outside the picture.
+        shown: the newest picture that the window shows, if there is one.
         speed: see `Speed`.
         show: names of the parts that are open: `panels`, `help`, `gallery`, `variations`, `overlay`, `save`, ...
         memory: of panels, by their own keys.
@@ -63,6 +65,7 @@ class Ui:
     size: tuple[float, float] = (1280.0, 720.0)
     scale: float = 1.0
     pick: Pick | None = None
+    shown: Shown | None = None
     speed: Speed = field(default_factory=Speed)
     show: set[str] = field(default_factory=lambda: {"panels", "overlay"})
     memory: dict[str, Any] = field(default_factory=dict)
