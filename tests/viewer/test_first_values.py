@@ -145,7 +145,8 @@ def _light(engine: Engine, scene: Scene, light: dict[str, Any]) -> npt.NDArray[n
     # Of lights on the set, each sample asks few.
     samples = 64 if light.get("type") == "set" else 1
     film = engine.render(edited(scene, {"lights": [light]}), samples=samples, channels=("R", "G", "B", "A"))
-    return np.asarray(film, float)[..., :3].mean(axis=-1) * (np.asarray(film["A"]) > 0.5)
+    colors, covered = np.asarray(film, np.float64)[..., :3], np.asarray(film["A"]) > 0.5
+    return np.asarray(colors.mean(axis=-1) * covered, np.float64)
 
 
 @pytest.mark.parametrize("kind", ["directional", "point", "spot", "sphere", "rectangle", "set"])

@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 
 from clfractal.optics.view import scene_view
 from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
 from clfractal.viewer.panels import formula, formula_library
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.pointer import project
@@ -96,16 +97,16 @@ def test_a_new_formula_is_framed_and_undo_brings_the_camera_back(name: str) -> N
     assert ui.studio.scene == after
 
 
-def _height(scene: object) -> float:
+def _height(scene: Scene) -> float:
     """The part of the picture's height that the bounds' outline fills, about its middle."""
-    view, (center, radius) = scene_view(scene), scene.bounds  # type: ignore[arg-type, attr-defined]
-    size = (scene.image.width, scene.image.height)  # type: ignore[attr-defined]
+    view, (center, radius) = scene_view(scene), scene.bounds
+    size = (scene.image.width, scene.image.height)
     middle = np.array(project(view, center, size))
     assert np.allclose(middle[:2], (size[0] / 2, size[1] / 2), atol=1e-6 * size[0])
+    assert view.eye is not None
     # Rays that touch the ball: tan(angle) = radius / sqrt(distance^2 - radius^2).
-    distance = float(middle[2])
-    slope = radius / np.sqrt(distance**2 - radius**2)
-    return float(2 * slope * size[1] / view.height * (np.linalg.norm(view.center - view.eye)) / size[1])
+    slope = radius / np.sqrt(float(middle[2]) ** 2 - radius**2)
+    return float(2 * slope * np.linalg.norm(view.center - view.eye) / view.height)
 
 
 def test_a_camera_that_a_film_moves_stays() -> None:
