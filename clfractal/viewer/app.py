@@ -20,6 +20,7 @@ from clfractal.viewer.aim import Aim, aimed
 from clfractal.viewer.begin import Begun
 from clfractal.viewer.controls import Controls
 from clfractal.viewer.deeds import Deeds
+from clfractal.viewer.depth_range import DepthRange
 from clfractal.viewer.inputs import Inputs
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.outputs import Outputs
@@ -31,6 +32,7 @@ from clfractal.viewer.picking import Pick
 from clfractal.viewer.places import Places, places_of
 from clfractal.viewer.playing import Player
 from clfractal.viewer.recording import Event
+from clfractal.viewer.room import Room
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.speed import Meter
 from clfractal.viewer.studio import Studio
@@ -88,6 +90,7 @@ class Viewer:
         self.studio.screens = self.outputs.shown_stereo
         self.studio.resize(*self.outputs.picture_size(scene.stereo))
         self.own_screen = OwnScreen(self.studio)
+        self.depth_range, self.room = DepthRange(), Room()
         self.pads = window.Pads()
         self.meter = Meter()
         self.small = gl.SmallTextures()
@@ -169,6 +172,7 @@ class Viewer:
         if arrived:
             self._redraw = max(self._redraw, 1)
             self.meter.shown(self.surface.shown, now)
+            self._mind_comfort()
         if self._redraw > 0 and (arrived or self._until_drawn(now) <= 0) and not self.window.minimised:
             self._redraw -= 1
             self.draw(now)
@@ -260,6 +264,8 @@ class Viewer:
             self._rest(False)
         else:
             self._rest(True)
+        for line in self.outputs.watch(now):
+            self.studio.tell(line.text, wrong=line.wrong)
         self._mind_device()
         self.studio.tick()
         session = self.studio.session
@@ -287,6 +293,14 @@ class Viewer:
         part = image_of(stereo, self.outputs.picture_size(stereo))[0] / max(self.window.framebuffer[0], 1)
         wide = window.physical_width(self.window.monitor(), round(part * self.window.size[0]))
         return {} if wide is None else {"screen_width": round(wide, 4)}
+
+    def _mind_comfort(self) -> None:
+        """Warns of a pair that strains the eyes, as of one that is written to a file."""
+        if self.controls.dragging or self.motion.active or self.player.playing:
+            return
+        warning = self.depth_range.look(self.surface.shown)
+        if warning:
+            self.studio.tell(warning, wrong=True)
 
     def _mind_device(self) -> None:
         """A device that fails gives way to another one; the last picture stays until then."""
@@ -374,6 +388,8 @@ class Viewer:
         imgui.new_frame()
         ui = self.ui
         ui.size, ui.scale, ui.pick, ui.shown = size, scale, self.pick, self.surface.shown
+        ui.comfort = self.depth_range.comfort if self.studio.scene.stereo is not None else None
+        self.room.fit(ui, alone=self.outputs.fills_screens)
         ui.speed = replace(self.meter.speed, way="shared" if self.surface.shared else "copied")
         self._draw_marks(scale)
         self._draw_panels(ui)

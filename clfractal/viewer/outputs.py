@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from clfractal.pictures.modes import BELOW, BESIDE
 from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer import gl, window
+from clfractal.viewer.cables import Cables, Told
 from clfractal.viewer.chart import mixed_chart
 from clfractal.viewer.options import Options
 from clfractal.viewer.recording import Event
@@ -31,6 +32,7 @@ class Outputs:
         self.second: Window | None = None
         self.quad = gl.has_stereo()
         self.monitors: list[Monitor] = []
+        self._cables = Cables()
         self._rectangle = gl.Rectangle()
         self._second_rectangle: gl.Rectangle | None = None
         self._second_ui: UiRenderer | None = None
@@ -47,7 +49,7 @@ class Outputs:
             if options.windows and len(self.monitors) == 2:
                 self.open_second()
             else:
-                self.first.fill(self.monitors)
+                self._fill(self.first, self.monitors)
         elif options.fullscreen:
             self.full_screen()
 
@@ -58,20 +60,20 @@ class Outputs:
         if self.second is not None:
             self.close_second()
         elif self.first.fullscreen:
-            self.first.unfill()
+            self._unfill()
         else:
             here = self.first.monitor()
             if here is not None:
-                self.first.fill([here])
+                self._fill(self.first, [here])
 
     def span(self) -> None:
         """One borderless window over all chosen monitors (all there are, if none were chosen), or goes back."""
         if self.first.fullscreen:
-            self.first.unfill()
+            self._unfill()
             return
         wanted = self.monitors or window.monitors()
         if wanted:
-            self.first.fill(wanted)
+            self._fill(self.first, wanted)
 
     def open_second(self) -> None:
         """A window for each of two monitors, the left eye's and the right eye's; back to one if there are two."""
@@ -85,8 +87,8 @@ class Outputs:
         window.no_wait()
         self.first.use()
         if len(there) >= 2:
-            self.first.fill([there[0]])
-            self.second.fill([there[1]])
+            self._fill(self.first, there[:1])
+            self._fill(self.second, there[1:2])
         self.second.title("right eye")
         self.first.raise_to_front()
 
@@ -99,6 +101,23 @@ class Outputs:
         self.second.close()
         self.second = None
         self.first.use()
+        self._unfill()
+
+    def watch(self, now: float) -> list[Told]:
+        """Looks once a second whether the filled monitors are there, seconds; what there is to tell."""
+        told, returned = self._cables.look(now)
+        for where, wanted in returned:
+            where.fill(wanted)
+        if self.second is not None:
+            self.second.show(self._cables.has(self.second))
+        return told
+
+    def _fill(self, where: Window, wanted: Sequence[Monitor]) -> None:
+        where.fill(wanted)
+        self._cables.filled(where, wanted)
+
+    def _unfill(self) -> None:
+        self._cables.clear()
         self.first.unfill()
 
     @property

@@ -309,6 +309,11 @@ class Window:
         glfw.set_window_monitor(self.handle, None, x, y, width, height, glfw.DONT_CARE)
         self.look()
 
+    def show(self, shown: bool) -> None:
+        """Takes it from the screen, or brings it back."""
+        if bool(glfw.get_window_attrib(self.handle, glfw.VISIBLE)) != shown:
+            (glfw.show_window if shown else glfw.hide_window)(self.handle)
+
     def pointer(self) -> tuple[float, float]:
         """The pointer's place, screen coordinates from the window's top left."""
         x, y = glfw.get_cursor_pos(self.handle)

@@ -141,3 +141,51 @@ def test_a_window_that_is_resized_is_another_screen_and_says_so(
         wait_for(told, "the line about it", 10)
         window.save()
     assert width_in(tmp_path) == 2
+
+
+def test_a_projector_that_goes_and_comes_back(projectors: Projectors, wall: Pixels, tmp_path: Path) -> None:
+    """Its window is taken away, both are told, and in the end the wall is as it was, wherever the window was put."""
+    (tmp_path / "s.yaml").write_text(SPHERES)
+    with Window(projectors, tmp_path, "s.yaml", "--monitors", "1,2", "--windows", "--no-panels") as window:
+        shows(projectors, wall)
+
+        def windows() -> list[str]:
+            return projectors.xdotool("search", "--onlyvisible", "--name", "^clfractal").split()
+
+        (right,) = [each for each in windows() if "right" in projectors.xdotool("getwindowname", each)]
+        try:
+            projectors.plug(right=False)
+            wait_for(lambda: right not in windows(), "the right eye's window to go")
+            left = wall[:, : PROJECTOR[0]]
+
+            def told() -> bool:
+                now = projectors.pixels()[:, : PROJECTOR[0]]
+                return not np.array_equal(now[:200], left[:200]) and np.array_equal(now[300:], left[300:])
+
+            wait_for(told, "a line about it", 10)
+            projectors.xdotool("windowmove", right, PROJECTOR[0] - 96, 0)  # as some systems do
+        finally:
+            projectors.plug(right=True)
+        wait_for(lambda: right in windows(), "the right eye's window")
+        shows(projectors, wall)
+        assert window.process.poll() is None
+
+
+def test_an_uncomfortable_pair_is_told(projectors: Projectors, tmp_path: Path) -> None:
+    """The window warns of what files warn of: a line over the picture."""
+    (tmp_path / "s.yaml").write_text(
+        SPHERES.replace("screen_width: 2, screen_distance: 2", "screen_width: 0.5")
+    )
+    with Window(
+        projectors, tmp_path, "s.yaml", "--size", "800x300", "--no-panels", "--stereo", "left"
+    ) as window:
+        window.move(200, 120)
+        fewer = film(tmp_path, "s.yaml", (800, 300), "--set", "stereo.mode=left")
+
+        def told() -> bool:
+            now = window.pixels()
+            return np.abs(now[150:].astype(int) - fewer[150:]).max() <= 1 and not np.array_equal(
+                now[:150], fewer[:150]
+            )
+
+        wait_for(told, "the warning", 20)

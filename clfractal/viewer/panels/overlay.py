@@ -20,6 +20,18 @@ from clfractal.viewer.panels.ui import Ui
 Pair = tuple[str, str]
 """A label and its value."""
 
+_FOR_NARROW = (
+    "render",
+    "samples",
+    "zoom",
+    "new zoom",
+    "plane",
+    "count",
+    "depth",
+    "point",
+    "stereo",
+    "parallax",
+)
 _SPINNER = "|/-\\"
 
 
@@ -28,7 +40,9 @@ def lines(ui: Ui) -> list[list[Pair]]:
     found = [_picture(ui), _scene(ui)]
     if ui.studio.scene.stereo is not None:
         found.append(_stereo(ui))
-    return found
+    if ui.narrow:  # the picture counts more
+        found = [[pair for pair in row if pair[0] in _FOR_NARROW] for row in found]
+    return [row for row in found if row]
 
 
 def _picture(ui: Ui) -> list[Pair]:
@@ -99,6 +113,8 @@ def _stereo(ui: Ui) -> list[Pair]:
         ("screen", f"{stereo.screen_width:.4g} wide, {stereo.screen_distance:.4g} away"),
         ("eyes", f"{stereo.interpupillary_distance:.4g} apart"),
     ]
+    if ui.comfort is not None:
+        found.append(("depth", stereo_panel.range_text(ui.comfort)))
     if "parallax" in ui.show or ui.pick is not None:
         found.append(("parallax", _parallax(ui)))
     return found

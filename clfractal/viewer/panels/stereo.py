@@ -16,6 +16,7 @@ from clfractal.scene.stereo import EyeName, Stereo
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
+from clfractal.work.comfort import Comfort
 
 MODES = {
     "split": "Side by side",
@@ -65,6 +66,7 @@ def draw(ui: Ui) -> None:
     _fit(ui, stereo)
     _plane(ui, stereo)
     if not w.filtering(ui):
+        _range(ui)
         _parallax(ui)
 
 
@@ -135,6 +137,23 @@ def _plane(ui: Ui, stereo: Stereo) -> None:
             normal={"step": 0.01},
             up={"step": 0.01},
         )
+
+
+def range_text(comfort: Comfort) -> str:
+    """The range of a picture's parallax, degrees, and whether that strains the eyes."""
+    ends = f"{comfort.nearest_degrees:+.2f} to {comfort.farthest_degrees:+.2f}°".replace("-", "\u2212")
+    return f"{ends}, too much" if comfort.warning() else ends
+
+
+def _range(ui: Ui) -> None:
+    """The parallax of the whole picture, and what helps if it is too much."""
+    if ui.comfort is None:
+        return
+    w.group(ui, "Whole picture")
+    warning = ui.comfort.warning()
+    w.reading(ui, "Parallax", range_text(ui.comfort), theme.WARNING if warning else theme.TEXT)
+    if warning:
+        w.hint(ui, f"{warning[0].upper()}{warning[1:]}.")
 
 
 def _parallax(ui: Ui) -> None:

@@ -11,9 +11,14 @@ import numpy.typing as npt
 
 from clfractal.viewer.display import Shown
 from clfractal.viewer.keys import KeyMap
+from clfractal.viewer.panels import theme
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
+from clfractal.work.comfort import Comfort
+
+_PICTURE = 200.0
+"""Points of the picture's width that are left beside the dock, or else it is put away."""
 
 
 class Textures(Protocol):
@@ -53,6 +58,7 @@ class Ui:
         pick: what lies under the pointer; None over panels or outside the picture.
         shown: the newest picture that the window shows, if there is one.
         speed: see `Speed`.
+        comfort: the range of the picture's parallax; None without two eyes, and before it is known.
         show: names of the parts that are open: `panels`, `help`, `gallery`, `variations`, `overlay`, `save`, ...
         memory: of panels, by their own keys.
     """
@@ -67,5 +73,11 @@ class Ui:
     pick: Pick | None = None
     shown: Shown | None = None
     speed: Speed = field(default_factory=Speed)
+    comfort: Comfort | None = None
     show: set[str] = field(default_factory=lambda: {"panels", "overlay"})
     memory: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether panels leave next to nothing of the picture beside them: in a small window, or an eye's half of one."""
+        return self.size[0] < theme.DOCK_LEFT + 2 * theme.MARGIN + _PICTURE
