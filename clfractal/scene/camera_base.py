@@ -1,6 +1,7 @@
 """Where a camera is: its position, target and up, and shorter ways to say them, which are resolved when a scene is read."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,6 +18,12 @@ from clfractal.scene.base import (
     problem,
 )
 from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbited, rolled, shifted
+
+WORDS = ("orbit", "roll", "shift")
+"""Keys of a camera that are other words for its position, target and up, and that films can move."""
+PLACE = ("position", "target", "up")
+"""Keys that say where a camera is."""
+_SAID = "_said"
 
 
 class Orbit(Section):
@@ -51,6 +58,7 @@ class CameraBase(Section):
 
     `orbit`, `roll`, `frame` and `shift` are other words for position, target and up. They are applied in this order and
     are then null: a camera that was read has a position, a target and an up, and nothing else has to know about them.
+    Only what moves them in a film has to: for it a camera remembers what it was given (`said`).
     """
 
     position: Position = Field((0.0, -3.0, 0.0), description="where the camera is, scene units")
@@ -79,6 +87,8 @@ class CameraBase(Section):
     def _stands_somewhere(self) -> Self:
         if length(self.up) < 1e-12:
             raise problem("must not be zero", "up")
+        if _SAID not in self.__dict__:  # this is asked again of a camera that is put into another scene
+            self._remember({name: getattr(self, name) for name in (*PLACE, *WORDS, "frame")})
         if self.orbit is None or not self.orbit.complete:
             self._check_target()
         if self.orbit is not None:
@@ -104,7 +114,51 @@ class CameraBase(Section):
         fov = getattr(self, "fov", None)
         position, height = framing(axes(self.position, self.target, self.up), shown, aspect, fov)
         update = {"position": position, "target": shown.center, "frame": None}
-        return self.model_copy(update=update if height is None else {**update, "height": height})
+        found = self.model_copy(update=update if height is None else {**update, "height": height})
+        found._remember(self.said)
+        return found
+
+    @property
+    def said(self) -> Mapping[str, Any]:
+        """Position, target, up, orbit, roll, frame and shift as they were given, before the words were applied."""
+        found: Mapping[str, Any] = self.__dict__[_SAID]
+        return found
+
+    def _remember(self, said: Mapping[str, Any]) -> None:
+        # Beside the fields, as it is no part of what makes two cameras equal.
+        self.__dict__[_SAID] = said
+
+    def word(self, key: str) -> Any:
+        """The value of one of `WORDS`: an Orbit, a roll, a Shift; where it was not given, what says the same."""
+        said = self.said[key]
+        if key != "orbit":
+            return said if said is not None else Shift() if key == "shift" else 0.0
+        given = (None, None, None) if said is None else (said.azimuth, said.elevation, said.distance)
+        azimuth, elevation, distance = (
+            present if wanted is None else wanted for present, wanted in zip(self.angles, given, strict=True)
+        )
+        return Orbit(azimuth=azimuth, elevation=elevation, distance=distance)
+
+    def moved(self, update: Mapping[str, Any]) -> Self:
+        """A copy with other values, of which words take the places of those that the camera was given.
+
+        So a camera that was rolled by 10 degrees is rolled by 20 then, not by 30. An angle or distance of `orbit` that is
+        left out is that of the position.
+
+        Raises:
+            SceneError: a value is wrong; the path says which.
+        """
+        if not any(word in update for word in WORDS):
+            return self.model_copy(update=update)
+        said = dict(self.said)
+        if "position" in update:  # which the words for it would hide
+            said |= {"orbit": None, "frame": None}
+        changed = {**said, **update}
+        if said["orbit"] is not None and update.get("orbit") is not None:
+            left_out = [name for name in Orbit.model_fields if getattr(update["orbit"], name) is None]
+            given = {name: getattr(said["orbit"], name) for name in left_out}
+            changed["orbit"] = update["orbit"].model_copy(update=given)
+        return self.model_copy(update=changed)
 
     @property
     def angles(self) -> tuple[float, float, float]:

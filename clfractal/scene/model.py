@@ -30,6 +30,7 @@ from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.scene.words import with_words
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
@@ -403,4 +404,6 @@ class Scene(Section):
         for name, each in self.objects.items():
             if isinstance(each, FormulaObject):
                 plain["objects"][name]["formula"] = each.formula.mapping()
+        if self.animation is not None:
+            with_words(plain, self, self.animation.tracks)
         return plain

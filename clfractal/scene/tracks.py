@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeAlias
 from clfractal.errors import SceneError, unknown_name
 from clfractal.files.marks import split_path
 from clfractal.scene.base import Section
-from clfractal.scene.camera_base import CameraBase
+from clfractal.scene.camera_base import WORDS, CameraBase, Orbit
 from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import SetLight
@@ -39,6 +39,7 @@ Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "col
 _SCALES: tuple[tuple[type[Section], frozenset[str]], ...] = (
     (PerspectiveCamera, frozenset({"fov", "focus_distance", "f_number"})),
     (OrthographicCamera, frozenset({"height"})),
+    (Orbit, frozenset({"distance"})),
     (Ball, frozenset({"radius"})),
     (Box, frozenset({"size"})),
     (Zoom, frozenset({"scale"})),
@@ -153,7 +154,7 @@ def _below(value: Any, path: Sequence[str], depth: int) -> Any:
     if isinstance(value, Section):
         if part not in _keys_of(value):
             raise SceneError(_unknown(part, shown, _keys_of(value)))
-        return getattr(value, part)
+        return value_under(value, part)
     if isinstance(value, Mapping):
         if shown in _NAMED and part not in value:
             raise SceneError(unknown_name(_NAMED[shown], part, tuple(value)))
@@ -168,9 +169,14 @@ def _below(value: Any, path: Sequence[str], depth: int) -> Any:
     raise SceneError(f"cannot move: {shown} is a single value, so it has no key {part!r}")
 
 
+def value_under(section: Section, key: str) -> Any:
+    """What a section has under a key; of a camera, under a word for its place, what the word says."""
+    return section.word(key) if isinstance(section, CameraBase) and key in WORDS else getattr(section, key)
+
+
 def _keys_of(section: Section) -> list[str]:
-    """The keys of a section that was read; those that are other words for them have done their work."""
-    return [key for key, field in type(section).model_fields.items() if not field.exclude]
+    """The keys of a section, in the schema's order."""
+    return list(type(section).model_fields)
 
 
 def _unknown(part: str, shown: str, known: Sequence[str]) -> str:
@@ -267,9 +273,13 @@ def _changed(value: Any, tree: Any, shown: str) -> Any:
         )
     if isinstance(value, Mapping):
         return {**value, **{key: _changed(value.get(key), tree[key], f"{shown}.{key}") for key in tree}}
-    update = {key: _changed(getattr(value, key), below, f"{shown}.{key}") for key, below in tree.items()}
+    own = {"orbit": Orbit()} if isinstance(value, CameraBase) else {}  # what is left out there stays as it is
+    update = {
+        key: _changed(own.get(key, value_under(value, key)), below, f"{shown}.{key}")
+        for key, below in tree.items()
+    }
     try:
-        return value.model_copy(update=update)
+        return value.moved(update) if isinstance(value, CameraBase) else value.model_copy(update=update)
     except SceneError as error:
         path = ".".join(part for part in (shown, error.where.path) if part)
         raise SceneError(error.message, replace(error.where, path=path)) from error

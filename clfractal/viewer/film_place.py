@@ -14,10 +14,12 @@ from typing import Any, TypeAlias
 from clfractal.errors import SceneError
 from clfractal.scene.animation import Animation
 from clfractal.scene.base import Section
+from clfractal.scene.camera_base import PLACE, CameraBase
 from clfractal.scene.curves import same
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
-from clfractal.scene.tracks import target_of, with_values
+from clfractal.scene.tracks import target_of, value_under, with_values
+from clfractal.scene.words import words_moved
 from clfractal.viewer.timeline import with_key
 
 Path: TypeAlias = tuple[str, ...]
@@ -90,7 +92,8 @@ class Keyed:
     Attributes:
         animation: with their keys.
         keyed: the tracks that have a key now.
-        refused: those that follow an expression or a table, and so take none.
+        refused: those that follow an expression or a table, and those of words for a camera's place that was changed:
+            they take none.
     """
 
     animation: Animation
@@ -129,7 +132,13 @@ def keyed(scene: Scene, place: FilmPlace, *, tracked_only: bool = False) -> Keye
     found = changes(place.posed, scene)
     keyed_names: list[str] = []
     refused: list[str] = []
+    words = words_moved(scene, names.values())
     for path, (old, new) in _with_partners(found, names, scene).items():
+        if (
+            path[-1] in PLACE and path[:-1] in words
+        ):  # what the words make of it at this frame is no place of its own
+            refused.append(words[path[:-1]])
+            continue
         for part, before, after in _parts(path, old, new, names):
             name = names.get(part)
             if name is None and tracked_only:
@@ -143,6 +152,14 @@ def keyed(scene: Scene, place: FilmPlace, *, tracked_only: bool = False) -> Keye
             animation = with_key(animation, name, place.frame, after)
             keyed_names.append(name)
     return Keyed(animation, tuple(keyed_names), tuple(refused))
+
+
+def why_no_keys(scene: Scene, name: str) -> str:
+    """Why a track got none of `keyed`, in words."""
+    assert scene.animation is not None
+    if scene.animation.tracks[name].keys is not None:
+        return "it moves this camera, whose place takes no keys beside it; set keys of this track in the timeline"
+    return "it follows an expression or a table, and takes no keys"
 
 
 def movable(scene: Scene) -> list[Path]:
@@ -201,6 +218,10 @@ def _rested(scene: Scene, rest: Scene) -> Scene:
     """The scene with the values of another one in the places of its tracks, where that has them."""
     values: dict[Path, Any] = {}
     parameters: dict[Path, dict[str, Any]] = {}
+    for path in words_moved(scene, scene.animation.tracks if scene.animation is not None else ()):
+        camera = _at(rest, path)
+        if isinstance(camera, CameraBase):
+            values |= {(*path, key): value for key, value in camera.said.items()}
     for target in movement_of(scene).targets.values():
         *owner, key = target.path
         found = _at(rest, target.path)
@@ -209,7 +230,7 @@ def _rested(scene: Scene, rest: Scene) -> Scene:
             group.pop(key, None)
             if found is not _NOTHING:
                 group[key] = found
-        elif found is not _NOTHING:
+        elif found is not _NOTHING and not any(path == target.path[: len(path)] for path in values):
             values[target.path] = found
     return with_values(scene, {**values, **parameters})
 
@@ -236,7 +257,7 @@ def _leaves(path: Path, old: Any, new: Any) -> Iterator[tuple[Path, Any, Any]]:
 def _values(path: Path, value: Any) -> Iterator[Path]:
     if isinstance(value, Section):
         for name in type(value).model_fields:
-            yield from _values((*path, name), getattr(value, name))
+            yield from _values((*path, name), value_under(value, name))
     elif isinstance(value, Mapping):
         for name, each in value.items():
             yield from _values((*path, name), each)
@@ -270,7 +291,7 @@ def _moves(scene: Scene, path: Path) -> bool:
 def _at(value: Any, path: Path) -> Any:
     for part in path:
         if isinstance(value, Section):
-            value = getattr(value, part, _NOTHING) if part in type(value).model_fields else _NOTHING
+            value = value_under(value, part) if part in type(value).model_fields else _NOTHING
         elif isinstance(value, Mapping):
             value = value.get(part, _NOTHING)
         elif isinstance(value, tuple) and part.isdecimal() and int(part) < len(value):

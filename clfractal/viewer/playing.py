@@ -5,7 +5,7 @@ from __future__ import annotations
 from clfractal.errors import ClfractalError
 from clfractal.scene.animation import MAX_FRAMES, Animation
 from clfractal.scene.parts import AnyCamera
-from clfractal.viewer import timeline
+from clfractal.viewer import film_place, timeline
 from clfractal.viewer.studio import Studio
 from clfractal.viewer.thinning import Sample, flight
 from clfractal.viewer.words import counted
@@ -186,7 +186,7 @@ class Player:
         if found is None:
             return
         for name in found.refused:
-            studio.tell(f"{name} follows an expression or a table, and takes no keys", wrong=True)
+            studio.tell(f"{name}: {film_place.why_no_keys(studio.scene, name)}", wrong=True)
         if found.keyed:
             listed = ", ".join(found.keyed[:4]) + (" and others" if len(found.keyed) > 4 else "")
             studio.tell(f"keys at frame {studio.frame_number:g}: {listed}")

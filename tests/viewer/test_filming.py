@@ -386,3 +386,33 @@ def test_values_that_can_move_are_listed() -> None:
     assert "renderer.samples" not in found
     assert "image.width" not in found
     assert None not in found.values()
+
+
+ROLLED = MOVING.replace(
+    "  tracks:\n", "  tracks:\n    camera.roll: {keys: [{frame: 0, value: 0}, {frame: 40, value: 80}]}\n"
+)
+
+
+def test_a_rolled_camera_that_is_moved_at_a_frame_is_saved_as_it_was() -> None:
+    """What the roll makes of its `up` at a frame is not what the next frame is rolled from."""
+    studio = studio_of(ROLLED, 20)
+    shown = studio.shown_scene.camera
+    assert shown == clfractal.at_frame(load_scene(ROLLED), 20).camera
+    assert studio.document == load_scene(ROLLED, posed=False)
+    assert studio.edit({"camera": dolly(shown, 0.5).model_dump(mode="json")})
+    assert studio.shown_scene.camera != shown
+    assert studio.document == load_scene(ROLLED, posed=False)
+    found = studio.set_keys()
+    assert found is not None
+    assert found.refused
+    assert set(found.refused) == {"camera.roll"}
+    assert "beside it" in film_place.why_no_keys(studio.scene, "camera.roll")
+    assert studio.go_to_frame(40)
+    assert studio.shown_scene.camera == clfractal.at_frame(load_scene(ROLLED), 40).camera
+
+
+def test_words_for_a_cameras_place_can_get_tracks() -> None:
+    scene = load_scene(STILL)
+    found = {".".join(path): film_place.value_of(scene, path) for path in film_place.movable(scene)}
+    assert found["camera.roll"] == found["camera.shift.right"] == 0
+    assert found["camera.orbit.distance"] == pytest.approx(scene.camera.angles[2])
