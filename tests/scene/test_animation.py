@@ -304,7 +304,7 @@ def test_it_loads_back_to_an_equal_scene() -> None:
 REFUSED = {
     "camera.fow: {expression: '1'}": "unknown key of camera 'fow'; did you mean 'fov'?",
     "camera: {expression: '1'}": "cannot move as a whole: name one of its keys, position, target, up, orbit,"
-    " f_number, focus_distance, focus, focus_on, sensor_height",
+    " frame, roll, shift, projection, fov, f_number, focus_distance, focus, focus_on, sensor_height",
     "camera..fov: {expression: '1'}": "must name a value by its dotted keys, such as camera.position",
     "formula.parameters: {expression: '1'}": "cannot move as a whole: name one of its values, such as"
     " formula.parameters.NAME",
