@@ -119,7 +119,7 @@ def test_a_table_from_the_shell_moves_a_scene(clf: InProcess) -> None:
         "high=2000-8000",
     )
     assert ended.err == "a.csv: 20 frames, level, low, high\n"
-    table = read_columns(Path("a.csv"), dict.fromkeys(["frame", "time", "level", "low", "high"]), "a.csv")
+    table = read_columns(Path("a.csv"), dict.fromkeys(["frame", "time", "level", "low", "high"]), "a.csv", 10)
     assert table["frame"] == list(range(20))
     np.testing.assert_allclose(table["time"], np.arange(20) / 10)
     assert min(table["low"][2:8]) > 0.95 > 0.01 > max(table["low"][12:18])
@@ -130,7 +130,7 @@ def test_a_table_from_the_shell_moves_a_scene(clf: InProcess) -> None:
     assert clfractal.at_frame(moving, 5).material.ambient > 0.95
     assert clfractal.at_frame(moving, 15).material.ambient < 0.01
     assert clf("sound", "a.wav", "--fps", "10", "--frames", "30", "--quiet").err == ""
-    longer = read_columns(Path("tracks.csv"), dict.fromkeys(["bass"]), "tracks.csv")["bass"]
+    longer = read_columns(Path("tracks.csv"), dict.fromkeys(["bass"]), "tracks.csv", 10)["bass"]
     assert len(longer) == 30
     assert longer[29] < 1e-3
 

@@ -305,7 +305,8 @@ class Movers:
         path = safe_path(track.file, self.scene.folder, where)
         try:
             table = self.scene.once(
-                f"{TABLE}{name}", lambda: read_columns(path, dict.fromkeys(titles), str(track.file))
+                f"{TABLE}{name}",
+                lambda: read_columns(path, dict.fromkeys(titles), str(track.file), self.animation.fps),
             )
         except FileError as error:
             raise FileError(error.inside(track.file), where) from error

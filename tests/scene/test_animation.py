@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -228,18 +227,6 @@ def test_what_is_null_has_as_many_numbers_as_the_schema_says() -> None:
     assert clfractal.at_frame(scene, 10).camera.focus_on == pytest.approx((0.5, 0.5))  # type: ignore[union-attr]
 
 
-def test_a_table_moves_a_value(tmp_path: Path) -> None:
-    rows = "\n".join(f"{frame}, {0.1 * frame}" for frame in range(21))
-    (tmp_path / "sound.csv").write_text(f"frame, bass\n{rows}\n")
-    track = "{file: sound.csv, column: bass, factor: 2, offset: 1}"
-    text = f"{HEAD}animation: {{frames: 21, tracks: {{lights.0.intensity: {track}}}}}\n"
-    (tmp_path / "scene.yaml").write_text(text)
-    scene = load_scene(tmp_path / "scene.yaml")
-    assert tmp_path / "sound.csv" in scene.files
-    np.testing.assert_allclose(values(scene, "lights.0.intensity"), 1 + 0.2 * np.arange(21))
-    assert clfractal.at_frame(scene, 2.5).lights[0].intensity == pytest.approx(1.5)
-
-
 def test_parameters_that_move_are_live_and_need_no_new_text() -> None:
     scene = moving({"formula.parameters.power": keys((0, 8), (20, 2.5))})
     assert clfractal.at_frame(scene, 3).formula.live == ("power",)
@@ -387,34 +374,6 @@ def test_around_target_is_for_smooth_positions() -> None:
         moving({"camera.position": turn})
     with pytest.raises(ClfractalError, match="must differ from the camera's target at frame 5"):
         moving({"camera.position": keys((0, [0, -3, 0]), (5, [0, 0, 0]), (9, [3, 0, 0]))})
-
-
-TABLES = {
-    "bass\n" + "1\n" * 20: "sound.csv has 20 rows, but the film 21 frames",
-    "treble\n" + "1\n" * 21: "sound.csv:1: unknown column 'bass'; known: treble",
-    "bass\n1\nx\n": "sound.csv:3: column 'bass' must hold finite numbers, got 'x'",
-    "a,bass\n1\n": "sound.csv:2: column 'bass' must hold finite numbers, got ''",
-    "bass\n1\n\n2\n": "sound.csv:3: must have a row for each frame, without blank ones",
-    'bass\n"1': "sound.csv:2: is no CSV table: unexpected end of data",
-}
-
-
-@pytest.mark.parametrize("table", TABLES)
-def test_wrong_tables(table: str, tmp_path: Path) -> None:
-    (tmp_path / "sound.csv").write_text(table)
-    tracks = "{lights.0.intensity: {file: sound.csv, column: bass}}"
-    (tmp_path / "scene.yaml").write_text(f"{HEAD}animation: {{frames: 21, tracks: {tracks}}}\n")
-    with pytest.raises(ClfractalError) as caught:
-        load_scene(tmp_path / "scene.yaml")
-    assert caught.value.message == TABLES[table]
-    assert caught.value.where.path == "animation.tracks.lights.0.intensity.file"
-    assert caught.value.where.line == 4
-
-
-def test_a_table_stays_in_the_scenes_folder(tmp_path: Path) -> None:
-    tracks = {"lights.0.intensity": {"file": "../sound.csv", "column": "bass"}}
-    with pytest.raises(ClfractalError, match="must be a path inside the scene's folder"):
-        moving(tracks)
 
 
 @given(
