@@ -198,24 +198,6 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize(
-    ("mode", "word"), [("split", "left_right"), ("over_under", "top_bottom"), ("rows", "row_interleaved_lr")]
-)
-def test_stereo_is_told(mode: str, word: str, pictures: list[Path], tmp_path: Path) -> None:
-    path = tmp_path / "film.mkv"
-    plan = plan_film(path, Recipe(), SIZE, 25, stereo=mode)
-    assert plan.tells_stereo
-    write_film(plan, pictures[:2])
-    with av.open(str(path)) as file:
-        assert file.streams.video[0].metadata["stereo_mode"] == word
-    h264 = plan_film(tmp_path / "film.mp4", Recipe(), SIZE, 25, stereo=mode)
-    assert h264.tells_stereo
-    write_film(h264, pictures[:2])
-    assert not plan_film(tmp_path / "film.mov", Recipe(), SIZE, 25, stereo=mode).tells_stereo
-    assert not plan_film(path, Recipe(), SIZE, 25, stereo=mode, swap=True).tells_stereo
-    assert plan_film(path, Recipe(), SIZE, 25, stereo="anaglyph").tells_stereo  # one picture, for glasses
-
-
 REFUSED: dict[tuple[str, Recipe, tuple[int, int]], str] = {
     ("a.mp4", Recipe(), (127, 96)): "needs an even width and height with chroma 420, got 127 x 96",
     ("a.mov", Recipe(), (127, 95)): "needs an even width with chroma 422, got 127 x 95",

@@ -57,27 +57,17 @@ CODECS: Mapping[str, Codec] = {
 DEFAULTS: Mapping[str, str] = {".mp4": "h264", ".mkv": "ffv1", ".mov": "prores"}
 """The codec of each kind of file, if none is named."""
 
-MATROSKA = {
-    "split": "left_right",
-    "split_half": "left_right",
-    "over_under": "top_bottom",
-    "over_under_half": "top_bottom",
-    "rows": "row_interleaved_lr",
-    "columns": "col_interleaved_lr",
-    "checkerboard": "checkerboard_lr",
+MATROSKA: Mapping[str, tuple[str, str]] = {
+    "split": ("left_right", "right_left"),
+    "split_half": ("left_right", "right_left"),
+    "over_under": ("top_bottom", "bottom_top"),
+    "over_under_half": ("top_bottom", "bottom_top"),
+    "rows": ("row_interleaved_lr", "row_interleaved_rl"),
+    "columns": ("col_interleaved_lr", "col_interleaved_rl"),
+    "checkerboard": ("checkerboard_lr", "checkerboard_rl"),
 }
-"""What Matroska calls the arrangement of two eyes' pictures, by the scene's `stereo.mode`."""
-
-PACKING = {
-    "checkerboard": 0,
-    "columns": 1,
-    "rows": 2,
-    "split": 3,
-    "split_half": 3,
-    "over_under": 4,
-    "over_under_half": 4,
-}
-"""H.264's numbers for the same (ITU-T H.264, table D-8)."""
+"""What Matroska calls the arrangement of two eyes' pictures (StereoMode 1, 3, 7, 9, 5; with the right eye first 11, 2, 6, 8, 4),
+by the scene's `stereo.mode`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,8 @@ import numpy.typing as npt
 from clfractal.errors import FileError, SceneError, Where
 from clfractal.files.atomic import atomic_writer, check_output, file_error
 from clfractal.files.encoding import as_usual_threads
-from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, MATROSKA, PACKING, Codec, Recipe
+from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, MATROSKA, Codec, Recipe
+from clfractal.files.frame_packing import arrangements, frame_packing, with_message
 
 if TYPE_CHECKING:
     from av import VideoFrame
@@ -60,13 +61,22 @@ class Plan:
     @property
     def tells_stereo(self) -> bool:
         """Whether the file tells players how it holds two pictures."""
-        if self.stereo not in PACKING:  # one picture, or one of two colours
-            return True
-        if self.swap:
-            return False
-        if self.path.suffix.lower() == ".mkv":
-            return self.stereo in MATROSKA
-        return self.codec.library == "libx264" and self.stereo in PACKING
+        holds_one = self.stereo not in MATROSKA  # one picture, or one of two colours
+        return holds_one or self.stereo_mode is not None or self.packing is not None
+
+    @property
+    def stereo_mode(self) -> str | None:
+        """What Matroska calls the arrangement of two pictures; None if the film is none, or holds one picture."""
+        if self.stereo not in MATROSKA or self.path.suffix.lower() != ".mkv":
+            return None
+        return MATROSKA[self.stereo][self.swap]
+
+    @property
+    def packing(self) -> bytes | None:
+        """The message that tells the arrangement within the stream of pictures; None if the codec has none."""
+        if self.stereo is None or self.stereo not in arrangements(self.codec.library):
+            return None
+        return frame_packing(self.codec.library, self.stereo, swap=self.swap)
 
 
 def plan_film(
@@ -175,18 +185,31 @@ def write_film(plan: Plan, pictures: Iterable[Path]) -> None:
                     frame = _frame(av, plan, _read(av, picture, plan))
                     frame.pts = number
                     frame.time_base = 1 / plan.fps
-                    film.mux(stream.encode(frame))
-                film.mux(stream.encode())
+                    film.mux(_told(av, plan, stream.encode(frame)))
+                film.mux(_told(av, plan, stream.encode()))
         except av.FFmpegError as error:
             raise file_error(plan.path, "cannot be written", error) from error
+
+
+def _told(av: Any, plan: Plan, packets: list[Any]) -> list[Any]:
+    """Coded pictures, of which the key ones tell how two eyes' pictures lie in them."""
+    if plan.packing is None:
+        return packets
+    return [_with_packing(av, plan, packet) if packet.is_keyframe else packet for packet in packets]
+
+
+def _with_packing(av: Any, plan: Plan, packet: Any) -> Any:
+    assert plan.packing is not None
+    told = av.Packet(with_message(bytes(packet), plan.packing, plan.codec.library))
+    told.stream, told.time_base, told.is_keyframe = packet.stream, packet.time_base, True
+    told.pts, told.dts, told.duration = packet.pts, packet.dts, packet.duration
+    return told
 
 
 def _stream(plan: Plan, film: Any) -> Any:
     options = dict(plan.codec.options)
     if plan.codec.quality is not None:
         options[plan.codec.quality[0]] = str(plan.quality)
-    if plan.codec.library == "libx264" and plan.stereo in PACKING and not plan.swap:
-        options["x264-params"] = f"frame-packing={PACKING[plan.stereo]}"
     if plan.codec.library == "prores_ks":
         options["profile"] = "4" if plan.chroma == "444" else "3"
     stream = film.add_stream(plan.codec.library, rate=plan.fps, options=options)
@@ -197,8 +220,8 @@ def _stream(plan: Plan, film: Any) -> Any:
     context.time_base = 1 / plan.fps
     context.framerate = plan.fps
     _tell_colors(context, plan)
-    if plan.stereo in MATROSKA and not plan.swap and plan.path.suffix.lower() == ".mkv":
-        stream.metadata["stereo_mode"] = MATROSKA[plan.stereo]
+    if plan.stereo_mode is not None:
+        stream.metadata["stereo_mode"] = plan.stereo_mode
     return stream
 
 
