@@ -66,8 +66,8 @@ MATROSKA: Mapping[str, tuple[str, str]] = {
     "columns": ("col_interleaved_lr", "col_interleaved_rl"),
     "checkerboard": ("checkerboard_lr", "checkerboard_rl"),
 }
-"""What Matroska calls the arrangement of two eyes' pictures (StereoMode 1, 3, 7, 9, 5; with the right eye first 11, 2, 6, 8, 4),
-by the scene's `stereo.mode`."""
+"""What Matroska calls the arrangement of two eyes' pictures, by the scene's `stereo.mode`: with the left eye first (its
+StereoMode 1, 3, 7, 9, 5), and with the right one (11, 2, 6, 8, 4)."""
 
 
 @dataclass(frozen=True, slots=True)

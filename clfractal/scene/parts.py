@@ -151,6 +151,8 @@ class Gradient(Section):
 
 def _known_channel(name: str) -> str:
     if name not in CHANNELS:
+        if name in LAYERS:
+            raise problem(f"{name!r} is a layer; name its channels, {', '.join(LAYERS[name])}")
         raise problem(unknown_channel(name))
     return name
 
