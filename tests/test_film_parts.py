@@ -88,6 +88,34 @@ def test_missing_frames_are_listed_and_rendered(clf: InProcess) -> None:
     assert (listed_at_last.out, listed_at_last.err, listed_at_last.status) == ("", "", 0)
 
 
+@pytest.mark.parametrize("name", ["f_1.exr", "f_1.png", "f_1.jpg", "f_1.webp"])
+def test_a_frame_of_random_bytes_is_missing_and_told(clf: InProcess, name: str) -> None:
+    """As a failing disk or a copy that went wrong leaves it. It may be somebody's file: so it is not written over."""
+    order = ("animate", "scene.yaml", "-o", f"f_#{Path(name).suffix}", "--frames", "0-2")
+    assert clf(*order).status == 0
+    noise = np.random.default_rng(1).bytes(5000)
+    Path(name).write_bytes(noise)
+    assert clf(*order, "--missing").out.split() == ["1"]
+    told = f"{name}: is no picture, as its name says; remove it, or render without --resume"
+    assert clf(*order, "--resume").is_one_line(2, told)
+    assert Path(name).read_bytes() == noise
+    Path(name).unlink()
+    assert clf(*order, "--resume").status == 0
+    assert clf(*order, "--missing").out == ""
+
+
+def test_a_damaged_frame_is_told_with_advice(clf: InProcess) -> None:
+    assert clf("animate", "scene.yaml", "-o", "p_#.png", "--frames", "0").status == 0
+    data = bytearray(Path("p_0.png").read_bytes())
+    at = data.index(b"clfractal")
+    data[at + 3] ^= 8
+    Path("p_0.png").write_bytes(data)
+    ended = clf("animate", "scene.yaml", "-o", "p_#.png", "--frames", "0", "--resume")
+    assert ended.status == 2
+    assert ended.err.startswith("p_0.png: ")
+    assert ended.err.endswith("; remove it, or render without --resume\n")
+
+
 def test_the_missing_of_a_film_or_of_no_pattern(clf: InProcess) -> None:
     ended = clf("animate", "scene.yaml", "-o", "film.mp4", "--missing")
     assert (ended.status, ended.err.count("\n")) == (2, 1)

@@ -198,6 +198,32 @@ def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 
 
+def test_a_film_of_8_bits_is_the_same_beside_others(clf: InProcess) -> None:
+    """Its frames are dithered, as a picture's 8 bits are: not rounded from the 16 that another film needs."""
+    scene = """version: 1
+formula: {name: mandelbulb, iterations: 4}
+image: {width: 48, height: 32}
+camera: {position: [0, -3, 0.5]}
+animation: {frames: 2, tracks: {camera.position.0: {expression: u}}}
+"""
+    Path("dim.yaml").write_text(scene)
+    assert clf("animate", "dim.yaml", "-o", "alone.mkv", "-o", "p_#.png").status == 0
+    for others in (["a.mov"], ["b.mov", "c.mp4"]):
+        order = ["animate", "dim.yaml", *(part for name in ("beside.mkv", *others) for part in ("-o", name))]
+        assert clf(*order).status == 0
+        assert not Path("beside.mkv.partial").exists()
+        pairs = zip(decoded(Path("alone.mkv"))[0], decoded(Path("beside.mkv"))[0], strict=True)
+        for number, (one, other) in enumerate(pairs):
+            shown = one.to_ndarray(format="rgb24")
+            np.testing.assert_array_equal(shown, other.to_ndarray(format="rgb24"))
+            np.testing.assert_array_equal(shown, np.asarray(Image.open(f"p_{number}.png")))
+        Path("beside.mkv").unlink()
+    # A film that is interrupted between its kinds of frames goes on.
+    Path("beside.mkv.partial").mkdir()
+    Path("beside.mkv.partial/000001.8.png").write_bytes(b"cut short")
+    assert clf("animate", "dim.yaml", "-o", "beside.mkv", "-o", "a.mov", "--resume").status == 0
+
+
 REFUSED: dict[tuple[str, Recipe, tuple[int, int]], str] = {
     ("a.mp4", Recipe(), (127, 96)): "needs an even width and height with chroma 420, got 127 x 96",
     ("a.mov", Recipe(), (127, 95)): "needs an even width with chroma 422, got 127 x 95",

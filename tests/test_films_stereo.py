@@ -104,8 +104,8 @@ def test_what_cannot_tell_is_known(tmp_path: Path) -> None:
         for swap in (False, True):
             plan = plan_film(tmp_path / f"f{suffix}", Recipe(codec), SIZE, 25, stereo=mode, swap=swap)
             assert not plan.tells_stereo
-    for mode in (None, "anaglyph", "left"):  # one picture
-        assert plan_film(tmp_path / "f.mov", Recipe(), SIZE, 25, stereo=mode, swap=True).tells_stereo
+    for one in (None, "anaglyph", "left"):  # one picture
+        assert plan_film(tmp_path / "f.mov", Recipe(), SIZE, 25, stereo=one, swap=True).tells_stereo
 
 
 SCENE = """\

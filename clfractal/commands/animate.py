@@ -30,7 +30,7 @@ from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
 from clfractal.files.film_kinds import Recipe
-from clfractal.files.whole import is_whole
+from clfractal.files.whole import is_foreign, is_whole
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 
@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 # Frames that took longer keep their tiles while they are in work, seconds.
 _LONG_FRAME = 2.0
+_ADVICE = "remove it, or render without --resume"
 
 
 def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
@@ -75,8 +76,8 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     if not order.outputs:
         patterns = [_usual(order)]
     with Kept(films, shell, resume=order.resume) as kept:
-        if kept.pattern is not None:
-            patterns.append(kept.pattern)
+        own = list(kept.patterns.values())
+        patterns += own
         files = {number: tuple(frame_file(path, number) for path in patterns) for number in numbers}
         others = [film.path for film in films]
         if order.stats is not None:
@@ -88,9 +89,9 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
                 shell.say(f"{film.path}: players are not told how it holds two pictures; choose it there")
         counted = _render_frames(order, scene, files, begun, kept, shell)
         rendered = time.perf_counter()
-        if kept.pattern is not None:
+        if films:
             shell.state = lambda: f"{films[0].path}: interrupted; all frames are kept; --resume continues"
-            kept.write([frame_file(kept.pattern, number) for number in numbers])
+            kept.write(list(numbers))
     shell.state = lambda: "clfractal: interrupted"
     # Imported only now: mistakes in the input are reported without waiting for NumPy.
     from clfractal.work.stats import sentence, write_statistics
@@ -98,10 +99,10 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     values = counted.statistics(1e3 * (time.perf_counter() - rendered))
     if order.stats is not None:
         write_statistics(order.stats, values)
-    named = [f"{files[numbers[0]][0]} to {files[numbers[-1]][0].name}"] if patterns[0] != kept.pattern else []
+    named = [f"{files[numbers[0]][0]} to {files[numbers[-1]][0].name}"] if patterns[0] not in own else []
     shell.say(f"{', '.join([*named, *(str(film.path) for film in films)])}: {counted.summary()}")
     left = [number for number in range(animation.count) if number not in numbers]
-    lacking = _missing(scene, [path for path in patterns if path != kept.pattern], left)
+    lacking = _missing(scene, [path for path in patterns if path not in own], left)
     if lacking:
         shell.say(f"{len(lacking)} frames of the film are missing: {shown_ranges(lacking)}")
     if shell.verbose:
@@ -183,7 +184,7 @@ def _render_on(
 
     def is_missing(job: Job) -> bool:
         number, paths = next(coming)
-        return not (order.resume and _is_there(job, paths, {kept.at(number): kept.bits}))
+        return not (order.resume and _is_there(job, paths, kept.at(number)))
 
     jobs = engine.in_order(
         map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
@@ -212,7 +213,7 @@ def _render_on(
                 shell,
                 resume=order.resume,
                 keep=each is None or each > _LONG_FRAME or _partial(paths).exists(),
-                bits={kept.at(number): kept.bits},
+                bits=kept.at(number),
             )
             counted.rendered(made.state.rays)
             counted.stats.add(number, job, made.state, wall_ms=made.wall_ms, write_ms=made.write_ms)
@@ -254,7 +255,7 @@ def _partial(paths: tuple[Path, ...]) -> Path:
     return paths[0].with_name(paths[0].name + PARTIAL)
 
 
-def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path | None, int]) -> bool:
+def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path, int]) -> bool:
     """Whether all files of a frame are there, whole, and stored as they are asked for.
 
     Args:
@@ -273,14 +274,18 @@ def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path | None, int]
         for path in paths
         for file in output_files(scene.stereo, path)
     }
+    for file in files:
+        if is_foreign(file):
+            raise FileError(f"is no picture, as its name says; {_ADVICE}", Where(str(file)))
     there = [file for file in files if is_whole(file)]
     wanted = job.header()["scene"]
     for file in there:
-        if read_scene_text(file) != wanted:
-            raise FileError(
-                "is a frame of another scene, or of other settings; remove it, or render without --resume",
-                Where(str(file)),
-            )
+        try:
+            text = read_scene_text(file)
+        except FileError as error:
+            raise FileError(f"{error.message}; {_ADVICE}", error.where) from error
+        if text != wanted:
+            raise FileError(f"is a frame of another scene, or of other settings; {_ADVICE}", Where(str(file)))
     components = 4 if scene.background == "transparent" else 3
     return len(there) == len(files) and all(
         file.suffix.lower() != ".png" or read_form(file) == (depth, components)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from clfractal.commands.film_parts import frame_file
 from clfractal.commands.order import PARTIAL
 from clfractal.commands.shell import Shell
 from clfractal.device.activity import doing
@@ -17,7 +18,7 @@ from clfractal.files.atomic import file_error
 if TYPE_CHECKING:
     from clfractal.files.moving import Plan
 
-_OWN = re.compile(r"\d{6,}\.png(\..*)?|\..*\.tmp", re.ASCII)
+_OWN = re.compile(r"\d{6,}(\.8)?\.png(\..*)?|\..*\.tmp", re.ASCII)
 
 
 class Kept:
@@ -42,18 +43,20 @@ class Kept:
             self._folder = first.with_name(first.name + PARTIAL)
 
     @property
-    def pattern(self) -> Path | None:
-        """The name of the frames, with # for their numbers."""
-        return self._folder / "######.png" if self._folder is not None else None
+    def patterns(self) -> Mapping[int, Path]:
+        """The names of the frames, with # for their numbers, by their bits.
 
-    @property
-    def bits(self) -> int:
-        """Bits of the kept frames: what the films need."""
-        return 16 if any(film.bits > 8 for film in self._films) else 8
+        A film of 8 bits has frames of its own: rounded from those of others it would not be what it is alone.
+        """
+        if self._folder is None:
+            return {}
+        kinds = sorted({16 if film.bits > 8 else 8 for film in self._films}, reverse=True)
+        names = ("######.png", "######.8.png")
+        return {bits: self._folder / name for bits, name in zip(kinds, names, strict=False)}
 
-    def at(self, number: int) -> Path | None:
-        """The file of a kept frame."""
-        return self._folder / f"{number:06d}.png" if self._folder is not None else None
+    def at(self, number: int) -> dict[Path, int]:
+        """The files of a kept frame, and the bits of each."""
+        return {frame_file(pattern, number): bits for bits, pattern in self.patterns.items()}
 
     def __enter__(self) -> Self:
         if self._folder is None:
@@ -82,8 +85,8 @@ class Kept:
             if not self._resume or file.name.startswith("."):  # what a kill has left of a frame in work
                 file.unlink()
 
-    def write(self, pictures: Sequence[Path]) -> None:
-        """Makes the films of the kept pictures, which are removed when all films are whole.
+    def write(self, numbers: Sequence[int]) -> None:
+        """Makes the films of the kept frames with these numbers, which are removed when all films are whole.
 
         Raises:
             FileError: a film cannot be written.
@@ -92,9 +95,11 @@ class Kept:
 
         for film in self._films:
             with doing(f"writing {film.path}"):
-                write_film(film, pictures)
-        for picture in pictures:
-            picture.unlink(missing_ok=True)
+                pattern = self.patterns[16 if film.bits > 8 else 8]
+                write_film(film, [frame_file(pattern, number) for number in numbers])
+        for number in numbers:
+            for picture in self.at(number):
+                picture.unlink(missing_ok=True)
 
     def _files(self) -> list[Path]:
         """What lies in the folder; FileError if something is no frame."""

@@ -42,7 +42,7 @@ def render_one(
     *,
     resume: bool = False,
     keep: bool = False,
-    bits: Mapping[Path | None, int] | None = None,
+    bits: Mapping[Path, int] | None = None,
 ) -> Made:
     """Renders one picture and writes its files.
 
@@ -77,7 +77,7 @@ def _save(
     stores: Sequence[TiledStore],
     paths: tuple[Path, ...],
     header: Mapping[str, Any],
-    bits: Mapping[Path | None, int],
+    bits: Mapping[Path, int],
 ) -> None:
     usual = tuple(path for path in paths if path not in bits)
     if usual:

@@ -67,7 +67,7 @@ class Plan:
     @property
     def stereo_mode(self) -> str | None:
         """What Matroska calls the arrangement of two pictures; None if the film is none, or holds one picture."""
-        if self.stereo not in MATROSKA or self.path.suffix.lower() != ".mkv":
+        if self.stereo is None or self.stereo not in MATROSKA or self.path.suffix.lower() != ".mkv":
             return None
         return MATROSKA[self.stereo][self.swap]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from clfractal.errors import FileError
@@ -11,10 +12,20 @@ from clfractal.files.atomic import file_error, open_regular
 _IEND = b"\0\0\0\0IEND\xaeB`\x82"
 _END_OF_JPEG = b"\xff\xd9"
 _TAIL = 12
+# How files begin, by their names' ends.
+_SIGNATURES: Mapping[str, bytes] = {
+    ".png": b"\x89PNG",
+    ".jpg": b"\xff\xd8\xff",
+    ".jpeg": b"\xff\xd8\xff",
+    ".webp": b"RIFF",
+    ".exr": b"\x76\x2f\x31\x01",
+}
 
 
 def is_whole(path: Path) -> bool:
-    """Whether a file is there and ends as its format says; other kinds than pictures need only be there.
+    """Whether a file is there, and begins and ends as its format says; other kinds than pictures need only be there.
+
+    Its name says which format that is: random bytes are no picture.
 
     Raises:
         FileError: it cannot be read.
@@ -29,16 +40,37 @@ def is_whole(path: Path) -> bool:
             tail = stream.read(_TAIL)
         except OSError as error:
             raise file_error(path, "cannot be read", error) from error
-    if start.startswith(b"\x89PNG"):
-        return tail == _IEND
-    if start.startswith(b"\xff\xd8\xff"):
-        return tail.endswith(_END_OF_JPEG)
-    if start.startswith(b"RIFF"):
-        # A chunk of an odd length is padded, and the length of the whole does not say so in all files.
-        return size - 8 - int.from_bytes(start[4:8], "little") in (0, 1)
-    if start.startswith(b"\x76\x2f\x31\x01"):
-        return _is_whole_exr(path)
-    return size > 0
+    kind = path.suffix.lower()
+    if kind not in _SIGNATURES:
+        return size > 0
+    if not start.startswith(_SIGNATURES[kind]):
+        return False
+    match kind:
+        case ".png":
+            return tail == _IEND
+        case ".jpg" | ".jpeg":
+            return tail.endswith(_END_OF_JPEG)
+        case ".webp":
+            # A chunk of an odd length is padded, and the length of the whole does not say so in all files.
+            return size - 8 - int.from_bytes(start[4:8], "little") in (0, 1)
+    return _is_whole_exr(path)
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file is there that was never such a picture, cut short or not, as its name says: notes, or random bytes.
+
+    Raises:
+        FileError: it cannot be read.
+    """
+    signature = _SIGNATURES.get(path.suffix.lower(), b"")
+    if not path.exists():
+        return False
+    with open_regular(path) as stream:
+        try:
+            start = stream.read(len(signature))
+        except OSError as error:
+            raise file_error(path, "cannot be read", error) from error
+    return not signature.startswith(start)
 
 
 def _is_whole_exr(path: Path) -> bool:

@@ -276,7 +276,10 @@ CASES = [
     ("output: {channels: [R, §Zed]}", "output.channels.1: unknown channel 'Zed'; did you mean 'Z'?"),
     ("output: {channels: [R, §R]}", "output.channels.1: channel 'R' is given twice"),
     ("output: {channels: §[]}", "output.channels: must not be empty"),
-    ("output: {precision: {§P: float}}", "output.precision: 'P' is a layer; name its channels, P.X, P.Y, P.Z"),
+    (
+        "output: {precision: {§P: float}}",
+        "output.precision: 'P' is a layer; name its channels, P.X, P.Y, P.Z",
+    ),
     ("output: {precision: {§Zed: half}}", "output.precision: unknown channel 'Zed'; did you mean 'Z'?"),
     ("output: {precision: {R: §quarter}}", "output.precision.R: must be half or float, got 'quarter'"),
     ("output: {png_bits: §12}", "output.png_bits: must be 8 or 16, got 12"),
