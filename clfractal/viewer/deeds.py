@@ -7,10 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from imgui_bundle import imgui
+
 from clfractal.device.select import choose, devices
 from clfractal.errors import ClfractalError
 from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
+from clfractal.viewer.panels import all_panels
 from clfractal.viewer.scene_deeds import SceneDeeds
 
 if TYPE_CHECKING:
@@ -130,9 +133,13 @@ class Deeds:
         }
 
     def cancel(self) -> None:
-        """Escape: ends what is under way, then closes what is open, then stops rendering."""
+        """Escape: closes a menu, ends what is under way, then closes what is open, then stops rendering."""
         viewer = self.viewer
-        if self.flying:
+        if all_panels.menu_is_open():
+            viewer.ui.memory[all_panels.CLOSE_MENU] = True
+        elif imgui.get_io().want_text_input:
+            return  # the field gives up what was typed
+        elif self.flying:
             self.fly()
         elif viewer.controls.cancel():
             return

@@ -11,7 +11,7 @@ from clfractal.errors import ClfractalError
 from clfractal.viewer import window
 from clfractal.viewer.deeds import HELD
 from clfractal.viewer.flying import Key
-from clfractal.viewer.keys import Context, KeyEvent
+from clfractal.viewer.keys import KEYS, PRINTABLE, Context, KeyEvent
 from clfractal.viewer.recording import Event, Player, Recorder, Recording
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ class Inputs:
         # Recordings count from the first picture on: what a pointer does depends on what is under it.
         self._start: float | None = None
         options = viewer.options
+        viewer.ui.keys.layout = window.layout(PRINTABLE)
         if recording is not None:
             self._player = Player(recording)
         if options.record is not None:
@@ -156,14 +157,18 @@ class Inputs:
 
     def _key(self, now: float, key: int, scancode: int, action: int, mods: int) -> None:
         viewer, io = self.viewer, imgui.get_io()
-        viewer.renderer.keyboard_callback(viewer.window.handle, key, scancode, action, mods)
+        name = window.key_name(key, scancode)
+        # Dear ImGui's own keys (Ctrl+A, Ctrl+C) are by what is printed, too.
+        typed = KEYS.get(name.upper(), key) if name is not None else key
+        viewer.renderer.keyboard_callback(viewer.window.handle, typed, scancode, action, mods)
         if action == RELEASE:
             held = self._held.pop(key, None)
             if held is not None:
                 viewer.motion.keys.discard(held)
             return
         context: Context = "text" if io.want_text_input else "fly" if viewer.deeds.flying else "picture"
-        event = KeyEvent(key, scancode, mods, window.key_name(key, scancode))
+        viewer.ui.keys.layout = layout = window.layout(PRINTABLE)
+        event = KeyEvent(key, scancode, mods, name, frozenset(map(str.lower, layout.values())))
         found = viewer.ui.keys.matches(event, context)
         if found is None:
             return

@@ -1,13 +1,15 @@
 """The table of keys: actions, the chords that call them, and which action an event of the keyboard means.
 
-Flying is by position: where W, A, S and D are on a US keyboard, whatever is printed there. Letters of other actions are by
-what is printed, so that Ctrl+Z is the key with a Z on it. All other keys (digits, signs, function keys) are by position.
+Flying is by position: where W, A, S and D are on a US keyboard, whatever is printed there. Letters, digits and signs of
+other actions are by what is printed, so that Ctrl+Z is the key with a Z on it. What a layout prints on no key of its own
+(digits of AZERTY, which want Shift; Latin letters of a Cyrillic one) is where a US keyboard has it. Keys with names have
+one place everywhere.
 """
 
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, TypeAlias
@@ -57,8 +59,12 @@ _MODIFIERS_BY_LOWER = {**{name.lower(): name for name in _MODIFIERS}, **_OTHER_M
 _CODES = {code: name for name, code in KEYS.items()}
 
 By: TypeAlias = Literal["position", "label"]
-NameOf: TypeAlias = Callable[[int], str | None]
-"""What the present keyboard layout prints on the key with a code, or None: GLFW's `get_key_name(code, 0)`."""
+Layout: TypeAlias = Mapping[int, str]
+"""What a keyboard layout prints on the keys that have one character, by their codes."""
+Found: TypeAlias = Literal["position", "label", "place"]
+"""How an event was found to be a chord: by its position, its label, or the place of a label that is printed nowhere."""
+PRINTABLE = tuple(code for name, code in KEYS.items() if len(name) == 1)
+"""The codes of keys that have a character printed on them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,12 +76,14 @@ class KeyEvent:
         scancode: the system's number of the key.
         mods: GLFW's bits of the modifiers.
         name: what the keyboard layout prints on the key (`get_key_name`), or None.
+        printed: all that the layout prints on keys, in lower case.
     """
 
     key: int
     scancode: int = 0
     mods: int = 0
     name: str | None = None
+    printed: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +101,7 @@ class Chord:
 
     @classmethod
     def parse(cls, text: str) -> Chord:
-        """Reads `F1`, `Ctrl+Shift+Z`, `Alt+,`; `Pos:W` is a letter's position, `Label:-` a sign by its print.
+        """Reads `F1`, `Ctrl+Shift+Z`, `Alt+,`; `Pos:W` is where a US keyboard has a W.
 
         Raises:
             ClfractalError: unknown key or modifier, or none.
@@ -119,43 +127,43 @@ class Chord:
             raise ClfractalError(f"{unknown_name('key', wanted, KEYS)} in {text[:40]!r}")
         if way == "label" and len(found) > 1:
             raise ClfractalError(f"{found} has no label; write it without Label: in {text[:40]!r}")
-        return cls(found, mods, way or ("label" if found in string.ascii_uppercase else "position"))
+        return cls(found, mods, way or ("label" if len(found) == 1 else "position"))
 
     @property
     def text(self) -> str:
         """As `parse` reads it."""
         return self._with_modifiers(f"{self._prefix}{self.key}")
 
-    def shown(self, name_of: NameOf | None = None) -> str:
-        """As people read it; with `name_of`, keys by position have what is printed there."""
-        if self.by == "position" and name_of is not None and len(self.key) == 1:
-            printed = name_of(KEYS[self.key])
-            if printed and len(printed) == 1:
+    def shown(self, layout: Layout | None = None) -> str:
+        """As people read it; on a `layout` positions, and signs that it prints nowhere, have what is printed there."""
+        if layout is not None and len(self.key) == 1 and self.key in KEYS:
+            nowhere = self.key in _SIGNS and self.key not in layout.values()
+            printed = layout.get(KEYS[self.key], "") if self.by == "position" or nowhere else ""
+            if len(printed) == 1:
                 return self._with_modifiers(printed.upper() if len(printed.upper()) == 1 else printed)
         words = {"PageUp": "Page Up", "PageDown": "Page Down"}
         key = words.get(self.key, f"Num {self.key[3:]}" if self.key.startswith("Num") else self.key)
         return self._with_modifiers(key)
 
-    def means(self, event: KeyEvent, *, any_shift: bool = False) -> bool:
-        """Whether an event is this chord; `any_shift`: with or without Shift.
-
-        A label that is no ASCII character (of a Cyrillic layout) is taken for a US keyboard's at its place.
-        """
+    def means(self, event: KeyEvent, *, any_shift: bool = False) -> Found | None:
+        """How an event is this chord; None if it is not. `any_shift`: with or without Shift."""
         ignored = SHIFT if any_shift else 0
         if (event.mods & _USED_MODIFIERS & ~ignored) != (self.mods & ~ignored):
-            return False
-        if self.by == "label":
-            name = event.name
-            if name and (name.isascii() or not self.key.isascii()):
-                return name.upper() == self.key or name == self.key
-        return self.key in KEYS and event.key == KEYS[self.key]
+            return None
+        at_its_place = self.key in KEYS and event.key == KEYS[self.key]
+        if self.by == "position":
+            return "position" if at_its_place else None
+        name = event.name or ""
+        if self.key in (name, name.upper()):
+            return "label"
+        return "place" if at_its_place and self.key.lower() not in event.printed else None
 
     def _with_modifiers(self, key: str) -> str:
         return "+".join([*(name for name, bit in _MODIFIERS.items() if self.mods & bit), key])
 
     @property
     def _prefix(self) -> str:
-        usual: By = "label" if self.key in string.ascii_uppercase or self.key not in KEYS else "position"
+        usual: By = "label" if len(self.key) == 1 else "position"
         return "" if self.by == usual else {"position": "Pos:", "label": "Label:"}[self.by]
 
 
@@ -164,9 +172,13 @@ class KeyMap:
 
     Args:
         chords: action name to its chords; an action that is not named has none.
+
+    Attributes:
+        layout: of the keyboard, for what people read; None: as on a US keyboard.
     """
 
     def __init__(self, chords: Mapping[str, Sequence[Chord]]) -> None:
+        self.layout: Layout | None = None
         self._chords = {action.name: tuple(chords.get(action.name, ())) for action in ACTIONS.values()}
 
     @classmethod
@@ -214,11 +226,12 @@ class KeyMap:
 
     def matches(self, event: KeyEvent, context: Context = "picture") -> Action | None:
         """The action that a key means in a context, or None; a position wins over a letter that is printed there."""
-        for by in ("position", "label"):
-            for action, chord in self._all(context):
-                if chord.by == by and chord.means(event, any_shift=action.held):
-                    return action
-        return None
+        found = {
+            chord.means(event, any_shift=action.held): action
+            for action, chord in reversed([*self._all(context)])
+        }
+        ways: tuple[Found, ...] = ("position", "label", "place")
+        return next((found[way] for way in ways if way in found), None)
 
     def conflicts(self) -> Iterator[tuple[str, str, Chord]]:
         """Pairs of actions with the same chord in a context that they share, on a US keyboard."""
@@ -230,18 +243,18 @@ class KeyMap:
                     if other != action.name:
                         yield other, action.name, chord
 
-    def help_rows(self, name_of: NameOf | None = None) -> list[tuple[str, str, str]]:
+    def help_rows(self) -> list[tuple[str, str, str]]:
         """(group, keys, help) for the overlay of keys, in the table's order; actions with the same help are one row."""
         rows = []
         for (group, told), actions in groupby(ACTIONS.values(), lambda action: (action.group, action.help)):
-            each = [[chord.shown(name_of) for chord in self._chords[action.name]] for action in actions]
+            each = [[chord.shown(self.layout) for chord in self._chords[action.name]] for action in actions]
             if any(each):
                 rows.append((group, _keys_text([texts for texts in each if texts]), told))
         return rows
 
-    def hint(self, name: str, name_of: NameOf | None = None) -> str:
+    def hint(self, name: str) -> str:
         """The first chord of an action, for menus and buttons; empty if it has none."""
-        return next((chord.shown(name_of) for chord in self._chords[name]), "")
+        return next((chord.shown(self.layout) for chord in self._chords[name]), "")
 
     def _all(self, context: Context) -> Iterator[tuple[Action, Chord]]:
         for name, chords in self._chords.items():
@@ -263,4 +276,4 @@ def key_name(code: int) -> str | None:
     return _CODES.get(code)
 
 
-__all__ = ["ACTIONS", "KEYS", "Action", "Chord", "Context", "KeyEvent", "KeyMap", "key_name"]
+__all__ = ["ACTIONS", "KEYS", "Action", "Chord", "Context", "KeyEvent", "KeyMap", "Layout", "key_name"]

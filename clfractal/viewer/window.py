@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -392,6 +392,12 @@ def key_name(key: int, scancode: int) -> str | None:
     """The letter that the present keyboard layout has on a key."""
     name = glfw.get_key_name(key, scancode)
     return _text(name) if name else None
+
+
+def layout(codes: Iterable[int]) -> dict[int, str]:
+    """What the present keyboard layout prints on keys with these codes, as far as it is one character."""
+    names = {code: key_name(code, 0) for code in codes}
+    return {code: name for code, name in names.items() if name is not None and len(name) == 1}
 
 
 class Pads:

@@ -300,6 +300,20 @@ def test_numbers_are_typed_after_a_click(way: str) -> None:
     assert stage.ui.studio.scene.material.diffuse == 0.9
 
 
+@pytest.mark.parametrize(
+    ("text", "told"), [("12 apples", "'12 apples' is no number"), ("", "a number is missing")]
+)
+def test_what_is_no_number_is_told_below_its_field(text: str, told: str) -> None:
+    stage = stage_of("camera.fov")
+    before = stage.ui.studio.value("camera.fov")
+    stage.click(*BOX)
+    stage.press(imgui.Key.backspace)  # all of it was selected
+    stage.type(text)
+    stage.press(imgui.Key.enter)
+    assert stage.ui.studio.value("camera.fov") == before
+    assert stage.ui.studio.problems == {"camera.fov": told}
+
+
 def test_escape_takes_back_what_was_typed() -> None:
     stage = stage_of("material.diffuse")
     stage.click(*BOX)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from tests.window.driver import Window, wait_for
 from tests.window.scenes import SPHERE
 
 # Where W and Q are on a keyboard of any layout, as X numbers places.
-PLACE_W, PLACE_A = "25", "38"
+PLACE_W, PLACE_A, PLACE_6 = "25", "38", "15"
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +80,14 @@ def test_keys_of_flight_are_places(window: Window, french: None) -> None:
     window.keys(f"ctrl+{PLACE_W}")
     window.still()
     assert window.scene().output.exposure != lighter.output.exposure
+
+
+def test_signs_of_this_layout(window: Window, french: None) -> None:
+    """A French keyboard has its minus where a US one has the 6."""
+    window.still()
+    window.keys(PLACE_6)
+    window.still()
+    assert window.scene().output.exposure == -0.25
 
 
 @pytest.mark.parametrize(
@@ -175,3 +184,20 @@ def test_bookmarks_are_kept_in_the_scene(window: Window) -> None:
     window.keys("ctrl+1")
     window.still()
     assert np.allclose(window.scene().camera.position, camera.position, atol=1e-9)
+
+
+def test_escape_closes_a_menu_and_a_text_alone(display: Display, folder: Path) -> None:
+    """The list of formulas, and a number that is typed: the picture goes on, and says nothing."""
+    (folder / "s.yaml").write_text(SPHERE)
+    with Window(display, folder, "s.yaml", "--size", "900x500") as opened:
+        rest = (700, 250)
+        opened.move(*rest)
+        plain = opened.still(2.0)
+        for place in ((130, 86), (210, 114)):
+            opened.click(*place)
+            opened.move(*rest)
+            assert (opened.still() != plain).any()
+            opened.keys("Escape")
+            wait_for(lambda: np.array_equal(opened.pixels(), plain), "the picture of before")
+        opened.keys("Escape")
+        wait_for(lambda: not np.array_equal(opened.pixels(), plain), "the line that gathering has stopped")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from imgui_bundle import imgui
+
 from clfractal.viewer.panels import (
     dialogs,
     gallery,
     help,
     history,
+    layout,
     menu,
     messages,
     overlay,
@@ -21,6 +24,8 @@ from clfractal.viewer.panels.ui import Ui
 
 def draw(ui: Ui) -> None:
     """Draws the panels of one frame, between `imgui.new_frame` and `imgui.render`."""
+    if ui.memory.pop(CLOSE_MENU, False):
+        imgui.internal.close_popup_to_level(0, True)
     overlay.draw(ui)
     scene_dock.draw(ui)
     timeline.draw(ui)
@@ -33,3 +38,16 @@ def draw(ui: Ui) -> None:
     help.draw(ui)
     dialogs.draw(ui)
     messages.draw(ui)
+    boxes = layout.boxes(ui)
+    if boxes.refused:  # by a box whose panel has no place for it
+        ui.studio.tell(boxes.refused, wrong=True)
+        boxes.refused = ""
+
+
+CLOSE_MENU = "menu.close"
+"""In `Ui.memory`: the menu, list or colour picker that is open is to be closed."""
+
+
+def menu_is_open() -> bool:
+    """Whether a menu, a list or a colour picker is open over the panels."""
+    return bool(imgui.is_popup_open("", imgui.PopupFlags_.any_popup))

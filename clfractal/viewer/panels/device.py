@@ -100,7 +100,12 @@ def _setting(ui: Ui, name: str, label: str, scale: w.Scale) -> None:
     if width is None:
         return
     change = w.number_box(w.boxes(ui), f"settings.{name}", float(current), width, scale)
-    if change.value is not None:
+    low, high = scale.low, scale.high
+    if change.value is not None and not (low is None or low <= change.value) & (
+        high is None or change.value <= high
+    ):
+        w.boxes(ui).refused = f"must be {low:g} to {high:g}, got {change.value:g}"
+    elif change.value is not None:
         _change(ui, name, int(change.value) if scale.whole else change.value)
 
 

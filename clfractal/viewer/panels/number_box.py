@@ -80,6 +80,7 @@ class Boxes:
         travel: of the drag, points of normal speed.
         moved: whether the pointer has moved in this drag.
         all_selected: whether the whole text is to be selected, as a double click on a box asks for.
+        refused: why what was typed last is no number; empty once somebody has told it.
     """
 
     typing: str = ""
@@ -90,6 +91,7 @@ class Boxes:
     travel: float = 0.0
     moved: bool = False
     all_selected: bool = False
+    refused: str = ""
 
 
 def number_box(
@@ -262,8 +264,12 @@ def _typed(boxes: Boxes, name: str, width: float, scale: Scale) -> Change:
     boxes.wants_next = tab
     if imgui.is_key_pressed(imgui.Key.escape):
         return NOTHING
-    found = typed_number(boxes.text.replace("\t", ""), scale)
-    return NOTHING if found is None else Change(found)
+    text = boxes.text.replace("\t", "").strip()
+    found = typed_number(text, scale)
+    if found is None:
+        boxes.refused = f"{text[:40]!r} is no number" if text else "a number is missing"
+        return NOTHING
+    return Change(found)
 
 
 def _draw(

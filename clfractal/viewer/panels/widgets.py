@@ -99,6 +99,8 @@ def apply(ui: Ui, path: str, change: Change, make: Callable[[float], Any] = lamb
     """Does what a number box returned to the value at a path; `make` turns the number into the value."""
     if change.value is not None:
         ui.studio.edit({path: make(change.value)}, path if change.dragging else None)
+    if boxes(ui).refused:
+        ui.studio.problems[path], boxes(ui).refused = boxes(ui).refused, ""
     if change.ended:
         ui.studio.end_gesture()
 
