@@ -11,6 +11,7 @@ from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane
 from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer.picking import Pick
+from clfractal.viewer.sight import sight_in
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +28,7 @@ class Aim:
         point: in space, under the pointer; None where nothing is.
         view: what the eye between both eyes sees.
         scale: pixels of the view's picture for a pixel of the window, across and down.
+        pivot: what orbits turn about: the point under the pointer, else what is at the picture's middle.
     """
 
     camera_path: str
@@ -39,6 +41,7 @@ class Aim:
     point: tuple[float, float, float] | None
     view: View
     scale: tuple[float, float]
+    pivot: tuple[float, float, float]
 
     @property
     def camera(self) -> PerspectiveCamera | OrthographicCamera:
@@ -81,4 +84,12 @@ def aimed(scene: Scene, pick: Pick) -> Aim:
         pick.point,
         middle,
         (1.0, 1.0),
+        _pivot(seen, pick),
     )
+
+
+def _pivot(scene: Scene, pick: Pick) -> tuple[float, float, float]:
+    if pick.point is not None or pick.depths is None or isinstance(scene.renderer, CutPlaneRenderer):
+        return pick.point or scene.camera.target
+    x, y, z = sight_in(scene, pick.view, pick.depths).pivot().tolist()
+    return x, y, z

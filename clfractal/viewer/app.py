@@ -318,8 +318,8 @@ class Viewer:
             self.use_device(choose(others[0].index))
 
     def aim(self) -> Aim | None:
-        """What is under the pointer; else under the middle of the picture."""
-        found = self.aim_at(*self.inputs.pointer)
+        """What is under the pointer; else, or where a panel is there, under the middle of the picture."""
+        found = None if imgui.get_io().want_capture_mouse else self.aim_at(*self.inputs.pointer)
         if found is not None:
             return found
         width, height = self.window.framebuffer

@@ -209,11 +209,10 @@ class Controls:
 
     def _orbit(self, drag: Drag, dx: float, dy: float) -> None:
         aim, faster = drag.aim, self.settings.mouse
-        pivot = aim.point if aim.point is not None else aim.camera.target
         style = self.settings.orbit
         vertical = self.studio.saved.camera.up if style == "turntable" else None
         camera = navigation.orbit(
-            drag.before, pivot, dx * faster, dy * faster, aim.size, style, vertical=vertical
+            drag.before, aim.pivot, dx * faster, dy * faster, aim.size, style, vertical=vertical
         )
         self._set_camera(aim, camera, "orbit")
 

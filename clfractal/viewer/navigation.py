@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from clfractal.optics.view import View, camera_view
 from clfractal.scene.parts import AnyCamera, OrthographicCamera
-from clfractal.viewer.pointer import Floats, Size, point_at, project, ray_at
+from clfractal.viewer.pointer import Size, point_at, project, ray_at
 from clfractal.viewer.pose import C, Style, pose_of, rotation, stood, turned_about, turning
 from clfractal.viewer.standard_views import axis_view, frame_all, to_orthographic, to_perspective
 from clfractal.viewer.transition import interpolated
@@ -27,7 +27,6 @@ __all__ = [
     "levelled",
     "orbit",
     "pan",
-    "pivot_under",
     "point_at",
     "project",
     "ray_at",
@@ -51,15 +50,6 @@ def used_depth(camera: AnyCamera, depth: float, view: View | None = None) -> flo
     if view is not None and view.eye is not None:
         return float((view.center - view.origin) @ view.axis)
     return pose_of(camera).distance
-
-
-def pivot_under(
-    camera: AnyCamera, x: float, y: float, size: Size, depth: float, *, view: View | None = None
-) -> Floats:
-    """The point to turn about: the one under the pointer, or the target where there is nothing."""
-    if isfinite(depth) and depth > 0:
-        return point_at(view or camera_view(camera, *size), x, y, size, depth)
-    return np.array(camera.target, float)
 
 
 @np.errstate(all="ignore")

@@ -8,6 +8,7 @@ import numpy as np
 
 from clfractal.optics.view import View
 from clfractal.pictures.modes import eye_at
+from clfractal.pictures.tiled import Floats
 from clfractal.renderers.plan import PlannedView
 from clfractal.viewer.display import Shown
 
@@ -23,6 +24,7 @@ class Pick:
         size: of that picture, pixels.
         depth: along the view axis, scene units; infinite where nothing was hit.
         point: in space, scene units, shape (3,); None where nothing was hit.
+        depths: of all that the view shows, in the pixels of its plan; None: unknown.
     """
 
     view: PlannedView
@@ -32,6 +34,7 @@ class Pick:
     size: tuple[int, int]
     depth: float
     point: tuple[float, float, float] | None
+    depths: Floats | None = None
 
 
 def picked(shown: Shown, x: float, y: float) -> Pick | None:
@@ -63,5 +66,5 @@ def picked(shown: Shown, x: float, y: float) -> Pick | None:
         if np.isfinite(depth):
             near = camera.points_at([column], [row], image, [depth])[0]
             point = (float(near[0]), float(near[1]), float(near[2]))
-        return Pick(view, camera, column, row, image, depth, point)
+        return Pick(view, camera, column, row, image, depth, point, depths)
     return None

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from clfractal.errors import ClfractalError
+from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
@@ -65,6 +66,7 @@ class SceneDeeds:
         self.first_stereo: Callable[[Mode], dict[str, Any]] = lambda mode: {}
         self._perspective: PerspectiveCamera | None = None
         self._kept: dict[str, Any] | None = None
+        self._pivot: Vector | None = None
         self.deeds: dict[str, Callable[[], None]] = {
             **self._cameras(),
             **self._planes(),
@@ -160,7 +162,11 @@ class SceneDeeds:
         size = self.studio.viewport
         style = self.settings.orbit
         vertical = self.studio.saved.camera.up if style == "turntable" else None
-        self._camera(navigation.orbit(camera, camera.target, -dx, -dy, size, style, vertical=vertical))
+        aim = None if self.motion.active else self.aim()
+        if aim is not None and aim.camera_path == "camera":
+            self._pivot = aim.pivot  # while the camera moves, steps that follow are about the same point
+        pivot = self._pivot or camera.target
+        self._camera(navigation.orbit(camera, pivot, -dx, -dy, size, style, vertical=vertical))
 
     def _pan(self, dx: float, dy: float) -> None:
         self._camera(navigation.pan(self.motion.target, -dx, -dy, self.studio.viewport, math.inf))

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import View, scene_view
+from clfractal.renderers.plan import PlannedView
 from clfractal.scene.model import Scene
 from clfractal.scene.stance import Extent
 from clfractal.viewer.display import Shown
@@ -206,21 +207,31 @@ class Sight:
 
 
 def sight_of(scene: Scene, shown: Shown | None, free: Area = (0.0, 0.0, 1.0, 1.0)) -> Sight:
-    """What is seen of a scene.
+    """What is seen of a scene; of several views, in the first that shows it in space.
 
     Args:
         shown: the newest picture; None: there is none yet.
         free: the part that no panel covers, as parts of the picture's width and height.
     """
-    view, size = scene_view(scene), _size(scene)
-    depths, divider = None, 1
-    if shown is not None:
-        views = shown.frame.views
-        number = next((n for n, each in enumerate(views) if each.scene.renderer.type != "cut_plane"), 0)
-        planned, depths = views[number], shown.depths[number].astype(np.float64)
-        view, size, divider = planned.camera, _size(planned.scene), planned.plan.divider
-    area = (free[0] * size[0], free[1] * size[1], free[2] * size[0], free[3] * size[1])
-    return Sight(view, size, depths, area, scene.extent, divider)
+    if shown is None:
+        size = _size(scene)
+        return Sight(scene_view(scene), size, None, _part(free, size), scene.extent)
+    views = shown.frame.views
+    number = next((n for n, each in enumerate(views) if each.scene.renderer.type != "cut_plane"), 0)
+    return sight_in(scene, views[number], shown.depths[number], free)
+
+
+def sight_in(
+    scene: Scene, view: PlannedView, depths: npt.NDArray[np.float32], free: Area = (0.0, 0.0, 1.0, 1.0)
+) -> Sight:
+    """What one view of a picture shows; see `sight_of`."""
+    size = _size(view.scene)
+    known = depths.astype(np.float64)
+    return Sight(view.camera, size, known, _part(free, size), scene.extent, view.plan.divider)
+
+
+def _part(free: Area, size: Size) -> Area:
+    return free[0] * size[0], free[1] * size[1], free[2] * size[0], free[3] * size[1]
 
 
 def _size(scene: Scene) -> Size:

@@ -108,13 +108,51 @@ def test_orbiting_keeps_the_distance_to_the_pivot(place: tuple[float, float], ha
     aim = hand.aim(*place)
     assert aim is not None
     before = hand.studio.scene.camera
-    pivot = np.array(aim.point if aim.point is not None else before.target)
+    pivot = np.array(aim.pivot)
     hand.drag(LEFT, place, (place[0] + 30, place[1] + 12))
     after = hand.studio.scene.camera
     assert after.position != before.position
     distances = [np.linalg.norm(np.array(camera.position) - pivot) for camera in (before, after)]
     assert distances[0] == pytest.approx(distances[1], rel=1e-6)
     assert hand.studio.history.depth("camera") == (1, 0)
+
+
+# Targets far behind the body, before it, and beside it, as flights leave them.
+_FLOWN = [
+    ("camera={position: [0, -4, 0], target: [0, 60, 0]}",),
+    ("camera={position: [0, -4, 0], target: [0, -3.9, 0]}",),
+    ("camera={position: [0, -4, 0], target: [-2.2, 6, 0]}",),
+    ("camera={projection: orthographic, position: [0.9, -4, 0], target: [0.9, 60, 0], height: 4}",),
+]
+
+
+@pytest.mark.parametrize("hand", _FLOWN, ids=["behind", "before", "beside", "flat"], indirect=True)
+@pytest.mark.parametrize("way", [(1, 0), (0, 1)])
+def test_a_drag_beside_the_body_keeps_it_in_view(way: tuple[int, int], hand: Hand) -> None:
+    place = (3.0, 3.0)
+    aim = hand.aim(*place)
+    assert aim is not None
+    assert aim.point is None
+    size, whole = np.array(VIEW), min(VIEW)  # a drag over the smaller side turns by half a turn
+    for share in (0.25, 0.5, 0.75, 1.0, 1.5):
+        end = place[0] + share * whole * way[0], place[1] + share * whole * way[1]
+        hand.drag(LEFT, place, end)
+        x, y, depth = project(scene_view(hand.studio.shown_scene), np.zeros(3), VIEW)
+        assert depth > 0
+        assert np.all((np.array([x, y]) > 0.04 * size) & (np.array([x, y]) < 0.96 * size)), share
+        hand.studio.undo("camera")
+
+
+def test_beside_the_body_one_turns_about_what_the_middle_of_the_picture_shows(hand: Hand) -> None:
+    middle, aside = hand.aim(VIEW[0] / 2, VIEW[1] / 2), hand.aim(3.0, 3.0)
+    assert middle is not None
+    assert aside is not None
+    assert middle.point is not None
+    assert aside.point is None
+    assert aside.pivot == pytest.approx(middle.point, abs=0.05)
+    assert np.linalg.norm(np.subtract(aside.pivot, hand.studio.scene.camera.target)) > 0.5
+    hand.drag(LEFT, (3.0, 3.0), (40.0, 10.0))
+    assert hand.at(aside.pivot) == pytest.approx((VIEW[0] / 2, VIEW[1] / 2), abs=0.1)
 
 
 @pytest.mark.parametrize("steps", [3.0, -2.0])
