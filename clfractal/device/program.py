@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
@@ -97,10 +98,7 @@ def build(
         Stopped: `stopped` answered True.
     """
     start = time.perf_counter()
-    if cannot_run_optimised_code(device.info):
-        text, flags = "#define INTERPRETED\n" + text, [*flags, "-cl-opt-disable"]
-    if loses_copies_when_unrolling(device.info):
-        text = "#define COUNTS_AT_RUN_TIME\n" + text
+    text, flags = _as_compiled(device, text, flags)
     key = _key(device, text, flags, warm)
     program = device.loaded.get(key)
     if program is not None:
@@ -116,6 +114,22 @@ def build(
             raise build_error(str(failure), text, sources or SourceMap(), device.info.name) from None
     device.loaded.keep(key, program)
     return Program(device, program, _milliseconds(start), cached=cached)
+
+
+def loaded(device: Device, text: str, *, flags: Sequence[str], warm: Sequence[Warm] = ()) -> Program | None:
+    """The program of a text, as `build` gives it, if it is loaded already; else None."""
+    start = time.perf_counter()
+    program = device.loaded.get(_key(device, *_as_compiled(device, text, flags), warm))
+    return None if program is None else Program(device, program, _milliseconds(start), cached=True)
+
+
+def _as_compiled(device: Device, text: str, flags: Sequence[str]) -> tuple[str, Sequence[str]]:
+    """The text and the flags that a device's compiler is given."""
+    if cannot_run_optimised_code(device.info):
+        text, flags = "#define INTERPRETED\n" + text, [*flags, "-cl-opt-disable"]
+    if loses_copies_when_unrolling(device.info):
+        text = "#define COUNTS_AT_RUN_TIME\n" + text
+    return text, flags
 
 
 def _check_file_sizes() -> None:
@@ -243,8 +257,13 @@ def _key(device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]) 
     # Of the first launches only what the driver generates code for: its arguments' values change from scene to
     # scene.
     launches = [(launch.kernel, launch.local_size) for launch in warm]
-    digest = hashlib.sha256(text.encode()).hexdigest()
-    return cache.key_of(_FORMAT, device.info.key, list(flags), launches, digest)
+    return cache.key_of(_FORMAT, device.info.key, list(flags), launches, _digest(text))
+
+
+@lru_cache(maxsize=64)
+def _digest(text: str) -> str:
+    """Of the texts that `source.flatten` keeps, too: they are asked for picture after picture."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _milliseconds(start: float) -> float:

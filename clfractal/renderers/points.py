@@ -12,6 +12,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.cancel import CancelToken
+from clfractal.device.kernels import Lease
 from clfractal.device.launch import Pace, Part, in_launches, wait_for_copy
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
@@ -147,7 +148,8 @@ def _run(
     """Runs one of the kernels of `points.cl`; its planes go into `result`, shape (planes, n)."""
     text = program_text(body, lanes, precision)
     built = program.build(device, text.text, flags=program.math_flags(precision), sources=text.sources)
-    kernel = built.kernel(kernel_name)
+    lease = Lease(device, [(built, (kernel_name,))])
+    kernel = lease.kernel(kernel_name)
     orbit = Watched(device, body.records(precision))
     constants, sent = _upload(device, body.constants(precision))
     planes, place = len(result), 0

@@ -12,6 +12,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
+from clfractal.device.kernels import Lease
 from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
@@ -61,12 +62,13 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """A program's kernel, and how it is launched."""
+    """A program's kernel, which is this object's as long as it is kept, and how it is launched."""
 
     kernel: cl.Kernel
     items: int
     group: tuple[int, int]
     build_ms: float
+    lease: Lease
 
 
 def build_all(
@@ -106,7 +108,8 @@ def build_all(
             on_compile=announce,
             stopped=nobody_waits,
         )
-        return Built(built.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms)
+        lease = Lease(device, [(built, (recipe.kernel,))])
+        return Built(lease.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms, lease)
 
     if len(recipes) == 1:
         return [build(recipes[0])]

@@ -14,6 +14,7 @@ import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
+from clfractal.device.kernels import Lease
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device, is_simulator
 from clfractal.device.watched import Watched, is_watched
@@ -23,7 +24,7 @@ from clfractal.renderers.mattes import told
 from clfractal.renderers.passes import STATISTICS, kept_numbers
 from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Resources
-from clfractal.work.stages import CAPACITY, Kernels, Span, Stages, Wave, group_of, number_count, wave_of
+from clfractal.work.stages import CAPACITY, Span, Stages, Wave, group_of, number_count, wave_of
 
 TILE_PIXELS = TILE * TILE
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
@@ -98,7 +99,7 @@ class Drawing:
         self.wave = Wave(0, 0, [])
         self.build_ms = 0.0
         self.pace = Pace(1.0)
-        self._kernels: Kernels | None = None
+        self._kernels: Lease | None = None
         self._stages: Stages | None = None
         self._programs: list[program.Program] = []
         self._texts: list[ProgramText] = []
@@ -149,8 +150,8 @@ class Drawing:
         self._kept_count = len(kept_numbers(plan, view.scene.renderer))
         self._kept_width = np.dtype(kernel.precision).itemsize
         if other or self._kernels is None:
-            named = list(zip(self._texts, built, strict=True))
-            self._kernels = Kernels(self.device, named, number_count(kernel))
+            named = [(made, text.kernels) for text, made in zip(self._texts, built, strict=True)]
+            self._kernels = Lease(self.device, named, 2 + number_count(kernel))
         self._stages = Stages(self.device, kernel, self.wave, self.group, self._kernels)
 
     @property
@@ -230,13 +231,23 @@ class Drawing:
         if self._programs and texts == self._texts and flags == self._flags:
             return self._programs
 
-        def build(text: ProgramText) -> program.Program:
+        warm = [[self._warm(kernel, name, sizes) for name in text.kernels] for text in texts]
+        loaded = [
+            program.loaded(self.device, text.flat.text, flags=flags, warm=launches)
+            for text, launches in zip(texts, warm, strict=True)
+        ]
+        found = [each for each in loaded if each is not None]
+        if len(found) == len(texts):
+            self._texts, self._flags = texts, flags
+            return found
+
+        def build(text: ProgramText, launches: list[Warm]) -> program.Program:
             return program.build(
                 self.device,
                 text.flat.text,
                 flags=flags,
                 sources=text.flat.sources,
-                warm=[self._warm(kernel, name, sizes) for name in text.kernels],
+                warm=launches,
                 on_compile=resources.on_compile,
                 stopped=lambda: ended.is_set() or (resources.token is not None and resources.token()),
             )
@@ -247,9 +258,12 @@ class Drawing:
         try:
             # Oclgrind's checks of memory are lost with the thread that they began in.
             if is_simulator(self.device.info):
-                built = [build(text) for text in texts]
+                built = list(map(build, texts, warm))
             else:
-                built = [each.result() for each in [pool.submit(build, text) for text in texts]]
+                built = [
+                    each.result()
+                    for each in [pool.submit(build, *each) for each in zip(texts, warm, strict=True)]
+                ]
         except BaseException:
             ended.set()
             raise

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from clfractal.device import program
-from clfractal.device.groups import fitting
+from clfractal.device.kernels import Lease
 from clfractal.device.select import Device
 from clfractal.pictures.tiles import TILE
 from clfractal.renderers.kernel import (
@@ -19,7 +18,6 @@ from clfractal.renderers.kernel import (
     STAGE_NUMBERS,
     STATE_PADDING,
     WAVE_NUMBERS,
-    ProgramText,
     Stage,
     TileKernel,
 )
@@ -97,41 +95,10 @@ def group_of(stage: Stage, lanes: int, group: int) -> tuple[int, ...]:
     return (group, 1) if stage.over == "pixels" else (group,)
 
 
-class Kernels:
-    """The kernels of some programs, for as long as these stay: pyopencl takes a millisecond to make one ready.
-
-    Args:
-        device: where.
-        built: the programs, and their texts.
-        numbers: how many numbers a launch sets, see `number_count`.
-    """
-
-    def __init__(
-        self, device: Device, built: Sequence[tuple[ProgramText, program.Program]], numbers: int
-    ) -> None:
-        self.device = device
-        self._kernels = {name: made.kernel(name) for text, made in built for name in text.kernels}
-        for kernel in self._kernels.values():
-            # With the types known all are set in the time that one takes without.
-            count = 2 + numbers
-            kernel.set_scalar_arg_dtypes([None] * (kernel.num_args - count) + [np.int32] * count)
-        self._groups: dict[tuple[str, tuple[int, ...]], tuple[int, ...]] = {}
-
-    def kernel(self, name: str) -> cl.Kernel:
-        """One of them."""
-        return self._kernels[name]
-
-    def group(self, name: str, wanted: tuple[int, ...]) -> tuple[int, ...]:
-        """The size of its work-groups: as is wanted, if the device can have them."""
-        if (name, wanted) not in self._groups:
-            self._groups[name, wanted] = fitting(self.device, self._kernels[name], wanted)
-        return self._groups[name, wanted]
-
-
 class Stages:
     """The kernels of a view, ready to be launched."""
 
-    def __init__(self, device: Device, kernel: TileKernel, wave: Wave, group: int, kernels: Kernels) -> None:
+    def __init__(self, device: Device, kernel: TileKernel, wave: Wave, group: int, kernels: Lease) -> None:
         self.device, self.kernel, self.wave, self.group = device, kernel, wave, group
         self._kernels = kernels
         self._stages: dict[tuple[int, int], list[Stage]] = {}

@@ -323,6 +323,7 @@ def test_flags_follow_the_number_type_where_the_text_does_not(
         return build(*arguments, **settings)
 
     monkeypatch.setattr(program, "build", noted)
+    monkeypatch.setattr(program, "loaded", lambda *_, **__: None)
     with Engine(device) as engine:
         for precision in ("float32", "float64", "float64"):
             engine.render(changed(VOLUME), precision=precision)
