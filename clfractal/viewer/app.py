@@ -434,6 +434,7 @@ class Viewer:
             size,
             scale,
             lights="lights" in self.ui.show,
+            depths=self.surface.shown.depths[0] if self.surface.shown is not None else None,
         )
 
     def _redraw_while_busy(self) -> None:

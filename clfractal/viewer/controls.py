@@ -165,13 +165,15 @@ class Controls:
         if getattr(camera, "f_number", 1) is None:
             self.studio.tell("focus is set; give the lens an f-number to see it")
 
-    def mark(self) -> None:
-        """Shows the box of the next zoom, or hides it."""
+    def mark(self, aim: Aim | None = None) -> None:
+        """Shows the box of the next zoom, or hides it. It begins at the surface under the pointer, if there is one."""
         if self.marking:
             self.marking = False
             return
         stage = zoom_box.stage_of(self.studio.scene)
         self.box = zoom_box.within(self.box, stage) if self.box else zoom_box.first_box(stage)
+        if aim is not None and aim.point is not None:
+            self.box = zoom_box.placed_at(self.box, stage, aim.point)
         self.marking = True
 
     def apply_box(self) -> None:

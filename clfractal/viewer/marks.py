@@ -9,15 +9,26 @@ from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError
 from clfractal.optics.view import View
+from clfractal.pictures.tiled import Floats
 from clfractal.scene.model import Scene
 from clfractal.viewer import handles, overlays, zoom_box
 from clfractal.viewer.controls import Controls
 
 _ZOOM, _BOX, _REGION, _LIGHT = (1.0, 0.72, 0.25), (0.55, 0.75, 0.9), (0.35, 0.85, 0.8), (1.0, 0.85, 0.45)
 
+# Edges are drawn in so many pieces, of which some may be hidden; those are so much fainter.
+_PIECES, _HIDDEN = 64, 0.4
+
 
 def draw(
-    scene: Scene, view: View, controls: Controls, size: tuple[int, int], scale: float, *, lights: bool
+    scene: Scene,
+    view: View,
+    controls: Controls,
+    size: tuple[int, int],
+    scale: float,
+    *,
+    lights: bool,
+    depths: Floats | None = None,
 ) -> None:
     """Draws the marks behind the panels.
 
@@ -25,6 +36,7 @@ def draw(
         view: of the picture that fills the panels' area (one eye's, or all of it).
         size: of that picture, pixels.
         scale: pixels of the picture for a point of the panels.
+        depths: of the picture that is shown; parts of the cube behind its surface are faint. None: nothing hides anything.
     """
     canvas = imgui.get_background_draw_list()
     if controls.marking and controls.box is not None:
@@ -34,8 +46,8 @@ def draw(
             controls.marking = False
         else:
             outer = zoom_box.box_edges(stage.shown.center, stage.shown.sides)
-            _lines(canvas, view, outer, size, scale, _BOX, 0.45, 1.0)
-            _lines(canvas, view, zoom_box.edges(controls.box, stage), size, scale, _ZOOM, 0.95, 2.0)
+            _lines(canvas, view, outer, size, scale, _BOX, 0.45, 1.0, depths)
+            _lines(canvas, view, zoom_box.edges(controls.box, stage), size, scale, _ZOOM, 0.95, 2.0, depths)
     if controls.region_start is not None and controls.region_now is not None:
         (x, y), (right, bottom) = controls.region_start, controls.region_now
         first, last = (
@@ -57,13 +69,17 @@ def _lines(
     color: Any,
     alpha: float,
     thick: float,
+    depths: Floats | None,
 ) -> None:
-    for x0, y0, x1, y1 in overlays.clipped_segments(view, segments, size):
+    pieces = overlays.split(segments, _PIECES)
+    lines, ends = overlays.clipped_with_depth(view, pieces, size)
+    behind = overlays.hidden(view, lines, ends, depths, size) if depths is not None else [False] * len(lines)
+    for (x0, y0, x1, y1), faint in zip(lines, behind, strict=True):
         canvas.add_line(
             imgui.ImVec2(float(x0) / scale, float(y0) / scale),
             imgui.ImVec2(float(x1) / scale, float(y1) / scale),
-            _color(color, alpha),
-            thick,
+            _color(color, alpha * _HIDDEN if faint else alpha),
+            1.0 if faint else thick,
         )
 
 

@@ -284,7 +284,7 @@ class SceneDeeds:
 
     def _mark(self) -> None:
         try:
-            self.controls.mark()
+            self.controls.mark(self.aim())
         except ClfractalError as error:
             self.studio.tell(error.message, wrong=True)
 

@@ -138,7 +138,8 @@ def test_a_volume_tells_its_zoom_and_the_next_one() -> None:
 
 def pick_at(ui: Ui, point: tuple[float, float, float] | None, depth: float) -> None:
     """Puts the pointer over a point of the scene."""
-    ui.pick = SimpleNamespace(point=point, depth=depth)  # type: ignore[assignment]
+    view = SimpleNamespace(scene=ui.studio.scene)
+    ui.pick = SimpleNamespace(point=point, depth=depth, view=view)  # type: ignore[assignment]
 
 
 def test_depth_and_place_under_the_pointer() -> None:

@@ -16,6 +16,8 @@ from clfractal.viewer.panels import stereo as stereo_panel
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.timeline_area import room_of
 from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.picking import Pick
+from clfractal.viewer.plane_count import PlaneCount, Point, point_on_plane
 
 Pair = tuple[str, str]
 """A label and its value."""
@@ -83,13 +85,28 @@ def _scene(ui: Ui) -> list[Pair]:
     elif isinstance(renderer, CutPlaneRenderer):
         found.append(("method", "cut plane"))
         found.append(("plane", f"{renderer.plane.placed.height:.4g} high"))
-    if not isinstance(renderer, CutPlaneRenderer):
-        pick = ui.pick
+    pick = ui.pick
+    on_plane = point_on_plane(pick) if pick is not None else None
+    if pick is not None and on_plane is not None:
+        found.append(("point", ", ".join(f"{each:.6g}" for each in on_plane)))
+        found.append(("count", _count(ui, pick, on_plane)))
+    elif isinstance(renderer, CutPlaneRenderer):
+        found += [("point", "-"), ("count", "-")]
+    else:
         hit = pick is not None and pick.point is not None
         found.append(("depth", f"{pick.depth:.5g}" if pick is not None and hit else "-"))
         if pick is not None and pick.point is not None:
             found.append(("point", ", ".join(f"{each:.4g}" for each in pick.point)))
     return found
+
+
+def _count(ui: Ui, pick: Pick, point: Point) -> str:
+    """How often the formula was applied to a point of the plane."""
+    counts: PlaneCount = ui.memory.setdefault("plane.count", PlaneCount(ui.studio))
+    text = counts.at(pick, point)
+    if not text:
+        ui.memory["awaited"] = True
+    return text or "..."
 
 
 def _step(scene: Scene, renderer: SurfaceRenderer) -> str:

@@ -1,0 +1,94 @@
+"""What a cut plane's own picture shows under the pointer: the point of space, and how often the formula was applied."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from clfractal.device.cancel import CancelToken
+from clfractal.errors import ClfractalError
+from clfractal.renderers import points
+from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.viewer.background import Tell
+from clfractal.viewer.picking import Pick
+from clfractal.viewer.pointer import ray_at
+from clfractal.viewer.studio import Studio
+from clfractal.work.local import LocalExecutor
+
+Point = tuple[float, float, float]
+
+
+class Counted:
+    """Counts the applications to one point, on the window's device, by the picture's number type.
+
+    Attributes:
+        key: what was asked for.
+        text: the count, or that the point is inside; empty until it is known, and where it cannot be counted.
+    """
+
+    def __init__(self, key: Any, pick: Pick, point: Point, iterations: int) -> None:
+        self.key, self.text = key, ""
+        self._scene, self._plan, self._point, self._iterations = (
+            pick.view.scene,
+            pick.view.plan,
+            point,
+            iterations,
+        )
+        self._finished = False
+
+    @property
+    def finished(self) -> bool:
+        """See `Task`."""
+        return self._finished
+
+    def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
+        """See `Task`."""
+        counts, inside = points.escape(
+            self._scene.chain,
+            [self._point],
+            self._iterations,
+            device=executor.device,
+            lanes=self._plan.lanes,
+            precision=self._plan.precision,
+            bailout=self._scene.formula.bailout,
+            token=token,
+        )
+        self.text = f"{int(counts[0])}, inside" if bool(inside[0]) else f"{int(counts[0])}"
+        self._finished = True
+
+    def failed(self, error: ClfractalError) -> None:
+        """See `Task`."""
+        self._finished = True
+
+
+class PlaneCount:
+    """Counts what the pointer rests on, one point at a time: a new one is begun when the one before is known."""
+
+    def __init__(self, studio: Studio) -> None:
+        self._studio = studio
+        self._task: Counted | None = None
+
+    def at(self, pick: Pick, point: Point) -> str:
+        """The count at a point of the plane; empty until it is known. Ask again until then."""
+        renderer = pick.view.scene.renderer
+        assert isinstance(renderer, CutPlaneRenderer)
+        iterations = (
+            renderer.iterations if renderer.iterations is not None else pick.view.scene.formula.iterations
+        )
+        key = (pick.view.scene.formula, point, iterations)
+        task = self._task
+        if task is not None and task.key == key:
+            return task.text
+        if task is None or task.finished:
+            self._task = Counted(key, pick, point, iterations)
+            self._studio.session.add(self._task)
+        return ""
+
+
+def point_on_plane(pick: Pick) -> Point | None:
+    """The point of space that a cut plane's own picture shows; None where the view shows something else."""
+    if not isinstance(pick.view.scene.renderer, CutPlaneRenderer):
+        return None
+    x, y, z = np.asarray(ray_at(pick.camera, pick.x, pick.y, pick.size)[0]).tolist()
+    return x, y, z
