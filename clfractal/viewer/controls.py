@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from clfractal.pictures.modes import eye_at
+from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import handles, navigation, plane_moves, zoom_box
 from clfractal.viewer.aim import Aim
@@ -159,11 +160,18 @@ class Controls:
             return
         camera = handles.focus_at(aim.camera, aim.depth)
         if camera is aim.camera:
-            self.studio.tell("an orthographic camera has no focus", wrong=True)
+            self.studio.tell(
+                "an orthographic camera has no focus",
+                wrong=True,
+                holds=lambda: isinstance(self.studio.scene.camera, OrthographicCamera),
+            )
             return
         self._set_camera(aim, camera, None)
         if getattr(camera, "f_number", 1) is None:
-            self.studio.tell("focus is set; give the lens an f-number to see it")
+            self.studio.tell(
+                "focus is set; give the lens an f-number to see it",
+                holds=lambda: getattr(self.studio.scene.camera, "f_number", 1) is None,
+            )
 
     def mark(self, aim: Aim | None = None) -> None:
         """Shows the box of the next zoom, or hides it. It begins at the surface under the pointer, if there is one."""

@@ -98,6 +98,8 @@ class Deeds:
 
         What goes wrong becomes a message.
         """
+        studio = self.viewer.studio
+        studio.begin_topic(name)
         try:
             kind, colon, rest = name.partition(":")
             if colon and kind == "device":
@@ -107,7 +109,9 @@ class Deeds:
             elif name in self._deeds:
                 self._deeds[name]()
         except ClfractalError as error:
-            self.viewer.studio.tell(str(error), wrong=True)
+            studio.tell(str(error), wrong=True)
+        finally:
+            studio.begin_topic("")
 
     @property
     def names(self) -> set[str]:
@@ -156,7 +160,7 @@ class Deeds:
         else:
             viewer.motion.stop()
             viewer.studio.session.pause()
-            viewer.studio.tell("stopped; Space goes on")
+            viewer.studio.tell("stopped; Space goes on", holds=lambda: viewer.studio.session.paused)
 
     def fly(self) -> None:
         """Hides the pointer, which then turns the head; or shows it again."""
@@ -193,7 +197,10 @@ class Deeds:
     def _pause(self) -> None:
         session = self.viewer.studio.session
         session.pause(not session.paused)
-        self.viewer.studio.tell("paused" if session.paused else "gathering samples")
+        paused = session.paused
+        self.viewer.studio.tell(
+            "paused" if paused else "gathering samples", holds=lambda: session.paused == paused
+        )
 
     def _coarse(self) -> None:
         settings = replace(self.viewer.settings, coarse=not self.viewer.settings.coarse)

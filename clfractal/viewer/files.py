@@ -208,8 +208,10 @@ class Files:
     def export(self) -> None:
         """The picture with all channels, at the window's size, as EXR beside the scene."""
         target = free_name(self.source, "exr")
-        self.viewer.studio.render_still((target,))
-        self.viewer.studio.tell(f"rendering {target.name} in the background")
+        still = self.viewer.studio.render_still((target,))
+        self.viewer.studio.tell(
+            f"rendering {target.name} in the background", holds=lambda: not still.finished
+        )
 
     # Again and again
 

@@ -77,7 +77,10 @@ class Player:
             return
         film = self.film
         if film is None or film.count < 2:
-            self.studio.tell("there is no film to play; a film begins in the timeline")
+            self.studio.tell(
+                "there is no film to play; a film begins in the timeline",
+                holds=lambda: self.studio.scene.animation is None,
+            )
             return
         frame = self.studio.frame_number or 0.0
         self._tell_unkeyed()
@@ -210,7 +213,10 @@ class Player:
         self._start = studio.frame_number or 0.0
         studio.recording = True
         studio.history.seal()
-        studio.tell("recording: begins with the first move")
+        studio.tell(
+            "recording: begins with the first move",
+            holds=lambda: studio.recording and len(self._samples) < 2,
+        )
 
     def _recorded(self, now: float, film: Animation) -> bool:
         studio = self.studio

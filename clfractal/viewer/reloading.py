@@ -30,6 +30,7 @@ class Reloading:
         self._watched = Watched(())
         self._stale = False
         self._gone: set[Path] = set()
+        self._loads = 0  # how often file and window have come to agree, or parted anew
 
     def begin(self, source: SceneSource) -> None:
         """Follows another scene; what has changed while it was read is loaded with the next look."""
@@ -43,6 +44,7 @@ class Reloading:
         self._watched.follow(source.watched)
         self._watched.accept()
         self._gone.clear()
+        self._loads += 1
 
     def look(self, source: SceneSource, studio: Studio) -> SceneSource:
         """Loads what has changed on the disk, or tells why not; gives the source that counts from now on."""
@@ -50,14 +52,18 @@ class Reloading:
         self._stale = False
         gone = set(self._watched.missing)
         if lost := sorted(gone - self._gone):
-            studio.tell(_told_lost(lost, source), wrong=True)
+            studio.tell(_told_lost(lost, source), wrong=True, holds=lambda: bool(self._gone))
         self._gone = gone
         if not changed:
             return source
         if studio.edited:
             name = source.path.name if source.path is not None else "the file"
+            self._loads += 1
+            count = self._loads
             studio.tell(
-                f"{name} has changed on the disk; F5 loads it (your changes can be undone to)", wrong=True
+                f"{name} has changed on the disk; F5 loads it (your changes can be undone to)",
+                wrong=True,
+                holds=lambda: self._loads == count,
             )
             self._watched.accept()
             return source
@@ -75,10 +81,11 @@ class Reloading:
             found = open_source(source.path)
             scene = self._again(source.path, found)
         except ClfractalError as error:
-            self.problem = str(error)
-            studio.tell(str(error), wrong=True)
+            problem = self.problem = str(error)
+            studio.tell(problem, wrong=True, holds=lambda: self.problem == problem)
             return source
         self.problem = ""
+        self._loads += 1
         studio.load_again(seen_as_before(scene, studio.opened, studio.document), scene, found.loaded or scene)
         self._watched.follow(found.watched)
         studio.tell(f"loaded {source.path.name} again")

@@ -198,7 +198,11 @@ class SceneDeeds:
         if isinstance(camera, OrthographicCamera):
             self.studio.set_camera(standard_views.to_perspective(camera, like=self._perspective))
         elif self.studio.scene.stereo is not None:
-            self.studio.tell("stereo needs a perspective camera", wrong=True)
+            self.studio.tell(
+                "stereo needs a perspective camera",
+                wrong=True,
+                holds=lambda: self.studio.scene.stereo is not None,
+            )
         else:
             self._perspective = camera
             self.studio.set_camera(standard_views.to_orthographic(camera, self.studio.scene.bounds))
@@ -215,11 +219,11 @@ class SceneDeeds:
 
     def _ask_focus(self) -> None:
         self.controls.focusing = True
-        self.studio.tell("click what shall be sharp")
+        self.studio.tell("click what shall be sharp", holds=lambda: self.controls.focusing)
 
     def _choose_region(self) -> None:
         self.controls.choosing_region = True
-        self.studio.tell("drag a rectangle: it alone is refined")
+        self.studio.tell("drag a rectangle: it alone is refined", holds=lambda: self.controls.choosing_region)
 
     def add_bookmark(self) -> None:
         """Keeps the camera under a free name."""
@@ -298,7 +302,11 @@ class SceneDeeds:
         """Surface, volume, cut plane, and again."""
         scene = self.studio.scene
         if scene.layout is not None:
-            self.studio.tell("each view of a layout has a renderer of its own", wrong=True)
+            self.studio.tell(
+                "each view of a layout has a renderer of its own",
+                wrong=True,
+                holds=lambda: self.studio.scene.layout is not None,
+            )
             return
         kind = _RENDERERS[(_RENDERERS.index(scene.renderer.type) + 1) % len(_RENDERERS)]
         changes: dict[str, Any] = {"renderer": {"type": kind, "samples": scene.renderer.samples}}
@@ -343,7 +351,11 @@ class SceneDeeds:
 
     def _of_stereo(self, key: str, change: Callable[[Any], Any]) -> None:
         if self.studio.scene.stereo is None:
-            self.studio.tell("stereo is off; choose a mode first", wrong=True)
+            self.studio.tell(
+                "stereo is off; choose a mode first",
+                wrong=True,
+                holds=lambda: self.studio.scene.stereo is None,
+            )
             return
         path = f"stereo.{key}"
         if not self._edit({path: change(self.studio.value(path))}):

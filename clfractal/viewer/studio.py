@@ -46,11 +46,18 @@ MOST_THUMBNAILS = 300
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A line for the user: what was done, or what went wrong."""
+    """A line for the user: what was done, or what went wrong.
+
+    Attributes:
+        holds: whether its cause is still there; it goes when that does.
+        topic: what it is about, such as an action: of each topic the newest lines are shown alone. Empty: nothing.
+    """
 
     text: str
     wrong: bool
     time: float
+    holds: Callable[[], bool] = lambda: True
+    topic: str = ""
 
 
 class Studio(InFilm):
@@ -80,6 +87,7 @@ class Studio(InFilm):
         self.history = History()
         self.problems: dict[str, str] = {}
         self.messages: list[Message] = []
+        self._topic = ""
         self.viewport = (1280, 720)
         self.screens: Callable[[Stereo | None], Stereo | None] = lambda stereo: stereo
         self.shared_in_text: Callable[[], tuple[Group, ...]] = tuple
@@ -114,7 +122,10 @@ class Studio(InFilm):
             for path in values:
                 self.problems[path] = text
             if (tracked or of_film) and gesture is None:  # no panel of what is edited has a place for it
-                self.tell(text, wrong=True)
+                paths = tuple(values)
+                self.tell(
+                    text, wrong=True, holds=lambda: any(self.problems.get(path) == text for path in paths)
+                )
             return False
         for path in values:
             self.problems.pop(path, None)
@@ -156,6 +167,7 @@ class Studio(InFilm):
         self.place = None
         self.history = History()
         self.problems.clear()
+        self.messages.clear()  # they are about the scene before
         self.region = None
         if scene.animation is None or not self.go_to_frame(0.0):
             self.refresh()
@@ -320,8 +332,18 @@ class Studio(InFilm):
         self.session.add(still)
         return still
 
-    def tell(self, text: str, *, wrong: bool = False) -> None:
-        """A line for the user; one that was told just now is not told twice."""
+    def begin_topic(self, topic: str) -> None:
+        """What is told from now on is about something, such as an action; what was told about it before is gone."""
+        self._topic = topic
+        if topic:
+            self.messages[:] = [message for message in self.messages if message.topic != topic]
+
+    def tell(self, text: str, *, wrong: bool = False, holds: Callable[[], bool] = lambda: True) -> None:
+        """A line for the user; one that was told just now is not told twice.
+
+        Args:
+            holds: whether its cause is still there: the line goes with it.
+        """
         last = self.messages[-1] if self.messages else None
         if (
             last is not None
@@ -329,7 +351,7 @@ class Studio(InFilm):
             and last.time > time.perf_counter() - _AGAIN
         ):
             return
-        self.messages.append(Message(" ".join(text.split()), wrong, time.perf_counter()))
+        self.messages.append(Message(" ".join(text.split()), wrong, time.perf_counter(), holds, self._topic))
         del self.messages[:-MOST_MESSAGES]
         self.woken()
 

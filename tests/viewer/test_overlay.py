@@ -20,8 +20,8 @@ from clfractal.scene.model import Scene
 from clfractal.viewer import zoom_box
 from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.keys import KeyMap
+from clfractal.viewer.panels import all_panels, messages, overlay
 from clfractal.viewer.panels import help as help_panel
-from clfractal.viewer.panels import messages, overlay
 from clfractal.viewer.panels.ui import Speed, Ui
 from clfractal.viewer.studio import MESSAGE_SECONDS, Message
 from tests.viewer.panel_harness import Stage, headless, make_ui
@@ -247,6 +247,81 @@ def test_the_newest_of_many_messages_are_shown() -> None:
     shown = [text for text, _, _ in messages.visible(ui, 100.0)]
     assert shown == [f"line {number}" for number in range(30 - len(shown), 30)]
     assert 2 <= len(shown) <= 6
+
+
+def test_a_message_goes_when_its_cause_does() -> None:
+    ui = ui_of(BULB)
+    waits = [True]
+    ui.studio.tell("click what shall be sharp", holds=lambda: waits[0])
+    now = ui.studio.messages[0].time
+    assert [text for text, _, _ in messages.visible(ui, now)] == ["click what shall be sharp"]
+    waits[0] = False
+    assert messages.visible(ui, now) == []
+
+
+def test_a_refused_change_is_told_until_it_is_possible() -> None:
+    tracks = "{camera.fov: {keys: [{frame: 0, value: 40}, {frame: 9, value: 50}]}}"
+    ui = make_ui(
+        load_scene(BULB, overrides=[f"animation={{fps: 10, frames: 10, tracks: {tracks}}}"], posed=False)
+    )[0]
+    assert not ui.studio.edit({"camera": {"projection": "orthographic"}})
+    (message,) = ui.studio.messages
+    assert messages.visible(ui, message.time) != []
+    assert ui.studio.edit({"camera": {"position": [0.0, -4.0, 0.0]}})
+    assert messages.visible(ui, message.time) == []
+
+
+def test_an_action_that_is_done_again_replaces_what_it_told() -> None:
+    """Going through six modes of stereo leaves one line."""
+    ui = ui_of(BULB)
+    for mode in ("rows", "columns", "split"):
+        ui.studio.begin_topic("next_stereo")
+        ui.studio.tell(f"stereo: {mode}")
+        ui.studio.begin_topic("")
+    ui.studio.tell("saved")
+    assert [message.text for message in ui.studio.messages] == ["stereo: split", "saved"]
+
+
+def test_messages_about_another_scene_go() -> None:
+    ui = ui_of(BULB)
+    ui.studio.tell("the file has changed on the disk", wrong=True)
+    ui.studio.open(ui.studio.scene)
+    assert ui.studio.messages == []
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (640, 360), (420, 300)])
+def test_messages_never_cover_a_dialog(size: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    ui = ui_of(BULB)
+    ui.size = size
+    ui.show |= {"close"}
+    ui.memory["files"] = SimpleNamespace(
+        offered=(), recovered=[], wanted=None, source=SimpleNamespace(path=None)
+    )
+    boxes: list[tuple[bool, messages.Box]] = []
+    plain = messages._line
+
+    def line(canvas: Any, text: str, wrong: bool, alpha: float, box: messages.Box) -> None:
+        boxes.append((canvas == imgui.get_foreground_draw_list(), box))
+        plain(canvas, text, wrong, alpha, box)
+
+    monkeypatch.setattr(messages, "_line", line)
+    for number in range(4):
+        ui.studio.tell(
+            f"{number}: a line that is so long that it takes three rows of the narrow box " * 2, wrong=True
+        )
+    with headless():
+        stage = Stage(ui, all_panels.draw, window=False)
+        boxes.clear()
+        stage.frame()
+        dialog = imgui.internal.find_window_by_name("##dialog")
+        left, top = dialog.pos.x, dialog.pos.y
+        right, bottom = left + dialog.size.x, top + dialog.size.y
+    assert len(boxes) == 4
+    for above, (x0, y0, x1, y1) in boxes:
+        apart = x1 <= left or x0 >= right or y1 <= top or y0 >= bottom
+        assert apart or not above  # what does not fit beside it lies below
+    if size == (1280, 720):
+        assert all(above for above, _ in boxes)
 
 
 def test_a_message_that_goes_asks_for_more_frames() -> None:
