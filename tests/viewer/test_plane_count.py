@@ -23,11 +23,12 @@ def test_the_count_under_the_pointer(device: Device) -> None:
         frame = watch.finished(scene)
         shown, _ = shown_frame(device, watch, frame, Look())
         ui.studio.session = watch.session
-        texts = []
+        texts: list[str] = []
         for x, y in ((45.5, 30.5), (80.5, 5.5), (34.5, 20.5)):
             ui.pick = picked(shown, x, y)
             assert ui.pick is not None
             point = point_on_plane(ui.pick)
+            assert point is not None
             # 3.6 x 2.4 about (-0.75, 0, 0), y upwards.
             assert point == pytest.approx((-0.75 + 3.6 * (x / 90 - 0.5), -2.4 * (y / 60 - 0.5), 0))
 

@@ -53,8 +53,18 @@ def boxes(ui: Ui) -> Boxes:
 
 
 def filtering(ui: Ui) -> str:
-    """What is searched for among the settings, in lower case; empty if nothing is."""
+    """What is searched for, in lower case; empty if nothing is, and in a panel that is found as a whole."""
+    return "" if ui.memory.get("filter.whole") else searched(ui)
+
+
+def searched(ui: Ui) -> str:
+    """What is searched for, in lower case, whichever panel is drawn."""
     return str(ui.memory.get("filter", "")).strip().lower()
+
+
+def found(ui: Ui, label: str, path: str = "") -> bool:
+    """Whether something that is no row, such as an editor, is to be drawn: nothing is searched for, or it."""
+    return _matches(ui, label, path)
 
 
 def search(ui: Ui, key: str, prompt: str, width: float = -1.0) -> str:
@@ -76,11 +86,15 @@ def _matches(ui: Ui, label: str, path: str) -> bool:
     wanted = filtering(ui)
     if not wanted:
         return True
-    heading = ui.memory.get("heading", ("", ""))
-    found = all(each in f"{label} {path} {heading[1]}".lower() for each in wanted.split())
-    if found:
+    heading, name = ui.memory.get("heading", ("", "")), str(ui.memory.get("group", ""))
+    matches = all(each in f"{label} {path} {heading[1]} {name}".lower() for each in wanted.split())
+    if matches:
         ui.memory.setdefault("hits", {})[heading[0]] = True
-    return found
+        ui.memory.setdefault("filter.drawn", set()).add(path)
+        if name and not ui.memory.get("group.drawn"):
+            title(name)
+            ui.memory["group.drawn"] = True
+    return matches
 
 
 # Rows
@@ -183,14 +197,19 @@ def hint(ui: Ui, text: str) -> None:
         _wrapped(text)
 
 
-def group(ui: Ui, title: str) -> None:
-    """A small heading within a panel; hidden while something is searched for."""
-    if filtering(ui):
-        return
+def group(ui: Ui, name: str) -> None:
+    """A small heading within a panel; while something is searched for it comes with the first row that is found."""
+    ui.memory["group"], ui.memory["group.drawn"] = name, False
+    if not filtering(ui):
+        title(name)
+
+
+def title(text: str) -> None:
+    """Draws a small heading."""
     imgui.dummy(imgui.ImVec2(0, 1))
     corner = imgui.get_cursor_screen_pos()
     with theme.font("bold", 12.0):
-        text = title.upper()
+        text = text.upper()
         size = imgui.calc_text_size(text)
         draw = imgui.get_window_draw_list()
         draw.add_text(imgui.ImVec2(corner.x + GUTTER, corner.y), theme.packed(theme.FAINT), text)
@@ -210,9 +229,11 @@ def header(ui: Ui, key: str, title: str, icon: str = "", *, summary: str = "", o
         summary: shown at its right, in few words.
         opened: whether it is open at first.
     """
-    ui.memory["heading"] = (key, title)
-    wanted = filtering(ui)
-    if wanted:
+    ui.memory["heading"], ui.memory["group"] = (key, title), ""
+    wanted = searched(ui)
+    # A panel that is called what is searched for is shown with all its editors.
+    whole = ui.memory["filter.whole"] = bool(wanted) and all(each in title.lower() for each in wanted.split())
+    if wanted and not whole:
         scene = (wanted, ui.studio.scene.renderer.type)
         if ui.memory.get("hits.of") != scene:
             ui.memory["hits.of"], ui.memory["hits"] = scene, {}

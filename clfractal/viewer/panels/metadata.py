@@ -189,6 +189,12 @@ def all_sections() -> list[type[Section]]:
     return found
 
 
+def sections_of(section: type[Section], name: str) -> list[type[Section]]:
+    """The classes of sections that a field may hold, also as entries of a list or mapping; those of maps are left out."""
+    inner = dict.fromkeys(_sections_in(section.model_fields[name].annotation))
+    return [each for each in inner if not issubclass(each, Map)]
+
+
 def _child(holder: Any, name: str) -> Any:
     if isinstance(holder, Section):
         return getattr(holder, name, None)

@@ -14,6 +14,7 @@ from clfractal.viewer.panels import (
     cut_planes,
     device,
     differences,
+    elsewhere,
     formula,
     formula_editor,
     lights,
@@ -94,6 +95,7 @@ def _dock(ui: Ui) -> None:
     _top(ui)
     # A gutter at the right, so that the scroll bar never covers or moves a widget.
     imgui.begin_child("##panels", imgui.ImVec2(0, 0), 0, imgui.WindowFlags_.always_vertical_scrollbar)
+    ui.memory["filter.drawn"] = set()
     for panel in _PANELS:
         if not panel.shown(ui):
             continue
@@ -102,6 +104,8 @@ def _dock(ui: Ui) -> None:
             panel.draw(ui)
             imgui.pop_id()
             imgui.dummy(imgui.ImVec2(0, 3))
+    ui.memory["filter.whole"] = False
+    elsewhere.draw(ui)
     imgui.end_child()
     imgui.end()
 

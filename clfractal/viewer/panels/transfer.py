@@ -95,7 +95,7 @@ def of_values(ui: Ui, of: Values, words: tuple[str, str] = ("Surface", "All valu
             _switch_opacity(ui, of, found)
             return
     w.problem(ui, of.opacity)
-    if opacity is not None and not w.filtering(ui):
+    if opacity is not None and w.found(ui, "Opacity of values", of.opacity):
         _graph(ui, of, opacity, color)
     about = "colours by value; else the material's colour"
     if opacity is not None or of.section == "renderer":
@@ -104,7 +104,7 @@ def of_values(ui: Ui, of: Values, words: tuple[str, str] = ("Surface", "All valu
             _switch_color(ui, of, color is None)
             return
         w.problem(ui, of.color)
-        if color is not None and not w.filtering(ui):
+        if color is not None and w.found(ui, "Colours of values", of.color):
             _strip(ui, of.color, color, low, high)
     if opacity is not None:
         _light(ui, of)
@@ -129,7 +129,7 @@ def _light(ui: Ui, of: Values) -> None:
         ui.studio.edit({of.emission: kept.get("emission") or first})
         return
     w.problem(ui, of.emission)
-    if found is not None and not w.filtering(ui):
+    if found is not None and w.found(ui, "Light of values", of.emission):
         _strip(ui, of.emission, found, low, high)
 
 
