@@ -300,7 +300,7 @@ class Viewer:
             return
         warning = self.depth_range.look(self.surface.shown)
         if warning:
-            self.studio.tell(warning, wrong=True)
+            self.studio.tell(warning, wrong=True, holds=lambda: self.depth_range.strains)
 
     def _mind_device(self) -> None:
         """A device that fails gives way to another one; the last picture stays until then."""

@@ -25,6 +25,7 @@ from clfractal.files.document import read_document
 from clfractal.files.regular import read_text_file
 from clfractal.scene.load import SceneText, load_scene
 from clfractal.scene.model import Scene
+from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.saving import SceneSource, open_source, scene_text
 from clfractal.viewer.sources import same_file
 
@@ -55,13 +56,13 @@ class Autosave:
         else:
             self.release()
 
-    def write(self, source: SceneSource, present: Scene) -> bool:
+    def write(self, source: SceneSource, present: Scene, texts: FormulaTexts | None = None) -> bool:
         """Keeps the present scene, in place of what was kept before; False if that is not possible.
 
         It takes some 10 ms, and does not wait for the disk: the text survives the process, but not a power failure.
         """
         try:
-            text = scene_text(source, present)
+            text = scene_text(source, present, texts)
             if text == self._written:
                 return True
             self._folder.mkdir(parents=True, exist_ok=True)

@@ -22,6 +22,11 @@ class DepthRange:
         self._request = -1
         self._warned = False
 
+    @property
+    def strains(self) -> bool:
+        """Whether the newest picture asks for too much."""
+        return self.comfort is not None and bool(self.comfort.warning())
+
     def look(self, shown: Shown | None) -> str:
         """Takes a picture in; a warning if it is the first of those that ask for too much, else empty."""
         if shown is None or shown.frame.divider > 1 or shown.frame.request == self._request:

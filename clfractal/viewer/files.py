@@ -162,7 +162,7 @@ class Files:
 
     def text(self) -> str:
         """The scene as YAML."""
-        return scene_text(self.source, self.viewer.studio.document)
+        return scene_text(self.source, self.viewer.studio.document, self.viewer.studio.formula_texts)
 
     @property
     def suggestion(self) -> Path:
@@ -191,7 +191,9 @@ class Files:
         """
         studio = self.viewer.studio
         scene = studio.document
-        self.source = save_scene(self.source, scene, target, even_if_changed=even_if_changed)
+        self.source = save_scene(
+            self.source, scene, target, even_if_changed=even_if_changed, texts=studio.formula_texts
+        )
         # In another folder maps and grids may have other names.
         studio.keep(self.source.loaded or scene)
         self._kept = studio.document
@@ -227,7 +229,7 @@ class Files:
             document = studio.document
             if document is not self._kept and studio.edited and not viewer.controls.dragging:
                 self._kept = document
-                self._autosave.write(self.source, document)
+                self._autosave.write(self.source, document, studio.formula_texts)
         self._title()
         played = self.options.play is not None and viewer.inputs.played
         if played and self.options.shot is None and studio.session.idle:
@@ -257,7 +259,7 @@ class Files:
     def keep(self) -> None:
         """The window ends without being closed: what is unsaved is offered at the next start."""
         if self._viewer is not None and self.options.shot is None and self.viewer.studio.edited:
-            self._autosave.write(self.source, self.viewer.studio.document)
+            self._autosave.write(self.source, self.viewer.studio.document, self.viewer.studio.formula_texts)
             self._autosave.release()
 
     def close(self) -> None:

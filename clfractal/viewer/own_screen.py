@@ -70,7 +70,11 @@ class OwnScreen:
         if stereo is None:
             return
         if self._set == stereo.screen_width:
-            self.studio.tell(f"the window is another screen: {_KEY} is {stereo.screen_width:g} now")
+            wide = stereo.screen_width
+            self.studio.tell(
+                f"the window is another screen: {_KEY} is {wide:g} now",
+                holds=lambda: self._changed is None and self._set == wide,
+            )
         else:
             self.studio.tell(
                 f"the window has another width, but {_KEY} stays {stereo.screen_width:g}", wrong=True

@@ -17,19 +17,25 @@ from clfractal.scene.inline import inlined
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.camera_words import with_words, written_words
+from clfractal.viewer.formula_texts import FormulaTexts, with_formula_text
 from clfractal.viewer.named import formula_files
 from clfractal.viewer.sources import SceneSource
 from clfractal.viewer.sparse import without_defaults
 
 
 def rewritten(
-    source: SceneSource, present: Scene, folder: Path, names: Mapping[str, str | None]
+    source: SceneSource,
+    present: Scene,
+    folder: Path,
+    names: Mapping[str, str | None],
+    texts: FormulaTexts | None = None,
 ) -> tuple[str, bool]:
     """The source's text with what has changed, and whether the content of formula files was written into it.
 
     Args:
         folder: where the text is to load from.
         names: new names of formula files; None for one whose content is written instead.
+        texts: of formulas that were typed: comments are kept.
 
     Raises:
         SceneError: no text loads to this scene.
@@ -37,8 +43,20 @@ def rewritten(
     for inline, make in _candidates(source, present, names):
         text = make()
         if _stands_for(text, present, folder):
-            return text, inline
+            return _as_typed(text, source, present, folder, texts), inline
     raise SceneError("the scene cannot be written so that it loads again")
+
+
+def _as_typed(
+    text: str, source: SceneSource, present: Scene, folder: Path, texts: FormulaTexts | None
+) -> str:
+    """The text with the formula as it was typed, if it was typed here and has changed since the source was read."""
+    content = present.formula.inline
+    typed = texts.text_of(content) if texts is not None and content is not None else None
+    if typed is None or (source.formula_text is not None and source.formula_text[1] == typed):
+        return text
+    found = with_formula_text(text, typed)
+    return found if _stands_for(found, present, folder) else text
 
 
 def formula_as_written(source: SceneSource, present: Scene) -> Any:

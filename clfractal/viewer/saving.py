@@ -8,6 +8,7 @@ from clfractal.errors import FileError, Where
 from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
+from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.named import carried, data_files, formula_files, renamed
 from clfractal.viewer.rewriting import formula_as_written, rewritten
 from clfractal.viewer.sources import (
@@ -25,17 +26,22 @@ __all__ = ["SceneSource", "is_protected", "open_source", "save_scene", "scene_te
 EXTENSIONS = (".yaml", ".yml")
 
 
-def scene_text(source: SceneSource, present: Scene) -> str:
+def scene_text(source: SceneSource, present: Scene, texts: FormulaTexts | None = None) -> str:
     """The present scene as YAML text: that of its source, with what has changed.
 
     It loads to an equal scene from the scene's folder. A formula file stays named if it still holds the formula that
     is shown; otherwise the formula is written into the text.
     """
-    return rewritten(source, present, present.folder, {})[0]
+    return rewritten(source, present, present.folder, {}, texts)[0]
 
 
 def save_scene(
-    source: SceneSource, present: Scene, target: Path, *, even_if_changed: bool = False
+    source: SceneSource,
+    present: Scene,
+    target: Path,
+    *,
+    even_if_changed: bool = False,
+    texts: FormulaTexts | None = None,
 ) -> SceneSource:
     """Writes the present scene into a file, which appears complete or not at all.
 
@@ -44,6 +50,7 @@ def save_scene(
     and so the saved scene differs from `present` in that name: the window goes on with `loaded` of the result.
 
     Args:
+        texts: of formulas that were typed in the window.
         even_if_changed: replace the source's own file even if its text has changed since it was read.
 
     Returns:
@@ -64,7 +71,7 @@ def save_scene(
     saved = renamed(present, {name: new for name in data if (new := files.names[name]) is not None})
     files.copy()
     try:
-        text, inline = rewritten(source, saved, folder, files.names)
+        text, inline = rewritten(source, saved, folder, files.names, texts)
         with atomic_writer(target) as beside:
             beside.write_bytes(text.encode())
     except BaseException:

@@ -16,6 +16,7 @@ from clfractal.files.document import read_document
 from clfractal.files.inputs import noting
 from clfractal.scene.load import SceneText, load_scene, read_text
 from clfractal.scene.model import Scene
+from clfractal.viewer.formula_texts import formula_text_in
 from clfractal.viewer.named import formula_files
 from clfractal.viewer.shared import Group, groups_of
 
@@ -53,6 +54,11 @@ class SceneSource:
         except SceneError:
             return None
         return section.plain() if section is not None else None
+
+    @cached_property
+    def formula_text(self) -> tuple[Any, str] | None:
+        """The formula that is written out in the text, and how: see `formula_text_in`."""
+        return formula_text_in(self.text)
 
     @cached_property
     def shared(self) -> tuple[Group, ...]:

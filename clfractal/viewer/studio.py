@@ -22,6 +22,7 @@ from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
 from clfractal.viewer.editing import edited, value_at
 from clfractal.viewer.filming import MOVING_SECONDS, InFilm
+from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.history import History, Kind
 from clfractal.viewer.live import with_live
@@ -77,6 +78,7 @@ class Studio(InFilm):
         problems: dotted path -> what was wrong with the value that was last tried there.
         viewport: width and height of what the window shows, pixels.
         messages: lines for the user, the newest last.
+        formula_texts: how formulas were typed.
         shared_in_text: what the scene's text has once and uses at several places.
         screens: how the screens show a scene's pair; eyes with a screen each have another way than the scene's.
     """
@@ -92,6 +94,7 @@ class Studio(InFilm):
         self.screens: Callable[[Stereo | None], Stereo | None] = lambda stereo: stereo
         self.shared_in_text: Callable[[], tuple[Group, ...]] = tuple
         self._shared = Shared()
+        self.formula_texts = FormulaTexts()
         self.region: tuple[int, int, int, int] | None = None
         self.smooth = True
         self.stills: list[Still] = []

@@ -14,6 +14,7 @@ from imgui_bundle.imgui_color_text_edit import TextEditor
 
 from clfractal.errors import ClfractalError, FormulaError, Where
 from clfractal.files.document import read_document, read_text_file, write_document
+from clfractal.files.fragments import same
 from clfractal.formulas import catalog
 from clfractal.resources import folder
 from clfractal.scene.formula import FormulaSpec
@@ -131,11 +132,22 @@ def _follow(ui: Ui, state: Editing) -> None:
         except ClfractalError:
             pass
     try:
-        state.text = text_of(spec)
+        state.text = _typed(ui, spec) or text_of(spec)
     except ClfractalError as error:
         ui.studio.tell(str(error), wrong=True)
         return
     _fill(state)
+
+
+def _typed(ui: Ui, spec: FormulaSpec) -> str | None:
+    """The formula's text as it was typed, here or in the scene's file; None if it was not."""
+    if spec.inline is None:
+        return None
+    files = ui.memory.get("files")
+    written = files.source.formula_text if files is not None else None
+    if written is not None and same(written[0], spec.inline):
+        return str(written[1])
+    return ui.studio.formula_texts.text_of(spec.inline)
 
 
 def _source(spec: FormulaSpec) -> Any:
@@ -180,6 +192,7 @@ def check(ui: Ui, state: Editing) -> None:
     _mark(state)
     if state.error is not None:
         return
+    ui.studio.formula_texts.remember(inline, state.text)
     spec = ui.studio.scene.formula
     if spec.inline == inline or _is_library(spec, inline):
         return
