@@ -19,12 +19,14 @@ class Player:
     Attributes:
         playing: whether the film runs; frames for which there is no time are left out.
         repeat: whether it begins again after its end.
+        span: the first and the last frame of the part that is played; None: all of the film.
     """
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
         self.playing = False
         self.repeat = True
+        self.span: tuple[int, int] | None = None
         self._since = 0.0
         self._from = 0.0
         self._samples: list[Sample] = []
@@ -67,8 +69,43 @@ class Player:
 
     # Playing
 
+    def played(self, film: Animation) -> tuple[int, int]:
+        """The first and the last frame that are played; a part that the film no longer has is none."""
+        last = film.count - 1
+        if self.span is None or self.span[0] >= last:
+            return 0, last
+        return self.span[0], min(self.span[1], last)
+
+    def set_span(self, first: float, last: float) -> None:
+        """Plays only a part, from one frame to another, in any order; all of the film if they are the same."""
+        low, high = sorted((round(first), round(last)))
+        self.span = (max(low, 0), high) if high > max(low, 0) else None
+
+    def span_end(self, way: int) -> None:
+        """The part that is played ends at the frame that is shown, or with -1 begins there."""
+        film = self.film
+        if film is None or self.studio.frame_number is None:
+            return
+        frame, (first, last) = round(self.studio.frame_number), self.played(film)
+        if way < 0:
+            self.set_span(frame, last if frame < last else film.count - 1)
+        else:
+            self.set_span(first if frame > first else 0, frame)
+        self._tell_span(film)
+
+    def span_clear(self) -> None:
+        """Plays all of the film again."""
+        self.span = None
+        if self.film is not None:
+            self._tell_span(self.film)
+
+    def _tell_span(self, film: Animation) -> None:
+        first, last = self.played(film)
+        whole = (first, last) == (0, film.count - 1)
+        self.studio.tell("all of the film is played" if whole else f"frames {first} to {last} are played")
+
     def play(self, now: float) -> None:
-        """Plays from the frame that is shown, or from the beginning if that is the last one; or stops."""
+        """Plays from the frame that is shown, or from the beginning if that is not before the end; or stops."""
         if self.recording:
             self.record(now)
             return
@@ -84,7 +121,8 @@ class Player:
             return
         frame = self.studio.frame_number or 0.0
         self._tell_unkeyed()
-        self._since, self._from = now, 0.0 if frame >= film.count - 1 else frame
+        first, last = self.played(film)
+        self._since, self._from = now, frame if first <= frame < last else float(first)
         self.playing = self.studio.go_to_frame(self._from, moving=True)
 
     def stop(self) -> None:
@@ -124,12 +162,13 @@ class Player:
         if not self.playing:
             return False
         frame = int(self._from + (now - self._since) * film.fps + 1e-6)
-        if frame >= film.count:
+        first, last = self.played(film)
+        if frame > last:
             if not (self.repeat or film.loop):
-                self.studio.go_to_frame(film.count - 1)
+                self.studio.go_to_frame(last)
                 self.stop()
                 return True
-            frame %= film.count
+            frame = first + (frame - first) % (last - first + 1)
         if frame == self.studio.frame_number:
             return False
         if not self.studio.go_to_frame(frame, moving=True):

@@ -59,6 +59,49 @@ def test_it_begins_again_or_ends() -> None:
     assert frame(player) == 0
 
 
+def test_a_part_of_the_film_is_played() -> None:
+    """20 frames a second: from 10 to 19 is half a second, again and again, or once."""
+    player = player_of()
+    player.show(10)
+    player.span_end(-1)
+    player.show(19)
+    player.span_end(1)
+    assert player.span == (10, 19)
+    player.play(100.0)
+    assert frame(player) == 10
+    for now, wanted in ((100.21, 14), (100.46, 19), (100.51, 10), (101.31, 16)):
+        player.step(now)
+        assert frame(player) == wanted
+    player.repeat = False
+    player.step(103.0)
+    assert (frame(player), player.playing) == (19, False)
+    player.show(30)  # beyond its end: it begins at its beginning
+    player.play(200.0)
+    assert frame(player) == 10
+    player.stop()
+    player.span_clear()
+    assert player.played(player.film) == (0, 40)  # type: ignore[arg-type]
+    assert "all of the film" in player.studio.messages[-1].text
+
+
+def test_parts_that_are_none() -> None:
+    player = player_of()
+    film = player.film
+    assert film is not None
+    player.set_span(12.4, 12.0)
+    assert player.span is None
+    player.set_span(30, 12.4)
+    assert player.played(film) == (12, 30)
+    player.set_span(38, 90)
+    assert player.played(film) == (38, 40)
+    player.span = (60, 90)  # the film was longer
+    assert player.played(film) == (0, 40)
+    player.show(0)
+    player.span = None
+    player.span_end(1)
+    assert player.span is None
+
+
 def test_a_film_that_plays_goes_on_from_where_it_is_put() -> None:
     player = player_of()
     player.play(100.0)

@@ -129,6 +129,20 @@ def test_a_drag_on_the_ruler_scrubs() -> None:
     assert film.ui.studio.history.depth("scene") == (0, 0)
 
 
+def test_a_drag_with_shift_on_the_ruler_chooses_what_is_played() -> None:
+    film = Film()
+    shown = film.ui.studio.frame_number
+    film.stage.hold(imgui.Key.mod_shift, True)
+    film.stage.drag((film.x(25), film.ruler), (film.x(8), film.ruler))
+    film.stage.hold(imgui.Key.mod_shift, False)
+    player = film.ui.memory["player"]
+    assert player.span == (8, 25)
+    assert film.ui.studio.frame_number == shown
+    film.stage.drag((film.x(5), film.ruler), (film.x(30), film.ruler))
+    assert player.span == (8, 25)
+    assert film.ui.studio.frame_number == 30
+
+
 def test_the_wheel_on_the_ruler_shows_fewer_frames() -> None:
     film = Film()
     film.stage.move(film.x(20), film.ruler)

@@ -154,6 +154,11 @@ def _ruler(ui: Ui, player: Player, view: TimelineView, animation: Animation, are
     draw.add_rect_filled(
         imgui.ImVec2(x[0], low.y), imgui.ImVec2(x[1], high.y), theme.packed(theme.FRAME), 3.0
     )
+    if player.span is not None:
+        ends = [area.x(view, frame) for frame in player.played(animation)]
+        draw.add_rect_filled(
+            imgui.ImVec2(ends[0], low.y), imgui.ImVec2(ends[1], high.y), theme.packed(theme.ACCENT, 0.28), 3.0
+        )
     step = timeline_view.step_of_marks(view.last - view.first, int(area.width / 74))
     with theme.font(size=11.5):
         for frame in timeline_view.marks(view.first, view.last, step):
@@ -172,13 +177,22 @@ def _ruler(ui: Ui, player: Player, view: TimelineView, animation: Animation, are
     imgui.invisible_button("##ruler", imgui.ImVec2(area.width, _RULER - 3))
     if imgui.is_item_active():
         frame = area.frame(view, imgui.get_mouse_pos().x)
-        whole = not imgui.get_io().key_ctrl
-        player.show(float(round(frame)) if whole else frame, moving=True)
+        io = imgui.get_io()
+        if imgui.is_item_activated():
+            view.held["span"] = frame if io.key_shift else None
+        began = view.held.get("span")
+        if began is not None:
+            player.set_span(began, frame)
+        else:
+            player.show(frame if io.key_ctrl else float(round(frame)), moving=True)
     if imgui.is_item_deactivated():
         ui.studio.end_gesture()
     if imgui.is_item_hovered():
         area.wheel(view)
-        w.tip("Drag to look at other frames, with Ctrl between them; the wheel shows more or fewer")
+        w.tip(
+            "Drag to look at other frames, with Ctrl between them; with Shift to choose the part that is played. "
+            "The wheel shows more or fewer"
+        )
     imgui.set_cursor_screen_pos(imgui.ImVec2(area.left - LEFT, top + _RULER))
 
 
