@@ -26,7 +26,7 @@ from clfractal.viewer.motion import Motion
 from clfractal.viewer.outputs import Outputs
 from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.panels import all_panels, theme
+from clfractal.viewer.panels import all_panels, theme, timeline_area
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.places import Places, places_of
@@ -253,8 +253,9 @@ class Viewer:
     def _follow(self, now: float) -> None:
         """The studio learns the window's size, the surface what to show."""
         if not self.window.minimised:
-            width, height = self.outputs.picture_size(self.studio.scene.stereo)
-            self.studio.resize(width, height)
+            stereo = self.studio.scene.stereo
+            self.outputs.leave(timeline_area.room_of(self.ui) * self.ui.scale, stereo)
+            self.studio.resize(*self.outputs.picture_size(stereo))
             self.own_screen.look(
                 self.window.framebuffer[0],
                 now,
@@ -361,7 +362,7 @@ class Viewer:
     def picture_alone(self) -> Any:
         """The picture that is shown, without what lies over it: uint8 of shape (height, width, 3)."""
         self.outputs.draw(self.surface, False, lambda by: None)
-        pixels = self.outputs.read()
+        pixels = self.outputs.read(picture=True)
         self.outputs.draw(
             self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
         )

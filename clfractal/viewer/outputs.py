@@ -36,6 +36,7 @@ class Outputs:
         self._rectangle = gl.Rectangle()
         self._second_rectangle: gl.Rectangle | None = None
         self._second_ui: UiRenderer | None = None
+        self._below = 0
         self._charts: dict[tuple[int, int, str], int] = {}
 
     def begin(self, options: Options) -> None:
@@ -139,8 +140,24 @@ class Outputs:
 
     def picture_size(self, stereo: Stereo | None) -> tuple[int, int]:
         """Size of the picture that fills the screens, pixels: both eyes' beside each other, if they are apart."""
-        width, height = self.first.framebuffer
+        width, height = self._room
         return (2 * width, height) if self.apart and stereo is not None else (width, height)
+
+    def leave(self, below: float, stereo: Stereo | None) -> None:
+        """Leaves so many pixels at the window's lower rim, where the picture may be smaller than the window.
+
+        It may not where it fills a screen, where a buffer or a half of the window is one eye's.
+        """
+        halves = stereo is not None and stereo.mode in BELOW
+        free = not (self.fills_screens or self.apart or halves)
+        height = self.first.framebuffer[1]
+        self._below = min(round(below), height // 2) if free else 0
+
+    @property
+    def _room(self) -> tuple[int, int]:
+        """The part of the first window that its picture fills, pixels from the top left."""
+        width, height = self.first.framebuffer
+        return width, max(height - self._below, 1)
 
     def shown_stereo(self, stereo: Stereo | None) -> Stereo | None:
         """How the pair is composed for these screens."""
@@ -154,7 +171,7 @@ class Outputs:
 
     def to_picture(self, x: float, y: float, size: tuple[int, int]) -> tuple[float, float]:
         """A place of the first window, framebuffer pixels, in the picture of a size."""
-        width, height = self.first.framebuffer
+        width, height = self._room
         wide = size[0] / 2 if self.apart and size[0] >= 2 * width - 2 else size[0]
         return x * wide / max(width, 1), y * size[1] / max(height, 1)
 
@@ -189,13 +206,16 @@ class Outputs:
         if charted:
             self._draw_charts(surface, width, height)
         elif surface.texture:
+            height -= self._below
             wide, high = surface.size
             part, smooth = surface.part, surface.coarse and surface.smooth
             # A picture is at most a pixel smaller than its window, where halves need even sizes.
             if 0 <= width - wide <= 1 and 0 <= height - high <= 1:
-                self._rectangle.draw(surface.texture, (0, height - high, wide, high), part, smooth=smooth)
+                self._rectangle.draw(
+                    surface.texture, (0, self._below + height - high, wide, high), part, smooth=smooth
+                )
             else:
-                self._rectangle.draw(surface.texture, (0, 0, width, height), part, smooth=True)
+                self._rectangle.draw(surface.texture, (0, self._below, width, height), part, smooth=True)
         draw_ui(None)
 
     def _draw_half(
@@ -238,9 +258,15 @@ class Outputs:
             self._charts[key] = texture
         return self._charts[key]
 
-    def read(self) -> Any:
-        """What was drawn and not yet swapped, uint8 of shape (height, width, 3); of two windows side by side."""
+    def read(self, *, picture: bool = False) -> Any:
+        """What was drawn and not yet swapped, uint8 of shape (height, width, 3); of two windows side by side.
+
+        Args:
+            picture: only the part that the picture fills.
+        """
         first = gl.read_pixels(*self.first.framebuffer)
+        if picture:
+            first = first[: self._room[1]]
         if self.second is None:
             return first
         self.second.use()

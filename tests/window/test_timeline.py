@@ -10,7 +10,7 @@ from clfractal.scene.load import load_scene
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.timeline_area import HEIGHT, LEFT
 from clfractal.work.frames import at_frame
-from tests.window.display import Display
+from tests.window.display import Display, Pixels
 from tests.window.driver import Window, wait_for
 from tests.window.film import film
 
@@ -51,6 +51,23 @@ def test_a_film_is_scrubbed_and_played(display: Display, folder: Path) -> None:
         window.keys("p")
         window.still()
         assert not window.title.endswith("*"), "looking at frames is no change"
+
+
+def test_the_timeline_makes_the_picture_smaller(display: Display, folder: Path) -> None:
+    """Nothing of the picture lies below it; without panels it is as large as the window again."""
+    (folder / "film.yaml").write_text(FILM.replace("frames: 76", "frames: 2"))
+    (folder / "still.yaml").write_text(FILM.partition("animation:")[0])
+    high = SIZE[1] - int(HEIGHT + theme.MARGIN)
+    whole = film(folder, folder / "still.yaml", (SIZE[0], high))
+    with Window(display, folder, "film.yaml", "--size", "900x640") as window:
+        free = (slice(60, high - 80), slice(int(theme.DOCK_LEFT) + 2 * int(theme.MARGIN), 880))
+        wait_for(lambda: not _differs(window.pixels()[:high][free], whole[free]), "a picture above it")
+        window.keys("F2", "F3")
+        window.shows(film(folder, folder / "still.yaml", SIZE))
+
+
+def _differs(one: Pixels, other: Pixels) -> bool:
+    return bool((np.abs(one.astype(int) - other) > 1).mean() > 1e-3)
 
 
 def _changes(window: Window, part: tuple[slice, slice]) -> None:

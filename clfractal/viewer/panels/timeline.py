@@ -9,7 +9,7 @@ from clfractal.viewer import timeline, timeline_view
 from clfractal.viewer.panels import theme, timeline_curves, timeline_inspector, timeline_rows
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import clipped
-from clfractal.viewer.panels.timeline_area import BAR, HEIGHT, LEFT, Area, left_of
+from clfractal.viewer.panels.timeline_area import BAR, LEFT, Area, height_of, left_of
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.playing import Player
 from clfractal.viewer.timeline_view import TimelineView
@@ -32,8 +32,9 @@ def draw(ui: Ui) -> None:
     view.follow(animation)
     left = left_of(ui)
     width = max(ui.size[0] - left - theme.MARGIN, 100.0)
-    imgui.set_next_window_pos(imgui.ImVec2(left, ui.size[1] - theme.MARGIN - HEIGHT))
-    imgui.set_next_window_size(imgui.ImVec2(width, HEIGHT))
+    high = height_of(ui)
+    imgui.set_next_window_pos(imgui.ImVec2(left, ui.size[1] - theme.MARGIN - high))
+    imgui.set_next_window_size(imgui.ImVec2(width, high))
     flags = (
         imgui.WindowFlags_.no_decoration
         | imgui.WindowFlags_.no_move
@@ -201,7 +202,7 @@ def _playhead(ui: Ui, view: TimelineView, area: Area, top: float) -> None:
     if not area.left - 1 <= x <= area.right + 1:
         return
     draw = imgui.get_window_draw_list()
-    bottom = imgui.get_window_pos().y + HEIGHT - 7
+    bottom = imgui.get_window_pos().y + height_of(ui) - 7
     color = theme.packed(theme.ACCENT)
     draw.add_triangle_filled(
         imgui.ImVec2(x - 5, top), imgui.ImVec2(x + 5, top), imgui.ImVec2(x, top + 8), color

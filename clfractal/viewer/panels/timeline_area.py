@@ -10,8 +10,9 @@ from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.timeline_view import TimelineView
 
-HEIGHT = 218.0
-"""Points that the timeline is high."""
+HEIGHT, _LEAST = 218.0, 124.0
+"""Points that the timeline is high where there is room for all of it."""
+_PART = 0.36
 LEFT = 158.0
 """Points for the names of tracks."""
 BAR = 10.0
@@ -25,10 +26,15 @@ def left_of(ui: Ui) -> float:
     return beside if ui.size[0] - beside >= 320 else theme.MARGIN
 
 
+def height_of(ui: Ui) -> float:
+    """Points that the timeline is high: less in a low window, most of which is the picture's."""
+    return min(HEIGHT, max(_PART * ui.size[1], _LEAST))
+
+
 def room_of(ui: Ui) -> float:
     """Points at the lower rim that the timeline takes up; 0 while it is not shown."""
     shown = "panels" in ui.show and ui.studio.frame_number is not None and "player" in ui.memory
-    return HEIGHT + theme.MARGIN if shown else 0.0
+    return height_of(ui) + theme.MARGIN if shown else 0.0
 
 
 @dataclass(frozen=True, slots=True)
