@@ -35,6 +35,10 @@ class Stopped(Exception):  # noqa: N818
     """The work was cancelled, by its token or by the caller that waited. This is not an error, so nothing is printed."""
 
 
+class NotReady(Exception):  # noqa: N818
+    """Something would have to be made first that takes long, and the caller did not want to wait for it."""
+
+
 class ClfractalError(Exception):
     """Base of every error meant for the user.
 

@@ -21,7 +21,7 @@ from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
-from clfractal.errors import FileError, Stopped, Where
+from clfractal.errors import FileError, NotReady, Stopped, Where
 from clfractal.files import system
 
 BUILD_TIMEOUT_S = 600.0
@@ -77,6 +77,7 @@ def build(
     isolated: bool = True,
     on_compile: Callable[[str], None] | None = None,
     stopped: Callable[[], bool] | None = None,
+    waits: bool = True,
 ) -> Program:
     """The program of one flat text, from the cache or the driver's compiler.
 
@@ -90,12 +91,14 @@ def build(
             an interrupt is answered at once.
         on_compile: called with a message, from another thread, if compiling takes more than a moment.
         stopped: asked at least every 20 ms while a child process compiles; it ends the child by answering True.
+        waits: whether it is built if it is not loaded yet.
 
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
         DeviceError: the driver failed or aborted.
         FileError: the process may write only files that are too small for programs.
         Stopped: `stopped` answered True.
+        NotReady: it is not loaded, and the caller does not wait.
     """
     start = time.perf_counter()
     text, flags = _as_compiled(device, text, flags)
@@ -103,6 +106,8 @@ def build(
     program = device.loaded.get(key)
     if program is not None:
         return Program(device, program, _milliseconds(start), cached=True)
+    if not waits:
+        raise NotReady
     _check_file_sizes()
     # Of devices of one kind one compiles, and the others find it in the cache.
     with device.loaded.building, _alone(key, stopped):

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.errors import NotReady
 
 T = TypeVar("T")
 
@@ -38,6 +39,15 @@ class Kept:
         found: T = self._things[key]
         return found
 
+    def has(self, key: str) -> bool:
+        """Whether there are data for a key."""
+        return key in self._things
+
+    def adopt(self, other: Kept) -> None:
+        """Takes what another keeps, as if it had been used for the last picture."""
+        self._things |= other._things
+        self._last_asked |= dict.fromkeys(other._things, self._picture)
+
 
 class Borrowing(Kept):
     """Data of its own, and those that another keeps, which it leaves alone."""
@@ -48,10 +58,13 @@ class Borrowing(Kept):
 
     def once(self, key: str, make: Callable[[], T]) -> T:
         """The other's data for this key, else its own; see `Kept`."""
-        if key in self._lender._things:
-            lent: T = self._lender._things[key]
-            return lent
-        return super().once(key, make)
+        # (Another thread may drop it meanwhile.)
+        lent: T | None = self._lender._things.get(key)
+        return lent if lent is not None else super().once(key, make)
+
+    def has(self, key: str) -> bool:
+        """See `Kept`."""
+        return key in self._lender._things or super().has(key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +76,21 @@ class Resources:
         kept: see `Kept`.
         on_compile: told a line if a program has to be compiled first.
         token: ends long work, such as the filling of a grid.
+        waits: whether what takes long is made here if it is not there yet.
     """
 
     device: Device
     kept: Kept = field(default_factory=Kept)
     on_compile: Callable[[str], None] | None = None
     token: CancelToken | None = None
+    waits: bool = True
+
+    def once(self, key: str, make: Callable[[], T], *, quick: bool = False) -> T:
+        """As `Kept.once`; `quick`: made at once, whoever waits.
+
+        Raises:
+            NotReady: it is not there, takes long, and is not waited for.
+        """
+        if not (self.waits or quick or self.kept.has(key)):
+            raise NotReady
+        return self.kept.once(key, make)

@@ -269,11 +269,11 @@ class SurfaceKernel(TileKernel):
         return self.plan.divider if self.scene.surface.used_points.count > 1 else 1
 
     def own_arguments(self) -> list[KernelArgument]:
-        scene, precision, kept = self.scene, self.precision, self.resources.kept
+        scene, precision, once = self.scene, self.precision, self.resources.once
         surroundings = scene.surroundings
         packed = None
         if surroundings is not None:
-            packed = kept.once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
+            packed = once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
         on_set, body = set_lights_of(scene), Body.of(scene)
         of_maps, tables = self._tables()
         return [
@@ -309,7 +309,7 @@ class SurfaceKernel(TileKernel):
 
     def _tables(self) -> tuple[int, Floats]:
         """How many numbers the tables of maps have, and these, with the grids of objects behind them."""
-        once, found, grids = self.resources.kept.once, mapped_materials(self.scene), ObjectGrids(self.scene)
+        once, found, grids = self.resources.once, mapped_materials(self.scene), ObjectGrids(self.scene)
         of_maps = np.zeros(0, np.float32) if found is None else once(f"maps {found.key}", found.tables)
         if not grids.volumes:
             return of_maps.size, of_maps if of_maps.size else np.zeros(4, np.float32)
@@ -323,8 +323,8 @@ class SurfaceKernel(TileKernel):
         from clfractal.scene.palette import palette_table
 
         key = f"palette {coloring.model_dump_json()}"
-        return self.resources.kept.once(
-            key, lambda: np.ascontiguousarray(palette_table(coloring), np.float32)
+        return self.resources.once(
+            key, lambda: np.ascontiguousarray(palette_table(coloring), np.float32), quick=True
         )
 
 

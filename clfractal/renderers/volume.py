@@ -156,15 +156,21 @@ class VolumeKernel(TileKernel):
     def precision(self) -> Precision:
         return ray_precision(self.scene, self.plan)
 
-    @cached_property
+    @property
     def grid(self) -> Grid:
         """The grid; of an earlier picture if that had the same.
 
         Raises:
             DeviceError, KernelBuildError: it cannot be filled.
             Stopped: its filling was cancelled.
+            NotReady: it would have to be filled, and is not waited for.
         """
-        return self.resources.kept.once(self._grid_key, self._fill)
+        # (Not a cached property: in Python 3.11 one that is computed holds up all others of its name, in any thread.)
+        if self._grid is None:
+            self._grid = self.resources.once(self._grid_key, self._fill)
+        return self._grid
+
+    _grid: Grid | None = None
 
     def texts(self) -> list[ProgramText]:
         return [ProgramText(self.name, program_text(self.scene, self.plan, self.grid), (self.name,))]
@@ -172,8 +178,10 @@ class VolumeKernel(TileKernel):
     def own_arguments(self) -> list[KernelArgument]:
         scene, grid, precision = self.scene, self.grid, self.precision
         unseen = unseen_sample(scene, grid)
-        blocks = self.resources.kept.once(
-            f"{self._grid_key} {unseen}", lambda: seen_blocks(grid, unseen, self.resources.on_compile)
+        blocks = self.resources.once(
+            f"{self._grid_key} {unseen}",
+            lambda: seen_blocks(grid, unseen, self.resources.on_compile),
+            quick=True,
         )
         four = (0, 1, 2, 3)
         return [
@@ -195,13 +203,15 @@ class VolumeKernel(TileKernel):
         found = self.scene.surroundings if has_paths(self.scene) else None
         if found is None:
             return None
-        return self.resources.kept.once(f"environment {found.digest}", lambda: packed_map(found))
+        return self.resources.once(f"environment {found.digest}", lambda: packed_map(found))
 
     def _path_arguments(self) -> list[KernelArgument]:
         """The bricks' bounds, and the environment."""
         grid, packed = self.grid, self._environment
-        ranges = self.resources.kept.once(
-            f"{self._grid_key} ranges", lambda: brick_ranges(grid, self.resources.on_compile)
+        ranges = self.resources.once(
+            f"{self._grid_key} ranges",
+            lambda: brick_ranges(grid, self.resources.on_compile),
+            quick=True,
         )
         return [
             brick_bounds(self.scene, grid, ranges),

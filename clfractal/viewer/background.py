@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
-from clfractal.errors import ClfractalError
+from clfractal.errors import ClfractalError, Stopped
 from clfractal.pictures.develop import rgb8
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.viewer.fitting import Cancellable, measured_exposure, with_exposure
+from clfractal.viewer.preparing import internal_error
 from clfractal.work.films import JobFilms
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
@@ -46,6 +47,24 @@ class Task(Protocol):
 
     def failed(self, error: ClfractalError) -> None:
         """It cannot be done."""
+
+
+def do_some(task: Task, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
+    """Works on a task; a mistake of its is the task's problem.
+
+    Raises:
+        Stopped: the token was set, and it is not finished.
+    """
+    try:
+        if not task.finished:
+            task.work(executor, token, tell)
+    except Stopped:
+        if not task.finished:
+            raise
+    except ClfractalError as error:
+        task.failed(error)
+    except Exception as error:  # the picture goes on
+        task.failed(internal_error(error))
 
 
 def prepared(

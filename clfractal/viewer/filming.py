@@ -48,7 +48,7 @@ class InFilm(ABC):
         self._first: tuple[Scene, Scene] | None = None
 
     @abstractmethod
-    def refresh(self, *, again: bool = False) -> None:
+    def refresh(self, *, again: bool = False, follows: bool = False) -> None:
         """Asks for a picture; see `Studio`."""
 
     @abstractmethod

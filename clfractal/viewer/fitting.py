@@ -66,7 +66,12 @@ class Fits:
         self._exposed: tuple[Scene, float] | None = None
 
     def fitted(
-        self, scene: Scene, moving: bool, token: CancelToken, exposed_in: Scene | None = None
+        self,
+        scene: Scene,
+        moving: bool,
+        token: CancelToken,
+        exposed_in: Scene | None = None,
+        executor: LocalExecutor | None = None,
     ) -> Scene:
         """The scene with all that is to be measured; as it is if that is nothing. Where nothing is in sight, defaults.
 
@@ -74,12 +79,14 @@ class Fits:
 
         Args:
             exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
+            executor: for looks, in the place of the usual one: another thread has its own.
 
         Raises:
             DeviceError, KernelBuildError: as of a render.
             Stopped: the token was set.
+            NotReady: a look needs what is not there, and the executor does not wait.
         """
-        look = Look(self._device, Cancellable(self._executor, token))
+        look = Look(self._device, Cancellable(executor or self._executor, token))
         if exposed_in is not None and isinstance(scene.output.exposure, str):
             known = self._exposed
             if known is None or not (moving or known[0] is exposed_in or known[0] == exposed_in):

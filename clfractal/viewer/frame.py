@@ -45,10 +45,28 @@ class Frame:
     frame_seconds: float
     stamp: int = 0
 
+    @classmethod
+    def of(cls, number: int, request: int, scene: Scene, job: Job, canvas: Canvas, growth: Growth) -> Frame:
+        """The frame of what is on a canvas now."""
+        grown = (growth.divider, growth.samples, growth.finished, growth.seconds, growth.frame_seconds)
+        return cls(number, request, scene, job, growth.views, canvas, *grown, canvas.stamp)
+
     @property
     def arrangement(self) -> Arrangement:
         """Where its views lie."""
         return Arrangement.of(self.job)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Growth:
+    """How far a picture is; see `Frame`."""
+
+    views: tuple[PlannedView, ...]
+    divider: int
+    samples: int
+    finished: bool
+    seconds: float
+    frame_seconds: float
 
 
 class CanvasPool:

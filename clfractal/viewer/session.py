@@ -6,53 +6,45 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError, Stopped
-from clfractal.pictures.tiles import Region
-from clfractal.renderers.plan import PlannedView
-from clfractal.renderers.resources import Borrowing
+from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError, NotReady, Stopped
+from clfractal.renderers.resources import Borrowing, Kept
 from clfractal.scene.model import Scene
-from clfractal.viewer.background import Task
+from clfractal.viewer.background import Task, do_some
 from clfractal.viewer.fitting import Fits
-from clfractal.viewer.frame import CanvasPool, Frame
-from clfractal.viewer.pacing import Pacing, Schedule
+from clfractal.viewer.frame import CanvasPool, Frame, Growth
+from clfractal.viewer.gathering import Gathering
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.painting import Painter
+from clfractal.viewer.preparing import (
+    Preparation,
+    Wanted,
+    differs_by_view,
+    internal_error,
+    seen_from,
+    sharp,
+    shows_whole,
+)
 from clfractal.viewer.resting import clean
-from clfractal.work.canvas import CHANNELS, Canvas, CanvasKernels, CanvasStore
+from clfractal.work.canvas import CHANNELS, Canvas
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
-from clfractal.work.refine import has_room, pass_ranges
-from clfractal.work.run import Progress, run
-from clfractal.work.show import Arrangement
+from clfractal.work.refine import has_room
+from clfractal.work.run import Progress
 
 BUDGET_SECONDS = 0.02
 """Limit of the work that is queued on the device: what cannot be told to end, ends after this time."""
 SETTLE_SECONDS = 0.15
 """A picture that moves is not refined before nothing has come for so long."""
+TRIED_AGAIN = 0.1
+"""While something is prepared, a newer picture that may need nothing is tried after so many seconds."""
 _HALVED_ABOVE = 0.25
 """Between coarse and whole there are steps if the whole picture takes longer than this, seconds."""
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """A picture that was asked for.
-
-    Attributes:
-        number: of the request.
-        scene: with the size of the viewport.
-        moving: whether more requests will follow soon.
-        region: x, y, width, height of the only part to refine, pixels of each eye's picture; None: all.
-        exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
-    """
-
-    number: int
-    scene: Scene
-    moving: bool
-    region: tuple[int, int, int, int] | None = None
-    exposed_in: Scene | None = None
 
 
 class Session:
@@ -93,9 +85,14 @@ class Session:
         self._aside = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
         self._aside.kept = Borrowing(self._executor.kept)
         self._fits = Fits(device, self._looking)
-        self._kernels: CanvasKernels | None = None
-        self._gathered: _Gathering | None = None
-        self._current: Wanted | _Gathering | Task | None = None
+        self._painter = Painter(device, self.pool, self._executor)
+        self._gathered: Gathering | None = None
+        self._current: Wanted | Gathering | Task | Preparation | None = None
+        # What is being prepared; the request that is known to need more, when one was tried last; what was shown last.
+        self._preparation: Preparation | None = None
+        self._tried: Wanted | None = None
+        self._tried_at = 0.0
+        self._seen: Wanted | None = None
         self._thread = threading.Thread(target=self._work, name="clfractal-session", daemon=True)
 
     def start(self) -> None:
@@ -109,21 +106,33 @@ class Session:
         moving: bool = False,
         region: tuple[int, int, int, int] | None = None,
         exposed_in: Scene | None = None,
+        follows: bool = False,
     ) -> int:
-        """Asks for a picture; what is under way ends at once. Gives the request's number.
+        """Asks for a picture; samples that are gathered end at once. Gives the request's number.
+
+        What a picture needs before its first ray may take seconds (compiling, a grid). Once begun for a movement, it is
+        finished and shown, and then the newest request is taken. Meanwhile the old picture follows the camera.
 
         Args:
             scene: its image has the size of the viewport. Motion blur comes when it rests: what is coarse is sharp.
             moving: whether more requests will follow soon: then a frame comes at the wanted rate, as coarse as that needs.
             region: the only part that is refined.
             exposed_in: the scene in which an exposure of `auto` is measured; None: this one.
+            follows: whether it ends a movement. A request that neither moves nor follows ends a preparation, too,
+                unless it only looks at the same scene from elsewhere.
         """
+        follows = follows or moving
         with self._changed:
             self._number += 1
             self._wanted = Wanted(self._number, scene, moving, region, exposed_in)
             self.paused = False
+            preparation = self._preparation
+            stays = follows or preparation is None or differs_by_view(preparation.wanted.scene, scene)
+            if preparation is not None and not stays:
+                preparation.cancel()
+                self._preparation = None
             # A coarse frame of a movement is short, and is finished: if each move of a pointer ended it, none would come.
-            if not (moving and self._shielded):
+            if not (follows and self._shielded):
                 self._token.cancel()
             self._changed.notify_all()
             return self._number
@@ -138,7 +147,7 @@ class Session:
         with self._changed:
             self._tasks.append(task)
             # A picture that gathers samples goes on afterwards where it was.
-            if isinstance(self._current, _Gathering) and self._current.samples > 0:
+            if isinstance(self._current, Gathering) and self._current.samples > 0:
                 self._token.cancel()
             self._changed.notify_all()
 
@@ -155,20 +164,30 @@ class Session:
             self.paused = paused
             if paused:
                 self._token.cancel()
+            if paused and self._preparation is not None:
+                self._preparation.cancel()
+                self._wanted = self._wanted or self._preparation.wanted
+                self._preparation = None
             self._changed.notify_all()
 
     @property
     def idle(self) -> bool:
         """Whether nothing is under way and nothing is wanted."""
         with self._changed:
-            return not self._busy and not self._tasks and (self.paused or not self._draws())
+            waits = self._busy or self._tasks or self._preparation is not None
+            return not waits and (self.paused or not self._draws())
 
     def close(self, timeout: float | None = 10.0) -> bool:
         """Ends the thread and frees the device's memory; whether it ended in time."""
         with self._changed:
             self._closed = True
             self._token.cancel()
+            preparation = self._preparation
+            if preparation is not None:
+                preparation.cancel()
             self._changed.notify_all()
+        if preparation is not None:
+            preparation.join(timeout)
         if self._thread.is_alive():
             self._thread.join(timeout)
         return not self._thread.is_alive()
@@ -187,9 +206,11 @@ class Session:
                 if work is self._wanted:
                     self._wanted = None
             try:
-                if isinstance(work, Wanted):
+                if isinstance(work, Preparation):
+                    self._arrived(work, token)
+                elif isinstance(work, Wanted):
                     self._begin(work, token)
-                elif isinstance(work, _Gathering):
+                elif isinstance(work, Gathering):
                     self._gather(work, token)
                 elif work is not None:
                     self._do(work, token)
@@ -198,20 +219,28 @@ class Session:
             except ClfractalError as error:
                 self._failed(error)
             except Exception as error:  # a mistake of ours must not freeze the window
-                self._failed(_internal(error))
+                self._failed(internal_error(error))
             finally:
-                self._say("")
+                if self._preparation is None:
+                    self._say("")
         for executor in (self._executor, self._looking, self._aside):
             executor.close()
 
-    def _next(self) -> Wanted | _Gathering | Task | None:
-        """What comes next: a new picture until it has a sample, then all tasks, then more samples."""
-        gathered = self._gathered
+    def _next(self) -> Wanted | Gathering | Task | Preparation | None:
+        """What comes next: a new picture until it has a sample, then all tasks, then more samples.
+
+        While something is prepared, only the old picture: as the newest request looks at it, with one sample.
+        """
+        gathered, preparation = self._gathered, self._preparation
         if not self.paused:
-            if self._wanted is not None:
+            if preparation is not None and preparation.finished:
+                return preparation
+            if self._wanted is not None and (preparation is None or self._wanted is not self._tried):
                 return self._wanted
             if gathered is not None and gathered.samples == 0:
                 return gathered
+        if preparation is not None:
+            return None
         if self._tasks:
             return self._tasks[0]
         more = gathered is not None and not gathered.finished and not self.paused
@@ -229,83 +258,163 @@ class Session:
         self.woken()
 
     def _begin(self, wanted: Wanted, token: CancelToken) -> None:
-        """The first, coarse frames of a picture."""
+        """The first frames of a picture; if it needs what takes long, that is begun, and the old picture goes on."""
+        before = self._gathered
+        late = self._preparation is not None and time.perf_counter() - self._tried_at < TRIED_AGAIN
+        if not late:
+            self._tried_at = time.perf_counter()
+            try:
+                self._show(wanted, token, waits=False)
+            except NotReady:
+                self._gathered = before.again() if before is not None else None
+            else:
+                return
+        with self._changed:
+            newest = self._wanted or wanted
+            if self.paused or self._closed:
+                self._wanted = newest
+                return
+            if self._preparation is None:
+                self._wanted = None
+                self._preparation = Preparation(newest, self._make_ready, self._is_ready)
+            elif newest is wanted:
+                self._wanted = self._tried = wanted
+        self._follow(newest, token)
+
+    def _show(self, wanted: Wanted, token: CancelToken, *, waits: bool) -> None:
+        """The first frames of a picture. One that is stopped begins again later, unless another request replaced it.
+
+        Raises:
+            NotReady: it needs what is not there, and is not to be waited for.
+        """
+        self._executor.waits = self._looking.waits = waits
+        try:
+            self._begun(wanted, token)
+        except Stopped:
+            with self._changed:
+                self._wanted = self._wanted or wanted
+            raise
+        finally:
+            self._executor.waits = self._looking.waits = True
+
+    def _follow(self, newest: Wanted, token: CancelToken) -> None:
+        """The old picture as a request looks at it whose own picture is not there yet."""
+        old, before = self._seen, self._gathered
+        seen = seen_from(old.scene, newest.scene) if old is not None else None
+        if old is None or seen is None or seen == old.scene:
+            return
+        self._executor.waits = self._looking.waits = False
+        try:
+            self._begun(replace(old, scene=seen, moving=True, region=None), token, old=True)
+        except NotReady:
+            self._gathered = before
+        finally:
+            self._executor.waits = self._looking.waits = True
+
+    def _make_ready(self, wanted: Wanted, token: CancelToken) -> Kept:
+        """Programs, grids and measures of a picture; in the preparation's thread."""
+        executors = [LocalExecutor(self.device, budget_seconds=BUDGET_SECONDS, tell=self._tell) for _ in "12"]
+        making, looking = executors
+        making.kept = looking.kept = Borrowing(self._executor.kept)
+        scene = self._fits.fitted(wanted.scene, wanted.moving, token, wanted.exposed_in, looking)
+        job = self._prepared(sharp(scene))
+        making.make_ready(replace(job, views=tuple(view.coarse(2) for view in job.views)), token)
+        return making.kept
+
+    def _is_ready(self) -> None:
+        """Called by a preparation that has ended."""
+        with self._changed:
+            if not self._shielded:
+                self._token.cancel()
+            self._changed.notify_all()
+
+    def _arrived(self, done: Preparation, token: CancelToken) -> None:
+        """Shows what was prepared, as the newest request looks at it; then that is taken."""
+        with self._changed:
+            self._preparation = self._tried = None
+            wanted, newest = done.wanted, self._wanted
+            if newest is not None:
+                seen = seen_from(wanted.scene, newest.scene)
+                if seen is not None and seen == newest.scene:
+                    wanted, self._wanted = newest, None
+                elif seen is not None:
+                    wanted = replace(wanted, scene=seen, moving=True, region=None)
+        if done.error is not None:
+            raise done.error
+        if done.kept is not None:
+            self._executor.kept.adopt(done.kept)
+        self._show(wanted, token, waits=True)
+
+    def _begun(self, wanted: Wanted, token: CancelToken, *, old: bool = False) -> None:
+        """The coarse frames of a picture, and what is gathered next; `old`: while another one is prepared."""
         self._gathered = None
         self._executor.forget()
         with self._changed:
-            self._shielded = wanted.moving
-        try:
-            self._gathered = self._begun(wanted, token)
-        except Stopped:
-            with self._changed:
-                # What was paused, and not replaced by another request, begins again later.
-                self._wanted = self._wanted or wanted
-            raise
-
-    def _begun(self, wanted: Wanted, token: CancelToken) -> _Gathering:
+            newest, self._shielded = self._wanted, wanted.moving
         scene = self._fits.fitted(wanted.scene, wanted.moving, token, wanted.exposed_in)
-        job = self._prepared(_sharp(scene))
+        job = self._prepared(sharp(scene))
         pixels = sum(view.plan.region.pixels for view in job.views)
         divider = self.pacing.divider(pixels)
         seconds = 0.0
-        if self._is_shown(wanted):
-            divider = 1  # a part of a picture that is there is refined: the rest stays as it is
-        elif divider > 1 or wanted.moving or wanted.region is not None:
+        # A part of a picture that is there is refined: the rest stays as it is.
+        shown = shows_whole(self.frame, wanted)
+        if not shown and (divider > 1 or wanted.moving or wanted.region is not None):
             seconds += self._coarse(wanted, job, divider, token, seconds)
+        else:
+            divider = 1
+            self._executor.make_ready(job, token)
+        if not old:
+            self._drop_preparation()  # of an older request
         if wanted.moving:
-            self._settle(token)
+            self._settle(token, newest)
             if scene is not wanted.scene:
                 scene = self._fits.fitted(wanted.scene, False, token, wanted.exposed_in)
-                job = self._prepared(_sharp(scene))
+                job = self._prepared(sharp(scene))
         while divider > 2 and self.pacing.estimate(pixels) > _HALVED_ABOVE:
             divider //= 2
             if divider > 1:
                 seconds += self._coarse(wanted, job, divider, token, seconds)
-        return _Gathering(wanted, job if scene.animation is None else self._prepared(scene), seconds)
+        self._gathered = Gathering(wanted, job if scene.animation is None else self._prepared(scene), seconds)
+
+    def _drop_preparation(self) -> None:
+        with self._changed:
+            if self._preparation is not None:
+                self._preparation.cancel()
+            self._preparation = self._tried = None
 
     def _prepared(self, scene: Scene) -> Job:
         if scene.output.denoise:  # stills are, not what moves
             scene = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
         return prepare(scene, self.device, channels=CHANNELS, on_start=self._tell)
 
-    def _is_shown(self, wanted: Wanted) -> bool:
-        """Whether the newest frame is a whole picture of the wanted scene."""
-        front = self.frame
-        return (
-            front is not None
-            and not wanted.moving
-            and front.divider == 1
-            and front.samples > 0
-            and front.scene == wanted.scene
-        )
-
-    def _settle(self, token: CancelToken) -> None:
-        """Waits until nothing has moved for a while."""
+    def _settle(self, token: CancelToken, newest: Wanted | None) -> None:
+        """Waits until nothing has moved for a while; `newest`: the request that waited when the picture was begun."""
         with self._changed:
             self._shielded = False
-            if self._wanted is not None:
+            if self._wanted is not newest or self._is_over():
                 raise Stopped
             self._changed.wait_for(token, SETTLE_SECONDS)
         token.check()
 
+    def _is_over(self) -> bool:
+        """Whether a preparation has ended, whose picture is to be shown."""
+        return self._preparation is not None and self._preparation.finished
+
     def _coarse(self, wanted: Wanted, job: Job, divider: int, token: CancelToken, before: float) -> float:
         """Renders and publishes a coarse picture; gives the seconds that it took."""
         coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
-        canvas = self._canvas(coarse)
-        state = self._run(coarse, canvas, token)
+        canvas = self._painter.canvas(coarse, self.frame)
+        state = self._painter.run(coarse, canvas, token)
         seconds = state.seconds
         self.pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, seconds)
-        self._publish(wanted, job, coarse, canvas, divider, 1, False, before + seconds, seconds)
+        self._publish(wanted, job, canvas, Growth(coarse.views, divider, 1, False, before + seconds, seconds))
         return seconds
 
-    def _gather(self, work: _Gathering, token: CancelToken) -> None:
+    def _gather(self, work: Gathering, token: CancelToken) -> None:
         """Samples of the whole picture, pass by pass, from where it stands."""
         if work.canvas is None:
-            work.canvas = self._canvas(work.job)
-            front = self.frame
-            if front is not None and len(front.canvas.parts) == len(work.canvas.parts):
-                self._writer.enlarge(front.canvas, work.canvas)
-                work.prepared = True
+            work.canvas = self._painter.canvas(work.job, self.frame)
+            work.prepared = self._painter.enlarged(self.frame, work.canvas)
         if not work.begun:
             work.begin(in_passes=has_room(work.part, self._executor, token))
         while work.ranges:
@@ -318,30 +427,31 @@ class Session:
                 self._executor.forget()
                 self._tell(f"{error.message}; so all samples are made in one pass")
                 work.begin(in_passes=False)
-            if work.ranges and self._tasks:
+            if work.ranges and (self._tasks or self._preparation is not None):
                 raise Stopped
         self._executor.forget()
         if work.cleans:
             self._clean(work, work.canvas, token)
         work.finished = True
 
-    def _clean(self, work: _Gathering, canvas: Canvas, token: CancelToken) -> None:
+    def _clean(self, work: Gathering, canvas: Canvas, token: CancelToken) -> None:
         """Takes the noise out of the whole picture, as its scene wants; one that cannot be stays as it is."""
         problem = None
         try:
             clean(work.job.scene, canvas, self._aside, token, self._tell)
         except FileError as error:
             problem = error
-        self._publish(work.wanted, work.job, work.job, canvas, 1, work.samples, True, work.seconds, 0.0)
+        self._publish(work.wanted, work.job, canvas, work.growth(finished=True))
         self.problem = problem
 
-    def _pass(self, work: _Gathering, canvas: Canvas, token: CancelToken) -> None:
+    def _pass(self, work: Gathering, canvas: Canvas, token: CancelToken) -> None:
         """The next pass; one that was interrupted is done anew: pixels that have its samples already get no more."""
-        part, wanted = work.part, work.wanted
+        part = work.part
         if work.ranges[0][0] > 0 and not self._executor.keeps(len(part.views)):
             work.begin(in_passes=True)  # what was kept went with a drawing that could not be updated
         samples = work.ranges[0]
-        state = self._run(part, canvas, token, work, samples)
+        grown = partial(self._grown, work, canvas)
+        state = self._painter.run(part, canvas, token, numbers=work.numbers, samples=samples, grown=grown)
         work.ranges.pop(0)
         seconds = state.seconds
         work.seconds += seconds
@@ -352,91 +462,26 @@ class Session:
             self.pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
         if not work.ranges or samples[0] == 0 or work.schedule.due(time.perf_counter()):
             last = not work.ranges and not work.cleans
-            self._publish(wanted, work.job, work.job, canvas, 1, work.samples, last, work.seconds, seconds)
+            self._publish(work.wanted, work.job, canvas, work.growth(seconds, finished=last))
 
-    def _grown(self, work: _Gathering, canvas: Canvas, seconds: float) -> None:
+    def _grown(self, work: Gathering, canvas: Canvas, state: Progress) -> None:
         """Shows a picture whose pass is under way."""
         if work.prepared and work.schedule.due(time.perf_counter()):
-            job = work.job
-            self._publish(
-                work.wanted, job, job, canvas, 1, work.samples, False, work.seconds + seconds, seconds
-            )
+            self._publish(work.wanted, work.job, canvas, work.growth(state.seconds, more=state.seconds))
 
-    def _run(
-        self,
-        job: Job,
-        canvas: Canvas,
-        token: CancelToken,
-        work: _Gathering | None = None,
-        samples: tuple[int, int] | None = None,
-    ) -> Progress:
-        """One pass onto a canvas; `work` is shown as it grows."""
-        numbers = range(len(job.views)) if work is None else work.numbers
-        stores = [CanvasStore(canvas, view, number) for view, number in zip(job.views, numbers, strict=True)]
-        writer = self._writer
-        self._executor.outlet = lambda view, film, places, tiles: writer.place(
-            canvas, numbers[view], job.views[view].plan.region, film, places, tiles
-        )
-        grown = None if work is None else lambda state: self._grown(work, canvas, state.seconds)
-        state = run(job, stores, self._executor, token=token, samples=samples, progress=grown)
-        with self.device.failures("rendering"):
-            self.device.queue.finish()
-        return state
-
-    @property
-    def _writer(self) -> CanvasKernels:
-        if self._kernels is None:
-            self._kernels = CanvasKernels(self.device)
-        return self._kernels
-
-    def _canvas(self, job: Job) -> Canvas:
-        canvas = self.pool.take(self.frame.canvas if self.frame is not None else None)
-        canvas.fit(job.views)
-        return canvas
-
-    def _publish(
-        self,
-        wanted: Wanted,
-        job: Job,
-        rendered: Job,
-        canvas: Canvas,
-        divider: int,
-        samples: int,
-        finished: bool,
-        seconds: float,
-        frame_seconds: float,
-    ) -> None:
+    def _publish(self, wanted: Wanted, job: Job, canvas: Canvas, growth: Growth) -> None:
+        """Shows what is on a canvas."""
         self._frames += 1
-        self.frame = Frame(
-            self._frames,
-            wanted.number,
-            wanted.scene,
-            job,
-            rendered.views,
-            canvas,
-            divider,
-            samples,
-            finished,
-            seconds,
-            frame_seconds,
-            canvas.stamp,
-        )
+        self.frame = Frame.of(self._frames, wanted.number, wanted.scene, job, canvas, growth)
+        self._seen = wanted
         self.problem = None
-        self.progress = ""
+        if self._preparation is None:
+            self.progress = ""
         self.woken()
 
     def _do(self, task: Task, token: CancelToken) -> None:
         """Some of a task's work; what is unfinished is gone on with later."""
-        try:
-            if not task.finished:
-                task.work(self._aside, token, self._tell)
-        except Stopped:
-            if not task.finished:
-                raise
-        except ClfractalError as error:
-            task.failed(error)
-        except Exception as error:  # the picture goes on
-            task.failed(_internal(error))
+        do_some(task, self._aside, token, self._tell)
         with self._changed:
             self._tasks.remove(task)
         self.woken()
@@ -448,53 +493,3 @@ class Session:
         if line != self.progress:
             self.progress = line
             self.woken()
-
-
-def _internal(error: Exception) -> DeviceError:
-    return DeviceError(f"internal error, please report it: {type(error).__name__}: {error}")
-
-
-def _sharp(scene: Scene) -> Scene:
-    """A scene without motion blur, whose noise would hide a coarse picture."""
-    return scene.model_copy(update={"animation": None}) if scene.animation is not None else scene
-
-
-class _Gathering:
-    """A whole picture that gathers samples; `part` is the job of what is refined of it, by the views with `numbers`."""
-
-    def __init__(self, wanted: Wanted, job: Job, seconds: float) -> None:
-        self.wanted, self.job, self.seconds = wanted, job, seconds
-        self.part, self.numbers = _clipped(job, wanted.region)
-        self.canvas: Canvas | None = None
-        self.ranges: list[tuple[int, int]] = []
-        self.begun = self.in_passes = False
-        self.schedule = Schedule(0.0)
-        self.samples = 0
-        self.prepared = False
-        self.finished = False
-        self.cleans = wanted.scene.output.denoise and wanted.region is None  # of its noise, at the end
-
-    def begin(self, *, in_passes: bool) -> None:
-        """All samples are still to be made, in passes or at once."""
-        samples = self.part.samples
-        self.begun, self.in_passes = True, in_passes
-        self.ranges = pass_ranges(samples) if in_passes else [(0, samples)]
-        self.schedule = Schedule(time.perf_counter())
-
-
-def _clipped(job: Job, region: tuple[int, int, int, int] | None) -> tuple[Job, tuple[int, ...]]:
-    """A job's views as far as they lie in a part of each eye's picture, and their numbers; all if nothing lies there."""
-    if region is None:
-        return job, tuple(range(len(job.views)))
-    views: dict[int, PlannedView] = {}
-    left, top, right, bottom = region[0], region[1], region[0] + region[2], region[1] + region[3]
-    for number, (view, place) in enumerate(zip(job.views, Arrangement.of(job).places, strict=True)):
-        whole = view.plan.region
-        x, y = max(left - place.x, whole.x), max(top - place.y, whole.y)
-        width, height = min(right - place.x, whole.right) - x, min(bottom - place.y, whole.bottom) - y
-        if width > 0 and height > 0:
-            plan = replace(view.plan, region=Region(x, y, width, height))
-            views[number] = replace(view, plan=plan)
-    if not views:
-        return job, tuple(range(len(job.views)))
-    return replace(job, views=tuple(views.values())), tuple(views)

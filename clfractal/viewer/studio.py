@@ -41,6 +41,8 @@ _PATIENCE = 0.25
 # Within so many seconds an equal line is the same event.
 _AGAIN = 0.1
 _PATIENCE_AT_END = 2.0
+# A drag that pauses for so many seconds, after those in which more of it is expected, is rendered as if it had ended.
+_PAUSE = 2.0
 MOST_MESSAGES = 200
 MOST_THUMBNAILS = 300
 
@@ -101,6 +103,7 @@ class Studio(InFilm):
         self._thumbnails: dict[Hashable, Thumbnail] = {}
         self._requested: Any = None
         self._live: tuple[str, ...] = ()
+        self._live_from: Scene | None = None  # as it was when the drag began
         self.session = Session(device, pacing, woken)
         self.session.start()
 
@@ -133,6 +136,7 @@ class Studio(InFilm):
         for path in values:
             self.problems.pop(path, None)
         if gesture is not None:
+            self._live_from = self._live_from or self.scene
             self._live = tuple(
                 path.split(".")[2] for path in values if path.startswith("formula.parameters.")
             )
@@ -192,9 +196,9 @@ class Studio(InFilm):
     def end_gesture(self) -> None:
         """A drag has ended: the next edit is a new step, and the picture goes to full resolution."""
         self.history.seal()
-        self._live = ()
+        self._live, self._live_from = (), None
         self._moving_until = 0.0
-        self.refresh()
+        self.refresh(follows=True)
 
     def undo(self, kind: Kind = "scene") -> bool:
         """Takes back the last step of one stack, at the film's frame at which it was made; whether there was one."""
@@ -248,27 +252,35 @@ class Studio(InFilm):
         if self._requested is not None:
             self.refresh()
 
-    def refresh(self, *, again: bool = False) -> None:
+    def refresh(self, *, again: bool = False, follows: bool = False) -> None:
         """Asks for a picture of what is wanted now, unless it is there or under way already.
 
         Args:
             again: render even what is there (the device has changed, or the user insists).
+            follows: it ends a movement, and comes after what was begun for that; see `Session.request`.
         """
-        moving = time.perf_counter() < self._moving_until
-        live = self._live if moving else ()
+        moving, live = time.perf_counter() < self._moving_until, self._live
         exposed_in = self.exposed_in
         key = (render_key(self.shown_scene), self.region, live, exposed_in)
         failed = self.session.frame is None and self.session.problem is not None and not moving
         if not again and key == self._requested and not failed:
             return
         self._requested = key
-        wanted = with_live(key[0], live) if live else key[0]
-        self.session.request(wanted, moving=moving, region=self.region, exposed_in=exposed_in)
+        wanted = with_live(key[0], live, self._live_from) if live else key[0]
+        self.session.request(
+            wanted, moving=moving, region=self.region, exposed_in=exposed_in, follows=follows
+        )
 
     def tick(self) -> None:
-        """Asks for the first picture, and renders a drag that pauses with the scene's own program; called every turn."""
-        if self._requested is None or (self._live and time.perf_counter() >= self._moving_until):
+        """Asks for the first picture, and renders a drag that pauses with the scene's own program; called every turn.
+
+        Not at once: a slow drag pauses often, and that program may take as long to compile as the pause lasts.
+        """
+        if self._requested is None:
             self.refresh()
+        if self._live and time.perf_counter() >= self._moving_until + _PAUSE:
+            self._live, self._live_from = (), None
+            self.refresh(follows=True)
 
     def set_region(self, region: tuple[int, int, int, int] | None) -> None:
         """Refines only a part of the picture: x, y, width, height, pixels of each eye's picture; None: all again."""

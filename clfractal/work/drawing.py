@@ -122,6 +122,7 @@ class Drawing:
             DeviceError: too little memory (status 2), or the device failed.
             KernelBuildError: the program does not compile.
             Stopped: cancelled while a program was built or a grid was filled.
+            NotReady: something of that would have to be made first, and is not waited for.
         """
         plan, built_before = view.plan, self.device.loaded.building.milliseconds
         kernel = _kernel_of(view.scene.renderer.type)(view, resources)
@@ -250,6 +251,7 @@ class Drawing:
                 warm=launches,
                 on_compile=resources.on_compile,
                 stopped=lambda: ended.is_set() or (resources.token is not None and resources.token()),
+                waits=resources.waits,
             )
 
         # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all.

@@ -50,6 +50,7 @@ class LocalExecutor:
 
     `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no films and no statistics.
     `supply`, if it is set, gives each launch its tiles; an item then only tells which ones it may give.
+    `waits` is whether programs are built and grids filled that are not there yet; else there is `NotReady`.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class LocalExecutor:
         self.kept = Kept()
         self.outlet: ViewOutlet | None = None
         self.supply: Supply | None = None
+        self.waits = True
         self._outputs = OutputBuffers(device)
         self._drawings: dict[int, Drawing] = {}
 
@@ -72,7 +74,8 @@ class LocalExecutor:
         self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
     ) -> Generator[Result]:
         """See `Executor`. Tiles of a view come in the order in which they are wanted."""
-        self.kept.begin_picture()
+        if self.waits:  # else it may come to nothing, and what the picture before needs has to stay
+            self.kept.begin_picture()
         for item in items:
             if len(item.tiles):
                 view = job.views[item.view]
@@ -99,6 +102,16 @@ class LocalExecutor:
         self.device.check_memory(sum(needs), "a picture in passes", largest=max(needs))
         if self.tell is not None and sum(needs) >= _WORTH_TELLING:
             self.tell(f"a picture in passes needs {shown_size(sum(needs))} of device memory")
+
+    def make_ready(self, job: Job, token: CancelToken | None = None) -> None:
+        """Builds the programs of a job and fills its grids, which stay in `kept`; nothing is rendered.
+
+        Raises:
+            DeviceError, KernelBuildError: as of a render.
+            Stopped: the token was set.
+        """
+        for number, view in enumerate(job.views):
+            self._drawing(number, view, 1, token)
 
     def forget(self) -> None:
         """Frees the data kept between the passes of a picture."""
@@ -157,7 +170,8 @@ class LocalExecutor:
     def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
         # Put back only when it is complete: one whose update failed is half of each view.
         drawing = self._drawings.pop(number, None) or Drawing(self.device, self._outputs)
-        drawing.update(view, Resources(self.device, self.kept, self.tell, token), tiles=tiles)
+        resources = Resources(self.device, self.kept, self.tell, token, self.waits)
+        drawing.update(view, resources, tiles=tiles)
         self._drawings[number] = drawing
         return drawing
 

@@ -14,6 +14,7 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError, SceneError
 from clfractal.scene.model import Scene
+from clfractal.viewer import painting
 from clfractal.viewer import session as sessions_module
 from clfractal.viewer.background import Thumbnail
 from clfractal.viewer.pacing import Pacing
@@ -296,7 +297,7 @@ def test_a_device_that_fails_is_told(
     with session_on(device) as watch:
         before = watch.finished(scene_of())
         with monkeypatch.context() as patch:
-            patch.setattr(sessions_module, "run", raising(error))
+            patch.setattr(painting, "run", raising(error))
             for moving in (False, True):
                 watch.session.request(turned(scene_of(), 0.2), moving=moving)
                 wait_for(lambda: watch.session.problem is not None)

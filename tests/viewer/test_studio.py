@@ -158,8 +158,14 @@ def test_a_dragged_parameter_needs_one_program(studio: Studio) -> None:
 def test_a_drag_that_pauses_shows_the_scenes_own_bits(studio: Studio) -> None:
     rest(studio)
     studio.edit({"formula.parameters.power": 7.5}, "power")
-    time.sleep(0.5)
-    studio.tick()
+    before = studio.frame
+
+    def ticked() -> bool:
+        studio.tick()
+        frame = studio.frame
+        return frame is not None and frame is not before and not frame.scene.formula.live
+
+    wait_for(ticked)
     converged(studio)
 
 
@@ -169,6 +175,14 @@ def test_live_parameters(device: Device) -> None:
     assert live.formula.live == ("power",)
     assert with_live(live, ["power"]) is live
     assert with_live(scene, []) is scene
+    # Where the values only are constants of one text, its program is there already.
+    box = [
+        scene_of(BULB, f"formula={{name: mandelbox, parameters: {{scale: {value}}}}}") for value in (2.0, 1.7)
+    ]
+    assert with_live(box[1], ["scale"], box[0]) is box[1]
+    assert with_live(scene_of(BULB, "formula.parameters={power: 7.5}"), ["power"], scene).formula.live == (
+        "power",
+    )
     ball = scene_of(BALL)
     assert with_live(ball, ["nothing"]) is ball
 

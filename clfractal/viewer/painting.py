@@ -1,0 +1,76 @@
+"""Renders a job's views onto a canvas, so that they can be shown while they grow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from clfractal.device.cancel import CancelToken
+from clfractal.device.select import Device
+from clfractal.viewer.frame import CanvasPool, Frame
+from clfractal.work.canvas import Canvas, CanvasKernels, CanvasStore
+from clfractal.work.job import Job
+from clfractal.work.local import LocalExecutor
+from clfractal.work.run import Progress, run
+
+
+class Painter:
+    """Canvases of a device, and what draws on them.
+
+    Args:
+        pool: where canvases come from.
+        executor: renders.
+    """
+
+    def __init__(self, device: Device, pool: CanvasPool, executor: LocalExecutor) -> None:
+        self.device, self.pool, self.executor = device, pool, executor
+        self._kernels: CanvasKernels | None = None
+
+    def canvas(self, job: Job, front: Frame | None) -> Canvas:
+        """A canvas for a job's views; not the one of the frame that is shown."""
+        canvas = self.pool.take(front.canvas if front is not None else None)
+        canvas.fit(job.views)
+        return canvas
+
+    def enlarged(self, front: Frame | None, canvas: Canvas) -> bool:
+        """Fills a canvas with the frame that is shown, until it has a picture of its own; whether that was possible."""
+        if front is None or len(front.canvas.parts) != len(canvas.parts):
+            return False
+        self._writer.enlarge(front.canvas, canvas)
+        return True
+
+    def run(
+        self,
+        job: Job,
+        canvas: Canvas,
+        token: CancelToken,
+        *,
+        numbers: Sequence[int] | None = None,
+        samples: tuple[int, int] | None = None,
+        grown: Callable[[Progress], None] | None = None,
+    ) -> Progress:
+        """One pass onto a canvas.
+
+        Args:
+            numbers: of the canvas's parts that the job's views belong to; None: all.
+            samples: see `WorkItem`; None: all.
+            grown: called after each launch.
+
+        Raises:
+            DeviceError, KernelBuildError, NotReady, Stopped: as of the executor.
+        """
+        numbers = range(len(job.views)) if numbers is None else numbers
+        stores = [CanvasStore(canvas, view, number) for view, number in zip(job.views, numbers, strict=True)]
+        writer = self._writer
+        self.executor.outlet = lambda view, film, places, tiles: writer.place(
+            canvas, numbers[view], job.views[view].plan.region, film, places, tiles
+        )
+        state = run(job, stores, self.executor, token=token, samples=samples, progress=grown)
+        with self.device.failures("rendering"):
+            self.device.queue.finish()
+        return state
+
+    @property
+    def _writer(self) -> CanvasKernels:
+        if self._kernels is None:
+            self._kernels = CanvasKernels(self.device)
+        return self._kernels

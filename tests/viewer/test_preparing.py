@@ -1,0 +1,262 @@
+"""What takes long before a picture's first ray: once begun it is finished, and the old picture follows the camera."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from clfractal.device import cache, program
+from clfractal.device.select import Device
+from clfractal.errors import DeviceError, Stopped
+from clfractal.renderers.volume import VolumeKernel
+from clfractal.scene.model import Scene
+from clfractal.viewer.editing import edited
+from clfractal.viewer.frame import Frame
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.preparing import differs_by_view, seen_from
+from clfractal.viewer.studio import Studio
+from tests.viewer.sessions import BULB, STEREO, equal_pictures, films_of, scene_of, session_on, wait_for
+from tests.viewer.test_session import SCENES, shell, turned
+
+SLOW = 1.2
+"""Seconds that a program takes here at least, whatever the machine compiles it in."""
+
+
+class Slow:
+    """Makes compiling slow, as a driver may be; counts what was begun, and what was finished."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self.begun = self.ended = 0
+        self._compile: Callable[..., Any] = program._compile
+
+    def __call__(self, *arguments: Any, stopped: Callable[[], bool] | None, **options: Any) -> Any:
+        self.begun += 1
+        end = time.perf_counter() + self.seconds
+        while time.perf_counter() < end:
+            if stopped is not None and stopped():
+                raise Stopped
+            time.sleep(0.005)
+        found = self._compile(*arguments, stopped=stopped, **options)
+        self.ended += 1
+        return found
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> Slow:
+    found = Slow()
+    monkeypatch.setattr(program, "_compile", found)
+    # What is in the cache on the disk is not compiled.
+    monkeypatch.setattr(cache, "load_blob", lambda key: None)
+    monkeypatch.setattr(cache, "store_blob", lambda key, blob: None)
+    return found
+
+
+class Shown:
+    """A studio whose frames are kept, with the times at which they came."""
+
+    def __init__(self, scene: Scene, device: Device) -> None:
+        self.frames: list[tuple[float, Frame]] = []
+        self.studio = Studio(scene, device, Pacing(), self._woken)
+        self.studio.viewport = (96, 64)
+        self.studio.refresh()
+        self.rest()
+
+    def _woken(self) -> None:
+        frame = self.studio.session.frame
+        if frame is not None and (not self.frames or self.frames[-1][1] is not frame):
+            self.frames.append((time.perf_counter(), frame))
+
+    def rest(self) -> Frame:
+        """The frame when nothing is under way any more."""
+        wait_for(lambda: self.studio.session.idle)
+        frame = self.studio.session.frame
+        assert frame is not None
+        return frame
+
+    def wait(self, seconds: float) -> None:
+        """As the window's loop does."""
+        end = time.perf_counter() + seconds
+        while time.perf_counter() < end:
+            self.studio.tick()
+            time.sleep(0.01)
+
+
+@pytest.fixture
+def shown(device: Device, slow: Slow) -> Iterator[Shown]:
+    found = Shown(scene_of(), device)
+    yield found
+    found.studio.close()
+
+
+def power(frame: Frame) -> float:
+    return float(frame.scene.formula.parameters.get("power", 8))
+
+
+def test_a_slow_drag_of_a_parameter_shows_pictures(shown: Shown, slow: Slow) -> None:
+    """Each value comes before the preparation of the one before is done, and pauses are longer than a move is expected."""
+    slow.seconds = SLOW
+    shown.frames.clear()
+    start, last = time.perf_counter(), 0.0
+    values = [5.5 + 0.1 * step for step in range(10)]
+    for value in values:
+        shown.studio.edit({"formula.parameters.power": value}, "power")
+        last = time.perf_counter()
+        shown.wait(0.6)
+    during = [(at - start, power(frame)) for at, frame in shown.frames if at < last and power(frame) != 8]
+    assert during, "no picture while the slider was dragged"
+    longest = max(
+        after - before for before, after in pairwise([0.0, *(at for at, _ in during), last - start])
+    )
+    assert longest < 2 * SLOW + 1.5
+    assert [each for _, each in during] == sorted(each for _, each in during)
+    assert len({each for _, each in during}) >= 3
+    # One program for all of them; the next is that of the last value alone.
+    assert slow.begun == slow.ended
+    count = slow.begun
+    shown.studio.end_gesture()
+    frame = shown.rest()
+    assert slow.begun == count + 1
+    assert (power(frame), frame.scene.formula.live) == (values[-1], ())
+    slow.seconds = 0.0
+    equal_pictures(films_of(frame).picture(), shell(shown.studio.shown_scene))
+
+
+def test_where_each_value_is_a_program_each_that_was_begun_is_shown(device: Device, slow: Slow) -> None:
+    """Then the newest is taken; none is thrown away."""
+    with session_on(device) as watch:
+        watch.finished(scene_of())
+        watch.frames.clear()
+        slow.seconds, count = 0.5, slow.begun
+        start, step = time.perf_counter(), 0
+        while time.perf_counter() - start < 5:
+            step += 1
+            watch.session.request(
+                scene_of(BULB, f"formula.parameters={{power: {5.25 + 0.001 * step}}}"), moving=True
+            )
+            time.sleep(0.03)
+        number = watch.session.request(scene_of(BULB, "formula.parameters={power: 5.9}"), follows=True)
+        frame = watch.rest()
+        powers = [each for each in dict.fromkeys(power(each) for each in watch.frames) if each != 8]
+        assert len(powers) >= 3
+        assert powers == sorted(powers)
+        assert slow.begun - count == slow.ended - count == len(powers)
+        assert (frame.request, frame.finished, power(frame)) == (number, True, 5.9)
+
+
+def test_the_old_picture_follows_the_camera(shown: Shown, slow: Slow) -> None:
+    slow.seconds = SLOW
+    shown.studio.edit({"formula.parameters.power": 6.3})
+    shown.frames.clear()
+    step = 0
+    while not any(power(frame) == 6.3 for _, frame in shown.frames):
+        step += 1
+        shown.studio.set_camera(turned(shown.studio.scene, 0.01 * step).camera, "orbit")
+        shown.wait(0.05)
+        assert step < 600
+    followed = [frame for _, frame in shown.frames if power(frame) == 8]
+    places = [frame.scene.camera.position for frame in followed]
+    assert len(set(places)) == len(places) >= 5
+    # And the new one is seen at once from where the camera is by then.
+    first = next(frame for _, frame in shown.frames if power(frame) == 6.3)
+    assert first.scene.camera.position not in places[:-2]
+    shown.studio.end_gesture()
+    slow.seconds = 0.0
+    frame = shown.rest()
+    assert (power(frame), frame.finished) == (6.3, True)
+    equal_pictures(films_of(frame).picture(), shell(shown.studio.shown_scene))
+
+
+def test_a_grid_is_filled_while_the_old_one_is_seen(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(BULB, *SCENES["volume"])
+    fill, fills = VolumeKernel._fill, [0]
+
+    def slowly(self: VolumeKernel) -> Any:
+        fills[0] += 1
+        end = time.perf_counter() + SLOW
+        while time.perf_counter() < end:
+            assert self.resources.token is not None
+            self.resources.token.check()
+            time.sleep(0.005)
+        return fill(self)
+
+    with session_on(device) as watch:
+        watch.finished(scene)
+        monkeypatch.setattr(VolumeKernel, "_fill", slowly)
+        zoomed = edited(scene, {"renderer.zoom": [{"center": [0, 0, 0], "scale": 2.0}]})
+        watch.session.request(zoomed)
+        time.sleep(0.1)
+        watch.frames.clear()
+        for step in range(1, 7):
+            number = watch.session.request(turned(zoomed, 0.05 * step), moving=True)
+            time.sleep(0.1)
+        frame = watch.rest()
+        old = [each for each in watch.frames if each.scene.renderer == scene.renderer]
+        assert len({each.scene.camera.position for each in old}) >= 3
+        assert (frame.request, frame.finished, fills[0]) == (number, True, 1)
+        monkeypatch.setattr(VolumeKernel, "_fill", fill)
+        equal_pictures(films_of(frame).picture(), shell(turned(zoomed, 0.3)))
+
+
+def test_another_scene_does_not_wait(device: Device, slow: Slow) -> None:
+    with session_on(device) as watch:
+        watch.finished(scene_of())
+        slow.seconds = 30.0
+        watch.session.request(scene_of(BULB, "formula.parameters={power: 5.3}"), moving=True)
+        time.sleep(0.2)
+        start = time.perf_counter()
+        # A window of another size is no other scene: what was begun for it goes on.
+        watch.session.request(scene_of(BULB, "formula.parameters={power: 5.3}", "image.width=90"))
+        time.sleep(0.2)
+        assert slow.begun - slow.ended == 1
+        frame = watch.finished(turned(scene_of(), 0.5))
+        assert time.perf_counter() - start < 10
+        equal_pictures(films_of(frame).picture(), shell(turned(scene_of(), 0.5)))
+
+
+def test_it_closes_and_pauses_while_something_is_prepared(device: Device, slow: Slow) -> None:
+    with session_on(device) as watch:
+        watch.finished(scene_of())
+        slow.seconds = 30.0
+        number = watch.session.request(scene_of(BULB, "formula.parameters={power: 5.4}"))
+        time.sleep(0.2)
+        assert not watch.session.idle
+        watch.session.pause()
+        wait_for(lambda: watch.session.idle, 10)
+        slow.seconds = 0.0
+        watch.session.pause(False)
+        frame = watch.rest()
+        assert (frame.request, power(frame)) == (number, 5.4)
+        slow.seconds = 30.0
+        watch.session.request(scene_of(BULB, "formula.parameters={power: 5.6}"))
+        time.sleep(0.2)
+        start = time.perf_counter()
+    assert time.perf_counter() - start < 5
+
+
+def test_what_cannot_be_prepared_is_told(device: Device, slow: Slow, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(*_: object, **__: object) -> Any:
+        raise DeviceError("no room for it")
+
+    with session_on(device) as watch:
+        before = watch.finished(scene_of())
+        monkeypatch.setattr(program, "_compile", failing)
+        watch.session.request(scene_of(BULB, "formula.parameters={power: 5.7}"))
+        wait_for(lambda: watch.session.problem is not None)
+        wait_for(lambda: watch.session.idle)
+        assert "no room for it" in str(watch.session.problem)
+        assert watch.session.frame is before
+
+
+def test_the_same_from_elsewhere() -> None:
+    scene = scene_of(BULB, STEREO)
+    other = turned(scene_of(BULB, STEREO, "image.width=50", "stereo.mode=rows"), 0.4)
+    assert differs_by_view(scene, other)
+    assert seen_from(scene, other) == other
+    assert not differs_by_view(scene, edited(other, {"material.diffuse": 0.2}))
+    flat = scene_of(BULB, "camera={projection: orthographic, position: [0, -3, 0]}")
+    assert seen_from(scene_of(), flat) == flat
