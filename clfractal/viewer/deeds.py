@@ -13,7 +13,7 @@ from clfractal.device.select import choose, devices
 from clfractal.errors import ClfractalError
 from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
-from clfractal.viewer.panels import all_panels
+from clfractal.viewer.panels import all_panels, keyboard
 from clfractal.viewer.scene_deeds import SceneDeeds
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ class Deeds:
             **self.scene.deeds,
             **self._film(),
             **{name: self._switch(part) for name, part in _PARTS.items()},
+            "into_panels": lambda: keyboard.enter(viewer.ui),
             "next_device": self._next_device,
             "full_screen": viewer.outputs.full_screen,
             "span_monitors": viewer.outputs.span,
@@ -146,6 +147,8 @@ class Deeds:
             viewer.ui.memory[all_panels.CLOSE_MENU] = True
         elif imgui.get_io().want_text_input:
             return  # the field gives up what was typed
+        elif keyboard.inside(viewer.ui):
+            keyboard.leave(viewer.ui)
         elif self.flying:
             self.fly()
         elif viewer.controls.cancel():

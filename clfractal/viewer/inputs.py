@@ -12,6 +12,7 @@ from clfractal.viewer import window
 from clfractal.viewer.deeds import HELD
 from clfractal.viewer.flying import Key
 from clfractal.viewer.keys import KEYS, PRINTABLE, Context, KeyEvent
+from clfractal.viewer.panels import keyboard
 from clfractal.viewer.recording import Event, Player, Recorder, Recording
 
 if TYPE_CHECKING:
@@ -142,6 +143,7 @@ class Inputs:
             io.add_mouse_button_event(button, action == PRESS)
         if action == PRESS and not over_panels and not viewer.deeds.flying:
             imgui.set_window_focus(None)
+            keyboard.leave(viewer.ui)
             aim = viewer.aim_at(*self.pointer)
             viewer.controls.press(button, mods, self._in_picture(), aim, now)
 
@@ -166,7 +168,8 @@ class Inputs:
             if held is not None:
                 viewer.motion.keys.discard(held)
             return
-        context: Context = "text" if io.want_text_input else "fly" if viewer.deeds.flying else "picture"
+        typing = io.want_text_input or keyboard.inside(viewer.ui)
+        context: Context = "text" if typing else "fly" if viewer.deeds.flying else "picture"
         viewer.ui.keys.layout = layout = window.layout(PRINTABLE)
         event = KeyEvent(key, scancode, mods, name, frozenset(map(str.lower, layout.values())))
         found = viewer.ui.keys.matches(event, context)

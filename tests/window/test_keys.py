@@ -196,8 +196,30 @@ def test_escape_closes_a_menu_and_a_text_alone(display: Display, folder: Path) -
         for place in ((130, 86), (210, 114)):
             opened.click(*place)
             opened.move(*rest)
-            assert (opened.still() != plain).any()
+            wait_for(lambda: not np.array_equal(opened.pixels(), plain), "what was clicked on")
+            opened.display.xdotool("sleep", 0.3)
             opened.keys("Escape")
             wait_for(lambda: np.array_equal(opened.pixels(), plain), "the picture of before")
         opened.keys("Escape")
         wait_for(lambda: not np.array_equal(opened.pixels(), plain), "the line that gathering has stopped")
+
+
+def test_tab_goes_into_the_panels_and_escape_back(display: Display, folder: Path) -> None:
+    """In the panels arrows move no camera; back in the picture they do."""
+    (folder / "s.yaml").write_text(SPHERE)
+    with Window(display, folder, "s.yaml", "--size", "900x500") as opened:
+        opened.move(700, 250)
+        opened.still(1.0)
+        before = opened.scene()
+
+        def press(*keys: str) -> None:
+            """One after the other, and time to take them in: the cursor of the search line blinks."""
+            for key in keys:
+                opened.keys(key)
+                opened.display.xdotool("sleep", 0.4)
+
+        press("Tab", "Tab", "Left", "Down")
+        assert opened.scene().camera == before.camera
+        press("Escape", "Left")
+        opened.still()
+        assert opened.scene().camera != before.camera

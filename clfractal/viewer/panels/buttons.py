@@ -77,11 +77,18 @@ def icon_button(icon: str, about: str, *, name: str = "", on: bool = False, enab
     return bool(clicked)
 
 
+def area(name: str, size: tuple[float, float]) -> bool:
+    """A place without a look of its own, for widgets that are drawn by hand: the pointer and the keyboard reach it; whether
+    it was clicked.
+    """
+    return bool(imgui.invisible_button(name, imgui.ImVec2(*size), imgui.ButtonFlags_.enable_nav))
+
+
 def toggle(name: str, on: bool, about: str = "") -> bool:
     """A switch; whether it was clicked."""
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     wide, high = 28.0, 15.0
-    clicked = imgui.invisible_button(f"##{name}", imgui.ImVec2(wide, height))
+    clicked = area(f"##{name}", (wide, height))
     hovered = imgui.is_item_hovered()
     draw = imgui.get_window_draw_list()
     top = corner.y + (height - high) / 2
@@ -137,7 +144,7 @@ def segments(name: str, words: Mapping[T, str], current: T, width: float) -> T |
         row, column = divmod(number, in_row)
         left, top = corner.x + column * each_width, corner.y + row * height
         imgui.set_cursor_screen_pos(imgui.ImVec2(left, top))
-        if imgui.invisible_button(f"##{name}.{each}", imgui.ImVec2(each_width, height)) and each != current:
+        if area(f"##{name}.{each}", (each_width, height)) and each != current:
             found = each
         if each == current:
             draw.add_rect_filled(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from imgui_bundle import imgui
 
 from clfractal.viewer.panels import theme
-from clfractal.viewer.panels.buttons import clipped
+from clfractal.viewer.panels.buttons import area, clipped
 from clfractal.viewer.panels.ui import Ui
 
 GAP = 10.0
@@ -54,7 +54,7 @@ def height(width: float, card: Card | None = None) -> float:
 def draw(ui: Ui, name: str, card: Card, width: float) -> bool:
     """Draws a card at the cursor; whether it was clicked. It is the last item, for tooltips and double clicks."""
     corner, picture = imgui.get_cursor_screen_pos(), width * 9 / 16
-    clicked = imgui.invisible_button(f"##{name}", imgui.ImVec2(width, height(width, card)))
+    clicked = area(f"##{name}", (width, height(width, card)))
     hovered = imgui.is_item_hovered()
     draw_list = imgui.get_window_draw_list()
     far = imgui.ImVec2(corner.x + width, corner.y + picture)

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.files.srgb import decode, encode
 from clfractal.viewer.panels import theme
-from clfractal.viewer.panels.buttons import tip
+from clfractal.viewer.panels.buttons import area, tip
 from clfractal.viewer.panels.ui import Ui
 
 Color = tuple[float, float, float]
@@ -43,7 +43,7 @@ def color_button(ui: Ui, path: str, color: Sequence[float], width: float, *, hei
     codes, gain = shown(color)
     corner, height = imgui.get_cursor_screen_pos(), height or imgui.get_frame_height()
     name = f"##{path}.picker"
-    if imgui.invisible_button(f"##{path}.swatch", imgui.ImVec2(width, height)):
+    if area(f"##{path}.swatch", (width, height)):
         imgui.open_popup(name)
         ui.memory["picker"] = (path, codes)
     draw = imgui.get_window_draw_list()

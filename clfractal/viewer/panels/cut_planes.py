@@ -15,6 +15,7 @@ from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer import plane_moves
 from clfractal.viewer.panels import palette_editor, renderer, theme
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
@@ -60,7 +61,7 @@ def _line(ui: Ui, index: int, chosen: bool) -> bool:
     plane = ui.studio.scene.cut_planes[index]
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     wide = imgui.get_content_region_avail().x
-    clicked = imgui.invisible_button(f"##plane{index}", imgui.ImVec2(wide, height))
+    clicked = area(f"##plane{index}", (wide, height))
     draw = imgui.get_window_draw_list()
     if chosen or imgui.is_item_hovered():
         back = theme.ACCENT_FAINT if chosen else theme.FRAME

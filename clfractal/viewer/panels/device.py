@@ -11,6 +11,7 @@ from clfractal.device.select import DeviceInfo, devices, shown_size
 from clfractal.errors import ClfractalError
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.ui import Ui
 
 
@@ -56,7 +57,7 @@ def _line(info: DeviceInfo, current: bool) -> bool:
     """One device; whether it was clicked."""
     corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     height = 38.0
-    clicked = imgui.invisible_button(f"##device{info.index}", imgui.ImVec2(wide, height))
+    clicked = area(f"##device{info.index}", (wide, height))
     hovered = imgui.is_item_hovered()
     kinds = f"{info.platform}\n{info.version}\nDriver {info.driver}"
     w.tip(kinds if current else f"Go on with this device\n{kinds}")

@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 from clfractal.viewer.history import Kind, Step
 from clfractal.viewer.panels import right_dock, theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import clipped
+from clfractal.viewer.panels.buttons import area, clipped
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
@@ -86,7 +86,7 @@ def _steps(ui: Ui, kind: Kind, steps: list[Step], now: int) -> None:
 def _row(name: str, text: str, here: bool, *, faint: bool) -> bool:
     wide, high = imgui.get_content_region_avail().x, imgui.get_text_line_height() + 1
     corner = imgui.get_cursor_screen_pos()
-    clicked = imgui.invisible_button(f"##{name}", imgui.ImVec2(wide, high))
+    clicked = area(f"##{name}", (wide, high))
     hovered = imgui.is_item_hovered()
     draw_list = imgui.get_window_draw_list()
     if hovered or here:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from imgui_bundle import imgui
 
 from clfractal.viewer.panels import theme
-from clfractal.viewer.panels.buttons import clipped, hover
+from clfractal.viewer.panels.buttons import area, clipped, hover
 from clfractal.viewer.panels.number_box import Boxes
 from clfractal.viewer.panels.ui import Ui
 
@@ -246,7 +246,7 @@ def header(ui: Ui, key: str, title: str, icon: str = "", *, summary: str = "", o
     is_open = bool(states.get(key, opened))
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height() + 3
     wide = imgui.get_content_region_avail().x
-    if imgui.invisible_button(f"##{key}.heading", imgui.ImVec2(wide, height)) and not wanted:
+    if area(f"##{key}.heading", (wide, height)) and not wanted:
         is_open = states[key] = not is_open
     hovered = imgui.is_item_hovered()
     draw = imgui.get_window_draw_list()

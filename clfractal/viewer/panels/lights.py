@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight, SetLight, SmallLight
 from clfractal.viewer.panels import first, theme
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
@@ -67,7 +68,7 @@ def _line(index: int, light: Any, chosen: bool) -> bool:
     """One light of the list; whether it was clicked."""
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     wide = imgui.get_content_region_avail().x
-    clicked = imgui.invisible_button(f"##light{index}", imgui.ImVec2(wide, height))
+    clicked = area(f"##light{index}", (wide, height))
     draw = imgui.get_window_draw_list()
     if chosen or imgui.is_item_hovered():
         back = theme.ACCENT_FAINT if chosen else theme.FRAME

@@ -16,6 +16,7 @@ from typing import Any
 from imgui_bundle import imgui
 
 from clfractal.viewer.panels import theme
+from clfractal.viewer.panels.buttons import area
 
 FINE, COARSE = 0.1, 10.0
 """Factors on a drag with Shift and with Control."""
@@ -80,6 +81,7 @@ class Boxes:
         travel: of the drag, points of normal speed.
         moved: whether the pointer has moved in this drag.
         all_selected: whether the whole text is to be selected, as a double click on a box asks for.
+        typed: the box that was typed into last, to which the keyboard comes back.
         refused: why what was typed last is no number; empty once somebody has told it.
     """
 
@@ -91,6 +93,7 @@ class Boxes:
     travel: float = 0.0
     moved: bool = False
     all_selected: bool = False
+    typed: str = ""
     refused: str = ""
 
 
@@ -109,7 +112,11 @@ def number_box(
     if boxes.typing == name:
         return _typed(boxes, name, width, scale)
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
-    imgui.invisible_button(f"##{name}", imgui.ImVec2(width, height))
+    if boxes.typed == name:
+        boxes.typed = ""
+        if imgui.get_io().config_flags & imgui.ConfigFlags_.nav_enable_keyboard:
+            imgui.set_keyboard_focus_here()
+    area(f"##{name}", (width, height))
     change = _dragged(boxes, name, value, width, scale)
     shown = value if change.value is None else change.value
     _draw(corner, width, height, shown, scale, mark)
@@ -260,7 +267,7 @@ def _typed(boxes: Boxes, name: str, width: float, scale: Scale) -> Change:
     ended = imgui.is_item_deactivated() or (not began and not imgui.is_item_active() and before == boxes.text)
     if not (tab or ended):
         return NOTHING
-    boxes.typing = ""
+    boxes.typing, boxes.typed = "", "" if tab else name
     boxes.wants_next = tab
     if imgui.is_key_pressed(imgui.Key.escape):
         return NOTHING

@@ -11,6 +11,7 @@ from clfractal.scene.object_checks import can_show
 from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined, VolumeObject
 from clfractal.viewer.panels import first, formula, formula_library, maps, theme, transfer
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
@@ -66,7 +67,7 @@ def _line(name: str, each: AnyObject, chosen: bool) -> bool:
     """One object of the list; whether it was clicked."""
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     wide = imgui.get_content_region_avail().x
-    clicked = imgui.invisible_button(f"##object {name}", imgui.ImVec2(wide, height))
+    clicked = area(f"##object {name}", (wide, height))
     draw = imgui.get_window_draw_list()
     if chosen or imgui.is_item_hovered():
         back = theme.ACCENT_FAINT if chosen else theme.FRAME

@@ -18,6 +18,7 @@ from clfractal.scene.palette import named_table, names
 from clfractal.scene.palettes import PALETTES
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
@@ -169,7 +170,7 @@ def _list(ui: Ui, path: str) -> None:
     wide = imgui.get_content_region_avail().x
     for name in found:
         corner = imgui.get_cursor_screen_pos()
-        if imgui.invisible_button(f"##{name}", imgui.ImVec2(wide, 26)):
+        if area(f"##{name}", (wide, 26)):
             ui.studio.edit({path: name})
             imgui.close_current_popup()
         if imgui.is_item_hovered():

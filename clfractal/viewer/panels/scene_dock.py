@@ -17,6 +17,7 @@ from clfractal.viewer.panels import (
     elsewhere,
     formula,
     formula_editor,
+    keyboard,
     lights,
     material,
     objects,
@@ -91,10 +92,12 @@ def _dock(ui: Ui) -> None:
         | imgui.WindowFlags_.no_scroll_with_mouse
         | imgui.WindowFlags_.no_bring_to_front_on_focus
     )
+    keyboard.focus_window(ui)
     imgui.begin("##scene", None, flags)
     _top(ui)
     # A gutter at the right, so that the scroll bar never covers or moves a widget.
-    imgui.begin_child("##panels", imgui.ImVec2(0, 0), 0, imgui.WindowFlags_.always_vertical_scrollbar)
+    flattened, bar = imgui.ChildFlags_.nav_flattened, imgui.WindowFlags_.always_vertical_scrollbar
+    imgui.begin_child("##panels", imgui.ImVec2(0, 0), flattened, bar)
     ui.memory["filter.drawn"] = set()
     for panel in _PANELS:
         if not panel.shown(ui):
@@ -120,4 +123,5 @@ def _top(ui: Ui) -> None:
     if w.icon_button(theme.REDO, f"Redo ({ui.keys.hint('redo')})", name="redo", enabled=undone > 0):
         ui.act("redo")
     w.in_row()
+    keyboard.begin_here(ui)
     w.search(ui, "filter", "Find a setting")
