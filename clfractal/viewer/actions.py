@@ -39,7 +39,7 @@ _TABLE: Mapping[str, tuple[tuple[str, str, str], ...]] = {
     "Window": (
         ("*help", "F1", "this help"),
         ("*panels", "F2", "show or hide the panels"),
-        ("into_panels", "Tab", "into the panels; there Tab goes on, and Escape goes back to the picture"),
+        ("into_panels", "Tab", "into the panels; Escape goes back"),
         ("*overlay", "F3", "show or hide the figures over the picture"),
         ("*gallery", "F4", "gallery of scenes"),
         ("*variations", "F6", "variations of the scene to choose from"),

@@ -36,16 +36,21 @@ def blocks(ui: Ui) -> list[tuple[str, list[Row]]]:
 
 def columns_of(found: list[tuple[str, list[Row]]], count: int) -> list[list[tuple[str, list[Row]]]]:
     """The blocks in columns of about the same height, in their order."""
-    total = sum(len(rows) + 2 for _, rows in found)
+    total = sum(map(_height, (rows for _, rows in found)))
     columns: list[list[tuple[str, list[Row]]]] = [[]]
     used = 0
     for title, rows in found:
-        height = len(rows) + 2
+        height = _height(rows)
         if columns[-1] and len(columns) < count and used + height / 2 > total * len(columns) / count:
             columns.append([])
         columns[-1].append((title, rows))
         used += height
     return columns
+
+
+def _height(rows: list[Row]) -> float:
+    """About how many lines a block takes up, with its heading: long texts are wrapped."""
+    return 2 + sum(max(-(-len(keys) // 22), -(-len(told) // 46)) for keys, told in rows)
 
 
 def draw(ui: Ui) -> None:
