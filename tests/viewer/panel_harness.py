@@ -69,7 +69,13 @@ class _Session:
         pass
 
     def request(
-        self, scene: Scene, *, moving: bool, region: Any = None, exposed_in: Scene | None = None
+        self,
+        scene: Scene,
+        *,
+        moving: bool,
+        region: Any = None,
+        exposed_in: Scene | None = None,
+        follows: bool = False,
     ) -> None:
         self.requests.append((scene, moving))
 
