@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import textwrap
+from pathlib import Path
 from typing import Any
 
-from clfractal.errors import SceneError
+from clfractal.errors import FileError, SceneError, Where
 from clfractal.files import spans
+from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.files.document import read_document
 from clfractal.files.fragments import same
 from clfractal.files.spans import UnusualError
+from clfractal.viewer.own_files import is_own
 
+EXTENSIONS = (".yaml", ".yml")
 _MOST = 100
 _INDENT = "  "
 
@@ -20,6 +24,7 @@ class FormulaTexts:
 
     def __init__(self) -> None:
         self._known: list[tuple[Any, str]] = []
+        self._files: list[tuple[Any, Path]] = []
 
     def remember(self, content: Any, text: str) -> None:
         """A formula, as a scene's `inline`, was typed as this text."""
@@ -30,6 +35,33 @@ class FormulaTexts:
     def text_of(self, content: Any) -> str | None:
         """The text of a formula; None if it was not typed here."""
         return next((text for each, text in self._known if same(each, content)), None)
+
+    def save(self, content: Any, text: str, path: Path, *, even_if_there: bool = False) -> None:
+        """Writes a formula into a file of its own; scenes that are saved in its folder, or above it, name it from now on.
+
+        Raises:
+            FileError: it comes with the program, is there already, is no YAML file, or cannot be written.
+        """
+        where = Where(str(path))
+        check_output(path, EXTENSIONS)
+        if is_own(path):
+            raise FileError("comes with the program and is never overwritten; choose another name", where)
+        if path.exists() and not even_if_there:
+            raise FileError("is there already; once more replaces it", where)
+        with atomic_writer(path) as beside:
+            beside.write_bytes(text.encode())
+        self._files = [(each, known) for each, known in self._files if known != path]
+        self._files.append((content, path.absolute()))
+        self.remember(content, text)
+
+    def named(self, folder: Path) -> list[tuple[Any, str]]:
+        """Formulas that were saved as files of their own, and the names of these from a scene's folder."""
+        home = folder.absolute()
+        return [
+            (content, path.relative_to(home).as_posix())
+            for content, path in reversed(self._files)
+            if path.is_relative_to(home) and path.exists()
+        ]
 
 
 def formula_text_in(text: str) -> tuple[Any, str] | None:

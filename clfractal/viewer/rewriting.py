@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,8 @@ def rewritten(
     Raises:
         SceneError: no text loads to this scene.
     """
-    for inline, make in _candidates(source, present, names):
+    own = texts.named(folder) if texts is not None else []
+    for inline, make in _candidates(source, present, names, own):
         text = make()
         if _stands_for(text, present, folder):
             return _as_typed(text, source, present, folder, texts), inline
@@ -68,7 +69,7 @@ def formula_as_written(source: SceneSource, present: Scene) -> Any:
 
 
 def _candidates(
-    source: SceneSource, present: Scene, names: Mapping[str, str | None]
+    source: SceneSource, present: Scene, names: Mapping[str, str | None], own: Sequence[tuple[Any, str]]
 ) -> Iterator[tuple[bool, Callable[[], str]]]:
     """From the one that keeps most of the source to the one that keeps nothing; the bool: without formula files."""
     loaded = source.loaded
@@ -79,8 +80,9 @@ def _candidates(
         # (What `frame` does follows from more than the camera.)
         fixed = {path: own for path, own in words.items() if "frame" not in own}
         nothing = dict.fromkeys(formula_files(source.formula, source.folder))
-        for inline, files in ((False, names), (True, nothing)):
-            whole = _with_files(source.formula, before, after, sparse, files)
+        named = [(False, names, own)] if own else []
+        for inline, files, more in (*named, (False, names, ()), (True, nothing, ())):
+            whole = _with_files(source.formula, before, after, sparse, files, more)
             # First with the words that cameras are written in, as far as these cameras are where they were.
             for kept in (words, fixed, {}) if words else ({},):
                 data = with_words(words, *whole, kept=kept)
@@ -90,13 +92,19 @@ def _candidates(
 
 
 def _with_files(
-    formula: Any, before: Any, after: Any, sparse: Any, names: Mapping[str, str | None]
+    formula: Any,
+    before: Any,
+    after: Any,
+    sparse: Any,
+    names: Mapping[str, str | None],
+    own: Sequence[tuple[Any, str]] = (),
 ) -> tuple[Any, Any, Any]:
     """The data with `file` where `formula` names one: in `before`, and elsewhere as long as its content is the same.
 
     Args:
         formula: the section as it was written.
         names: new names of files; None for one whose content is written instead.
+        own: formulas that were saved as files, and the names of these.
     """
     if not isinstance(formula, Mapping):
         return before, after, sparse
@@ -106,6 +114,7 @@ def _with_files(
     links = formula.get("chain")
     if isinstance(links, list) and isinstance(old.get("chain"), list) and len(links) == len(old["chain"]):
         old = {**old, "chain": [_named_file(*pair, known) for pair in zip(links, old["chain"], strict=True)]}
+    known += own
     new, short = (_with_known(section, known, names) for section in (new, short))
     return {**before, "formula": old}, {**after, "formula": new}, {**sparse, "formula": short}
 

@@ -10,10 +10,10 @@ from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.named import carried, data_files, formula_files, renamed
+from clfractal.viewer.own_files import is_own
 from clfractal.viewer.rewriting import formula_as_written, rewritten
 from clfractal.viewer.sources import (
     SceneSource,
-    is_own,
     is_picture,
     is_protected,
     open_source,

@@ -12,7 +12,8 @@ from clfractal.errors import ClfractalError
 from clfractal.files.png import SCENE_KEY, write_png_pixels
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
-from clfractal.viewer.sources import SceneSource, is_own
+from clfractal.viewer.own_files import is_own
+from clfractal.viewer.sources import SceneSource
 
 if TYPE_CHECKING:
     from clfractal.viewer.app import Viewer

@@ -9,20 +9,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from clfractal import resources
 from clfractal.errors import ClfractalError, FileError, SceneError
 from clfractal.files import embedded
 from clfractal.files.document import read_document
 from clfractal.files.inputs import noting
+from clfractal.files.regular import read_text_file
 from clfractal.scene.load import SceneText, load_scene, read_text
 from clfractal.scene.model import Scene
 from clfractal.viewer.formula_texts import formula_text_in
 from clfractal.viewer.named import formula_files
+from clfractal.viewer.own_files import is_own
 from clfractal.viewer.shared import Group, groups_of
 
 Kind = Literal["scene", "picture", "shipped", "none"]
-
-_OWN_FOLDERS = ("scenes", "environments", "formulas/library", "kernels")
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,19 @@ class SceneSource:
     def formula_text(self) -> tuple[Any, str] | None:
         """The formula that is written out in the text, and how: see `formula_text_in`."""
         return formula_text_in(self.text)
+
+    @cached_property
+    def formula_file_text(self) -> tuple[Any, str] | None:
+        """The formula of the file that the text names, and the file's text; None if it names none."""
+        formula = self.formula
+        name = formula.get("file") if isinstance(formula, dict) else None
+        if not isinstance(name, str):
+            return None
+        try:
+            text = read_text_file(self.folder / name)
+            return read_document(text).root.plain(), text
+        except ClfractalError:
+            return None
 
     @cached_property
     def shared(self) -> tuple[Group, ...]:
@@ -116,33 +128,6 @@ def suggested_name(source: SceneSource, folder: Path) -> Path:
         if not os.path.lexists(path):
             return path
         number += 1
-
-
-def is_own(path: Path) -> bool:
-    """Whether a file lies in one of the program's own folders, or is a link to such a file."""
-    try:
-        status = path.stat()
-    except OSError:
-        return False
-    key = (status.st_dev, status.st_ino)
-    parents = {
-        (found.st_dev, found.st_ino) for parent in path.resolve().parents if (found := _status(parent))
-    }
-    for name in _OWN_FOLDERS:
-        folder = resources.folder(name)
-        inside = _status(folder)
-        if inside is not None and (inside.st_dev, inside.st_ino) in parents:
-            return True
-        if any((found.st_dev, found.st_ino) == key for file in folder.iterdir() if (found := _status(file))):
-            return True
-    return False
-
-
-def _status(path: Path) -> os.stat_result | None:
-    try:
-        return path.stat()
-    except OSError:
-        return None
 
 
 def is_picture(path: Path) -> bool:

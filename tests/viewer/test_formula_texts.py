@@ -143,3 +143,64 @@ def test_a_text_that_would_break_the_scene_is_not_used(tmp_path: Path) -> None:
     found = scene_text(desk.source, desk.ui.studio.document, texts)
     assert "--- #" not in found
     assert load_scene(found) == desk.ui.studio.document
+
+
+def ask(name: str) -> dict[str, Any]:
+    return {"name": name, "problem": "", "sure": ""}
+
+
+def test_a_formula_is_saved_as_a_file_of_its_own(tmp_path: Path) -> None:
+    """The scene's file names it, and a new window shows its text; a change of the formula is the scene's own again."""
+    desk = Desk(tmp_path / "s.yaml", SCENE)
+    text = desk.shown.replace("x*x + y*y\n", "x*x + y*y*1.  # mine\n")
+    desk.type(text)
+    state: Any = SimpleNamespace(text=text, source=None)
+    wanted = ask("mine")
+    formula_editor.save_as_file(desk.ui, state, wanted)
+    assert wanted["problem"] == ""
+    assert (tmp_path / "mine.yaml").read_text() == text
+    saved = desk.save()
+    assert "formula: {file: mine.yaml, iterations: 6, parameters: {power: 8}}  # the bulb" in saved
+    desk.open()
+    assert desk.shown == text
+    desk.type(text.replace("*1.  # mine", "*2.  # other"))
+    assert "# other" in desk.save()
+    assert (tmp_path / "mine.yaml").read_text() == text
+
+
+def test_a_formula_of_the_library_becomes_a_file(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "s.yaml", SCENE)
+    formula_editor.save_as_file(desk.ui, SimpleNamespace(text=desk.shown, source=None), ask("own.yml"))  # type: ignore[arg-type]
+    assert "{file: own.yml, iterations: 6, parameters: {power: 8}}" in desk.save()
+
+
+def test_files_that_are_there_and_names_that_are_none(tmp_path: Path) -> None:
+    desk = Desk(tmp_path / "s.yaml", SCENE)
+    (tmp_path / "taken.yaml").write_text("mine\n")
+    state: Any = SimpleNamespace(text=desk.shown, source=None)
+    for name, told in (
+        ("taken", "once more replaces it"),
+        ("a.png", ".yaml"),
+        (str(LIBRARY), "comes with the program"),
+    ):
+        wanted = ask(name)
+        formula_editor.save_as_file(desk.ui, state, wanted)
+        assert told in wanted["problem"]
+    assert (tmp_path / "taken.yaml").read_text() == "mine\n"
+    wanted = ask("taken")
+    formula_editor.save_as_file(desk.ui, state, wanted)
+    formula_editor.save_as_file(desk.ui, state, wanted)
+    assert wanted["problem"] == ""
+    assert (tmp_path / "taken.yaml").read_text() == desk.shown
+
+
+def test_a_scene_in_another_folder_holds_the_formula(tmp_path: Path) -> None:
+    """Only files in its folder, or below, can be named."""
+    desk = Desk(tmp_path / "s.yaml", SCENE)
+    text = desk.shown.replace("x*x + y*y\n", "x*x + y*y*1.  # mine\n")
+    desk.type(text)
+    formula_editor.save_as_file(desk.ui, SimpleNamespace(text=text, source=None), ask("mine"))  # type: ignore[arg-type]
+    (tmp_path / "other").mkdir()
+    studio = desk.ui.studio
+    save_scene(desk.source, studio.document, tmp_path / "other" / "t.yaml", texts=studio.formula_texts)
+    assert "# mine" in (tmp_path / "other" / "t.yaml").read_text()

@@ -7,6 +7,7 @@ keeps its last good formula and picture.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from imgui_bundle import imgui
@@ -26,6 +27,7 @@ PAUSE_SECONDS = 0.3
 """The text is checked when nothing was typed for so long."""
 _WIDTH, _HEIGHT = 520.0, 420.0
 _TITLE = "Formula editor"
+_FILE = "##formula.file"
 
 
 @dataclass(slots=True)
@@ -144,9 +146,10 @@ def _typed(ui: Ui, spec: FormulaSpec) -> str | None:
     if spec.inline is None:
         return None
     files = ui.memory.get("files")
-    written = files.source.formula_text if files is not None else None
-    if written is not None and same(written[0], spec.inline):
-        return str(written[1])
+    written = [files.source.formula_text, files.source.formula_file_text] if files is not None else []
+    for each in written:
+        if each is not None and same(each[0], spec.inline):
+            return str(each[1])
     return ui.studio.formula_texts.text_of(spec.inline)
 
 
@@ -169,7 +172,7 @@ def _fill(state: Editing) -> None:
 
 
 def _edit(ui: Ui, state: Editing) -> None:
-    footer = 3 * imgui.get_text_line_height_with_spacing() + 10
+    footer = 3 * imgui.get_text_line_height_with_spacing() + imgui.get_frame_height_with_spacing() + 10
     room = imgui.get_content_region_avail()
     with theme.font("fixed", 14.5):
         state.editor.render("##formula", imgui.ImVec2(room.x, max(room.y - footer, 60)))
@@ -179,6 +182,8 @@ def _edit(ui: Ui, state: Editing) -> None:
     if state.changed is not None and now - state.changed >= PAUSE_SECONDS:
         check(ui, state)
     _footer(state)
+    if state.error is None and state.changed is None:
+        _to_file(ui, state)
 
 
 def check(ui: Ui, state: Editing) -> None:
@@ -204,6 +209,59 @@ def check(ui: Ui, state: Editing) -> None:
 
 def _is_library(spec: FormulaSpec, inline: dict[str, Any]) -> bool:
     return spec.name is not None and catalog.description(spec.name) == inline
+
+
+def _to_file(ui: Ui, state: Editing) -> None:
+    """A button that writes the formula into a file of its own, under a name that is asked for."""
+    ask: dict[str, Any] = ui.memory.setdefault("formula.file", {"name": "", "problem": "", "sure": ""})
+    if w.button(
+        "Save as a file…", icon=theme.SAVE, about="The scene's file will name it from its next saving on"
+    ):
+        ask.update(name=_suggested(ui), problem="", sure="")
+        imgui.open_popup(_FILE)
+    if not imgui.begin_popup(_FILE):
+        return
+    imgui.set_next_item_width(300)
+    if imgui.is_window_appearing():
+        imgui.set_keyboard_focus_here()
+    done, ask["name"] = imgui.input_text("##name", ask["name"], imgui.InputTextFlags_.enter_returns_true)
+    w.in_row()
+    if w.button("Save", primary=True) or done:
+        save_as_file(ui, state, ask)
+        if not ask["problem"]:
+            imgui.close_current_popup()
+    if ask["problem"]:
+        with theme.colors(text=theme.WARNING):
+            imgui.push_text_wrap_pos(360.0)
+            imgui.text_unformatted(ask["problem"])
+            imgui.pop_text_wrap_pos()
+    imgui.end_popup()
+
+
+def save_as_file(ui: Ui, state: Editing, ask: dict[str, Any]) -> None:
+    """Writes the text into the file that was named; a name that is taken wants to be given twice."""
+    name = Path(ask["name"].strip()).expanduser()
+    path = ui.studio.scene.folder / (name if name.suffix else name.with_suffix(".yaml"))
+    sure = ask["sure"] == str(path)
+    ask["sure"], ask["problem"] = str(path) if path.exists() else "", ""
+    try:
+        content = read_formula(state.text)
+        ui.studio.formula_texts.save(content, state.text, path, even_if_there=sure)
+        spec = ui.studio.scene.formula
+        if spec.inline != content:  # a formula of the library becomes one of the user's
+            ui.studio.edit({"formula": applied(spec, content)})
+            state.source = _source(ui.studio.scene.formula)
+    except ClfractalError as error:
+        ask["problem"] = str(error)
+        return
+    ui.studio.tell(f"saved {path.name}; the scene's file names it once the scene is saved")
+
+
+def _suggested(ui: Ui) -> str:
+    """A name for the formula's file."""
+    spec = ui.studio.scene.formula
+    title = str((spec.inline or {}).get("title", spec.name or "formula"))
+    return "_".join("".join(each if each.isalnum() else " " for each in title.lower()).split()) + ".yaml"
 
 
 def _mark(state: Editing) -> None:

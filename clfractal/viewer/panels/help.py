@@ -48,7 +48,7 @@ def columns_of(found: list[tuple[str, list[Row]]], count: int) -> list[list[tupl
     return columns
 
 
-def _height(rows: list[Row]) -> float:
+def _height(rows: list[Row]) -> int:
     """About how many lines a block takes up, with its heading: long texts are wrapped."""
     return 2 + sum(max(-(-len(keys) // 22), -(-len(told) // 46)) for keys, told in rows)
 
