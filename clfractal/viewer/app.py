@@ -265,8 +265,7 @@ class Viewer:
             self._rest(False)
         else:
             self._rest(True)
-        for line in self.outputs.watch(now):
-            self.studio.tell(line.text, wrong=line.wrong)
+        self.outputs.watch(now, self.studio.tell)
         self._mind_device()
         self.studio.tick()
         session = self.studio.session

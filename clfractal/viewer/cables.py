@@ -78,6 +78,11 @@ class Cables:
             for each in theirs
         )
 
+    @property
+    def complete(self) -> bool:
+        """Whether all monitors are there that windows fill."""
+        return all(each is not None for theirs in self._found(self._there) for each in theirs)
+
     def _found(self, there: Sequence[Monitor]) -> list[list[Monitor | None]]:
         """The monitors of each window as they are now, by their names; of several with one name first those in place."""
         wanted = [each for _, theirs in self._filled for each in theirs]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from clfractal.pictures.modes import BELOW, BESIDE
 from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer import gl, window
-from clfractal.viewer.cables import Cables, Told
+from clfractal.viewer.cables import Cables
 from clfractal.viewer.chart import mixed_chart
 from clfractal.viewer.options import Options
 from clfractal.viewer.recording import Event
@@ -104,14 +105,23 @@ class Outputs:
         self.first.use()
         self._unfill()
 
-    def watch(self, now: float) -> list[Told]:
-        """Looks once a second whether the filled monitors are there, seconds; what there is to tell."""
+    def watch(self, now: float, tell: Callable[..., None]) -> None:
+        """Looks once a second whether the filled monitors are there, and tells what has changed.
+
+        Args:
+            now: seconds.
+            tell: the studio's.
+        """
         told, returned = self._cables.look(now)
         for where, wanted in returned:
             where.fill(wanted)
         if self.second is not None:
             self.second.show(self._cables.has(self.second))
-        return told
+        for line in told:
+            tell(line.text, wrong=line.wrong, holds=partial(self._still, line.wrong))
+
+    def _still(self, missing: bool) -> bool:
+        return missing != self._cables.complete
 
     def _fill(self, where: Window, wanted: Sequence[Monitor]) -> None:
         where.fill(wanted)

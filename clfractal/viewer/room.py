@@ -26,7 +26,8 @@ class Room:
             self._away = True
             hint = ui.keys.hint("panels")
             ui.studio.tell(
-                f"there is no room for panels beside the picture{f'; {hint} shows them' if hint else ''}"
+                f"there is no room for panels beside the picture{f'; {hint} shows them' if hint else ''}",
+                holds=lambda: ui.narrow and "panels" not in ui.show,
             )
         elif not narrow and self._away and not alone:
             ui.show.add("panels")

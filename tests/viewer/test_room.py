@@ -98,10 +98,12 @@ def test_a_monitor_goes_and_comes_back_elsewhere(second: str) -> None:
     assert again == []
     assert desk.cables.has(desk.windows[0])
     assert not desk.cables.has(desk.windows[1])
+    assert not desk.cables.complete
     assert desk.look(desk.left) == ([], [])
     other = Monitor(2, second, 1920, 96, 1280, 720, 0.0)
     assert desk.look(desk.left, other) == ([f"monitor 2 ({second}) is back"], [(1, [other])])
     assert desk.cables.has(desk.windows[1])
+    assert desk.cables.complete
 
 
 def test_a_window_over_both_waits_for_both() -> None:

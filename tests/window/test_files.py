@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from clfractal import resources
 from clfractal.scene.load import load_scene
@@ -189,3 +190,41 @@ def test_what_was_saved_is_not_kept(display: Display, folder: Path) -> None:
         wait_for(lambda: not list((cache / "autosave").glob("*.json")), "the end of the safety copy")
         window.kill()
     assert Autosave(cache / "autosave").found() == []
+
+
+SPLIT = """version: 1
+formula: {name: hast, iterations: 10}
+camera: {position: [-0.6, -3, 1.2], target: [-0.5, 0, 0]}
+cut_planes:
+  - plane: &plane {center: [-0.6, 0, 0], width: 2.6, height: 2.6}  # one plane
+    opacity: 0.4
+renderer: {samples: 1}
+layout:
+  columns: 2
+  views:
+    - {}
+    - renderer: {type: cut_plane, plane: *plane, samples: 1}  # its cut
+"""
+
+
+@pytest.mark.parametrize("x", [90, 270])
+def test_in_a_split_picture_the_plane_and_its_cut_are_one(display: Display, folder: Path, x: int) -> None:
+    """Page Up, Ctrl+Right and Alt+Up over either half: the file has one plane, and the shell shows the same picture."""
+    (folder / "s.yaml").write_text(SPLIT)
+    with Window(display, folder, "s.yaml", "--size", "360x180", "--no-panels") as window:
+        window.move(x, 90)
+        window.still()
+        window.keys("Page_Up", "ctrl+Right", "alt+Up")
+        window.still()
+        window.save()
+        saved = (folder / "saved.yaml").read_text()
+        changed = [
+            (one, other)
+            for one, other in zip(SPLIT.splitlines(), saved.splitlines(), strict=True)
+            if one != other
+        ]
+        assert len(changed) == 1
+        assert "plane: &plane {" in changed[0][1]
+        assert changed[0][1].endswith("}  # one plane")
+        window.still(7)
+        window.shows(film(folder, "saved.yaml", (360, 180)))

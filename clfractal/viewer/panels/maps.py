@@ -33,7 +33,7 @@ def draw(ui: Ui, path: str, found: Map) -> None:
 
 def _curve(ui: Ui, path: str, points: tuple[tuple[float, float], ...]) -> None:
     """The curve as it is, and its points: where each is in the range, and the value there."""
-    if not w.filtering(ui):
+    if w.found(ui, "Curve", path):
         _draw_curve(points)
     for index, (at, value) in enumerate(points):
         # A point stays between its neighbours.
