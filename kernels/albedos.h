@@ -2,12 +2,14 @@
 #define SMOOTHEST (R(1.0) / (real)((scalar)SMOOTHEST_PARTS))            // alpha, at the least
 #define SMOOTHEST_FUZZ (R(1.0) / (real)((scalar)SMOOTHEST_FUZZ_PARTS))
 #define ALBEDO_ROW (ALBEDO_COSINES + 1)
-#define ALBEDO_FUZZ (ALBEDO_ROUGHNESSES * ALBEDO_ROW)
-#define ALBEDO_DIELECTRIC (2 * ALBEDO_FUZZ)
+#define ALBEDO_TABLE (ALBEDO_ROUGHNESSES * ALBEDO_ROW)
+#define REPEATED_TABLES 4   // of metals, see `clfractal/renderers/facets.py`
+#define ALBEDO_FUZZ (REPEATED_TABLES * ALBEDO_TABLE)
+#define ALBEDO_DIELECTRIC (ALBEDO_FUZZ + ALBEDO_TABLE)
 // With HAS_GLASS (`clfractal/renderers/glass.py`): rough glass, seen from outside and from inside; wavelengths.
-#define ALBEDO_GLASS (ALBEDO_DIELECTRIC + ALBEDO_REFLECTANCES * ALBEDO_FUZZ)
-#define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_FUZZ)
-#define SPECTRUM (ALBEDO_GLASS_INSIDE + ALBEDO_REFLECTANCES * ALBEDO_FUZZ)
+#define ALBEDO_GLASS (ALBEDO_DIELECTRIC + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
+#define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
+#define SPECTRUM (ALBEDO_GLASS_INSIDE + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
 
 // Of one direction, whose cosine with the normal is given, and of the mean over all directions.
 typedef struct {
@@ -46,9 +48,9 @@ INLINE albedo albedo_of_root(__global const float *tables, real cosine, real rou
         const mask here = open & equal(step, (real)(at[lane]));
         if (!any_lane(here)) continue;
         open &= ~here;
-        __global const float *table = tables + (int)at[lane] * ALBEDO_FUZZ;
+        __global const float *table = tables + (int)at[lane] * ALBEDO_TABLE;
         low = albedo_at(table, cosine, roughness);
-        high = albedo_at(table + ALBEDO_FUZZ, cosine, roughness);
+        high = albedo_at(table + ALBEDO_TABLE, cosine, roughness);
         sum.of_direction = pick(here, low.of_direction + rest * (high.of_direction - low.of_direction), sum.of_direction);
         sum.mean = pick(here, low.mean + rest * (high.mean - low.mean), sum.mean);
     }
@@ -58,4 +60,18 @@ INLINE albedo albedo_of_root(__global const float *tables, real cosine, real rou
 // Of a dielectric's boundary.
 INLINE albedo albedo_of_dielectric(__global const float *tables, real cosine, real roughness, real root) {
     return albedo_of_root(tables + ALBEDO_DIELECTRIC, cosine, roughness, root);
+}
+
+// What a metal's facets do to light from or to a direction that meets several of them: the scale of the lobe of two, and of that of more;
+// and by which powers of cosines the first facet reflects; in all directions those between the first and the last.
+typedef struct {
+    real twice, more, first[2], between[2];
+} repeated;
+
+INLINE repeated repeated_at(__global const float *tables, real cosine, real roughness) {
+    albedo found[REPEATED_TABLES];
+    for (int i = 0; i < REPEATED_TABLES; ++i) found[i] = albedo_at(tables + i * ALBEDO_TABLE, cosine, roughness);
+    const repeated r = {found[0].of_direction, found[1].of_direction, {found[2].of_direction, found[3].of_direction},
+                        {found[2].mean, found[3].mean}};
+    return r;
 }

@@ -149,17 +149,24 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     return b;
 }
 
-// f * cosine of a metal, with light that is reflected more than once between its facets, `several` (Kulla and Conty 2017).
+// f * cosine of a metal. Of light that is reflected more than once between its facets, `several`, the lobes have a direction: that of wider
+// facets. Their colour is what the first, the last and those between reflect; see `clfractal/renderers/facets.py`.
 INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several, __global const float *tables) {
-    const real meeting = vec_dot(b->out, h);
-    const albedo o = albedo_at(tables, b->out.z, b->rough), other = albedo_at(tables, i.z, b->rough);
-    const real again = several * (R(1.0) - o.of_direction) * (R(1.0) - other.of_direction) / (BSDF_PI * fmax(R(1.0) - o.mean, R(1e-6))) * i.z;
+    const real meeting = vec_dot(b->out, h), wide = fmax(b->rough, (real)((scalar)REPEATED_NARROWEST_TENTHS * S(0.1)));
+    const repeated o = repeated_at(tables, b->out.z, b->rough), other = repeated_at(tables, i.z, b->rough);
+    const real lobe = several * (ggx_value(b->out, i, h, wide) + (real)((scalar)REPEATED_EVEN_HUNDREDTHS * S(0.01)) * i.z);
+    const real twice = lobe * o.twice * other.twice, more = lobe * o.more * other.more;
+    // After more than two facets each time about as much goes on to the next one.
+    const real onward = (real)((scalar)REPEATED_AGAIN_TENTHS * S(0.1)) * more / fmax(twice + more, (real)(REAL_SMALLEST));
     color sum;
-#define METAL_PART(c)                                                                                     \
-    {                                                                                                     \
-        const real mean = fresnel_metal_mean(b->metal.c, b->edge.c);                                      \
-        sum.c = single * fresnel_metal(meeting, b->metal.c, b->edge.c)                                    \
-                + again * mean * mean * o.mean / (R(1.0) - mean * (R(1.0) - o.mean));                     \
+#define METAL_PART(c)                                                                                                       \
+    {                                                                                                                       \
+        const real dip = metal_dip(b->metal.c, b->edge.c);                                                                  \
+        const real between = metal_reflects(b->metal.c, dip, o.between[0], o.between[1]);                                   \
+        const real ends = metal_reflects(b->metal.c, dip, o.first[0], o.first[1])                                           \
+                          * metal_reflects(b->metal.c, dip, other.first[0], other.first[1]);                                \
+        const real repeats = twice + more * between * (R(1.0) - onward) / (R(1.0) - onward * between);                      \
+        sum.c = single * fresnel_metal(meeting, b->metal.c, b->edge.c) + ends * repeats;                                    \
     }
     METAL_PART(r)
     METAL_PART(g)

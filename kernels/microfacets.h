@@ -53,16 +53,15 @@ INLINE real metal_dip(real straight, real tint) {
     return (straight + (R(1.0) - straight) * R(0.462664366)) * (R(1.0) - tint) / R(0.0566527795);
 }
 
-// The reflectance of a metal by Schlick, with a tint where the cosine is 1/7 (Kutz, Hasan, Edmondson 2021), as in OpenPBR.
+// The reflectance of a metal, of (1 - cosine)^5 and cosine (1 - cosine)^6, or of their means.
+INLINE real metal_reflects(real straight, real dip, real rest5, real dipped) {
+    return clamp(straight + (R(1.0) - straight) * rest5 - dip * dipped, R(0.0), R(1.0));
+}
+
+// By Schlick, with a tint where the cosine is 1/7 (Kutz, Hasan, Edmondson 2021), as in OpenPBR.
 INLINE real fresnel_metal(real cosine, real straight, real tint) {
     const real rest = fmax(R(1.0) - cosine, R(0.0)), rest2 = rest * rest, rest5 = rest2 * rest2 * rest;
-    const real dip = metal_dip(straight, tint);
-    return clamp(straight + (R(1.0) - straight) * rest5 - dip * cosine * rest5 * rest, R(0.0), R(1.0));
-}
-// Its mean over the hemisphere, weighted by the cosine.
-INLINE real fresnel_metal_mean(real straight, real tint) {
-    const real most = straight + (R(1.0) - straight) * R(0.047619047619);
-    return clamp(most - metal_dip(straight, tint) * R(0.0079365079365), R(0.0), R(1.0));
+    return metal_reflects(straight, metal_dip(straight, tint), rest5, cosine * rest5 * rest);
 }
 
 // Diffuse light of rough surfaces, with all its energy (Portsmouth, Kutz, Hill 2024, EON).

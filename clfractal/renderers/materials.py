@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from clfractal.device.structs import Field, Struct
+from clfractal.renderers.facets import AGAIN_TENTHS, EVEN_HUNDREDTHS, NARROWEST_TENTHS
 from clfractal.renderers.glass import WAVELENGTHS
 from clfractal.renderers.scattering import (
     COSINES,
@@ -128,6 +129,9 @@ def scattering_defines() -> dict[str, object]:
         "ALBEDO_REFLECTANCES": REFLECTANCES,
         "SMOOTHEST_PARTS": SMOOTHEST_PARTS,
         "SMOOTHEST_FUZZ_PARTS": SMOOTHEST_FUZZ_PARTS,
+        "REPEATED_EVEN_HUNDREDTHS": EVEN_HUNDREDTHS,
+        "REPEATED_NARROWEST_TENTHS": NARROWEST_TENTHS,
+        "REPEATED_AGAIN_TENTHS": AGAIN_TENTHS,
     }
 
 

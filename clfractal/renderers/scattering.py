@@ -6,11 +6,12 @@ next one (Kulla and Conty 2017, Revisiting Physically Based Shading at Imagework
 Axes: the cosine of the direction with the normal is (i / (COSINES - 1))^2, the roughness k / (ROUGHNESSES - 1), the square
 root of the reflectance at normal incidence j / REFLECTANCES. The buffer has, one after the other,
 
-    GGX of reflectance 1   [ROUGHNESSES][COSINES + 1]
-    fuzz                   [ROUGHNESSES][COSINES + 1]
-    GGX of a dielectric    [REFLECTANCES][ROUGHNESSES][COSINES + 1]
+    of metals, see `facets.py`   [4][ROUGHNESSES][COSINES + 1]
+    fuzz                         [ROUGHNESSES][COSINES + 1]
+    GGX of a dielectric          [REFLECTANCES][ROUGHNESSES][COSINES + 1]
 
-where the last number of a row is the mean over the hemisphere, weighted by the cosine, of what lies between the others.
+where the last number of a row is the mean over the hemisphere, weighted by the cosine, of what lies between the others; but
+for those of metals.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
+
+from clfractal.renderers.facets import repeated_tables
 
 COSINES, ROUGHNESSES, REFLECTANCES = 32, 16, 16
 SMOOTHEST_PARTS = 512
@@ -36,7 +39,6 @@ _RADII, _ANGLES = 48, 24
 def albedo_tables() -> Floats:
     """The buffer, float32, one-dimensional."""
     width = COSINES + 1
-    fresnel_one = np.empty((ROUGHNESSES, width))
     fuzz = np.empty((ROUGHNESSES, width))
     dielectric = np.empty((REFLECTANCES, ROUGHNESSES, width))
     cosines = table_cosines()
@@ -45,15 +47,17 @@ def albedo_tables() -> Floats:
         alpha = max(roughness * roughness, 1 / SMOOTHEST_PARTS)
         cosine, facet, meeting = visible_normals(cosines, alpha)
         weight = mirrored(cosine, facet, meeting, alpha)
-        fresnel_one[k, :-1] = weight.mean(axis=(1, 2))
         for j in range(REFLECTANCES):
             root = j / REFLECTANCES
             dielectric[j, k, :-1] = (weight * fresnel(meeting, (1 + root) / (1 - root))).mean(axis=(1, 2))
         fuzz[k, :-1] = _fuzz_albedo(cosines, roughness)
-    for table in (fresnel_one, fuzz, dielectric):
+    for table in (fuzz, dielectric):
         table[..., -1] = mean_albedo(table[..., :-1])
-    parts = [np.minimum(part, 1.0).reshape(-1) for part in (fresnel_one, fuzz, dielectric)]
-    found = np.concatenate(parts).astype(np.float32)
+    albedos = [np.minimum(part, 1.0).reshape(-1) for part in (fuzz, dielectric)]
+    roughnesses = np.arange(ROUGHNESSES) / (ROUGHNESSES - 1)
+    alphas = np.maximum(roughnesses * roughnesses, 1 / SMOOTHEST_PARTS)
+    metals = repeated_tables(cosines, alphas, roughnesses)
+    found = np.concatenate([metals.reshape(-1), *albedos]).astype(np.float32)
     found.flags.writeable = False
     return found
 

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.renderers.scattering import albedo_tables, fresnel
+from clfractal.renderers.scattering import COSINES as COSINES_OF_TABLES
+from clfractal.renderers.scattering import ROUGHNESSES, albedo_tables, fresnel
 from clfractal.scene.materials import PbrMaterial
 from tests.render.material_kernel import ask, turned
 from tests.variants import one_of
@@ -178,4 +179,7 @@ def test_a_mirror_reflects_what_fresnel_says() -> None:
 def test_tables_are_albedos() -> None:
     table = albedo_tables()
     assert table.dtype == np.float32
+    # Those of metals, the first four, are factors of lobes.
+    assert table[: 4 * ROUGHNESSES * (COSINES_OF_TABLES + 1)].min() >= 0
+    table = table[4 * ROUGHNESSES * (COSINES_OF_TABLES + 1) :]
     assert 0 <= table.min() <= table.max() <= 1
