@@ -17,12 +17,9 @@ from clfractal.errors import FileError, SceneError, Where
 from clfractal.files import memory
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import noting, refuse_overwriting
+from clfractal.files.kinds import kind_of
 from clfractal.files.mesh import EXTENSIONS, SINGLE_PRECISION, TOO_FINE, Mesh, is_too_fine, write_mesh
-from clfractal.files.nrrd import MAGIC
-from clfractal.files.regular import read_bytes
 from clfractal.files.volume import Volume, read_volume
-
-_NPY = b"\x93NUMPY"
 
 
 def make_mesh(order: GridOrder, shell: Shell, *, level: float | None = None, close: bool = True) -> None:
@@ -44,8 +41,7 @@ def _make_mesh(order: GridOrder, shell: Shell, level: float | None, close: bool)
     if level is not None and not math.isfinite(level):
         raise SceneError(f"must be a number, got {level}", Where("--level"))
     shell.state = lambda: f"{order.output}: interrupted, nothing was written"
-    read = read_bytes(Path(order.source), prefix=8)
-    is_volume = read.startswith((MAGIC, _NPY))
+    is_volume = kind_of(Path(order.source)) == "volume"
     mesh = (_of_file if is_volume else _of_scene)(order, shell, level, close)
     with doing(f"writing {order.output}"):
         write_mesh(order.output, mesh)

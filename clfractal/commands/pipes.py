@@ -19,6 +19,7 @@ from clfractal.commands.shell import OUTPUT, Shell
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.files.atomic import file_error
+from clfractal.files.kinds import kind_of_start
 from clfractal.files.regular import MAX_BYTES
 
 INPUT = "standard input"
@@ -26,7 +27,6 @@ STREAM = "-"
 
 _PIECE = 1 << 20
 _LARGEST = 1 << 32  # bytes of a picture that holds a scene, or of a grid
-_STARTS = (b"\x76\x2f\x31\x01", b"\x89PNG", b"\xff\xd8\xff", b"RIFF", b"NRRD")
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def _spool(path: Path) -> None:
     try:
         with open(path, "wb") as file:
             while piece := stream.read(_PIECE):
-                if size == 0 and piece.startswith(_STARTS):
+                if size == 0 and kind_of_start(piece) is not None:
                     limit = _LARGEST
                 size += len(piece)
                 if size > limit:

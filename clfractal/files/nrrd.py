@@ -17,10 +17,10 @@ from typing import Literal, NoReturn, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FileError, Where, unknown_name
+from clfractal.errors import FileError, Where, nearest, unknown_name
 
 Doubles = npt.NDArray[np.float64]
-Encoding = Literal["raw", "gzip"]
+Encoding = Literal["raw", "ascii", "hex", "gzip", "bzip2"]
 Meaning = TypeVar("Meaning")
 
 MAGIC = b"NRRD000"
@@ -47,19 +47,45 @@ _TYPES = {
     "f8": ("double",),
 }
 _KIND_OF_TYPE = {name: kind for kind, names in _TYPES.items() for name in names}
-_ENCODINGS: dict[str, Encoding] = {"raw": "raw", "gzip": "gzip", "gz": "gzip"}
-# Names of spaces with three axes -> whether they are right-handed.
-_SPACES = {
-    "right-anterior-superior": True,
-    "ras": True,
-    "left-posterior-superior": True,
-    "lps": True,
-    "left-anterior-superior": False,
-    "las": False,
-    "scanner-xyz": True,
-    "3d-right-handed": True,
-    "3d-left-handed": False,
+_ENCODINGS: dict[str, Encoding] = {
+    "raw": "raw",
+    **dict.fromkeys(("ascii", "text", "txt"), "ascii"),
+    "hex": "hex",
+    **dict.fromkeys(("gzip", "gz"), "gzip"),
+    **dict.fromkeys(("bzip2", "bz2"), "bzip2"),
 }
+COMPRESSED: tuple[Encoding, ...] = ("gzip", "bzip2")
+"""Encodings whose data are compressed."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Space:
+    """A space: the signs that bring its coordinates to ours, and how many there are: four with a time."""
+
+    signs: tuple[int, int, int]
+    dimension: int
+
+
+# Ours is left-posterior-superior, as in ITK and 3D Slicer: x to the left, y to the back, z up. Spaces that know nothing of a
+# body are taken as ours if they are right-handed; left-handed ones have x reversed, so that nothing becomes a mirror image.
+_SIGNS: dict[tuple[str, ...], tuple[int, int, int]] = {
+    ("right-anterior-superior", "ras"): (-1, -1, 1),
+    ("left-anterior-superior", "las"): (1, -1, 1),
+    ("left-posterior-superior", "lps"): (1, 1, 1),
+    ("scanner-xyz",): (1, 1, 1),
+    ("3d-right-handed",): (1, 1, 1),
+    ("3d-left-handed",): (-1, 1, 1),
+}
+_SPACES = {
+    **{name: _Space(signs, 3) for names, signs in _SIGNS.items() for name in names},
+    # The names of the same with a time, such as left-posterior-superior-time and LPST.
+    **{
+        f"{name}{'t' if len(name) == 3 else '-time'}": _Space(signs, 4)
+        for names, signs in _SIGNS.items()
+        for name in names
+    },
+}
+_KNOWN_SPACES = "known: RAS, LAS, LPS or their whole names, scanner-xyz, 3D-right-handed, 3D-left-handed, and these with -time"
 _SAME = {
     "axismins": "axis mins",
     "axismaxs": "axis maxs",
@@ -94,7 +120,7 @@ class Header:
         origin: the middle of the first voxel.
         directions: (3, 3), row i the step to the next voxel along array axis x, y, z.
         length: bytes up to the attached data.
-        data_file: name of the file that holds the data, if it is another one.
+        data_file: name of the file that holds the data, if it is another one; `data_place` is where the header says so.
         line_skip, byte_skip: what comes before the data; -1 bytes: the data are the end of the file.
         texts: keys and values that others, or we, have put in.
     """
@@ -106,6 +132,7 @@ class Header:
     encoding: Encoding
     length: int
     data_file: str | None = None
+    data_place: Where = field(default_factory=Where)
     line_skip: int = 0
     byte_skip: int = 0
     texts: Mapping[str, str] = field(default_factory=dict)
@@ -191,8 +218,12 @@ class _Parser:
 
     def fail(self, message: str, name: str | None = None) -> NoReturn:
         """Raises FileError at the file, or at one of its fields."""
+        raise FileError(message, self.place(name))
+
+    def place(self, name: str | None) -> Where:
+        """The file, or the line of one of its fields."""
         line = self.fields[name][0] if name in self.fields and name is not None else None
-        raise FileError(message, Where(self.path, line, None, name))
+        return Where(self.path, line, None, name)
 
     def _line(self, number: int, line: str) -> None:
         pair, plain = line.find(":="), line.find(":")
@@ -210,7 +241,8 @@ class _Parser:
         self.fields[name] = number, line[plain + 1 :].strip()
 
     def header(self) -> Header:
-        dtype = self._dtype()
+        encoding = self._word("encoding", _ENCODINGS)
+        dtype = self._dtype(encoding)
         if self._whole_number("dimension") != 3:
             shown = self.value("dimension")[:20]
             self.fail(f"must be 3: only volumes of one value per voxel are read, got {shown}", "dimension")
@@ -226,10 +258,9 @@ class _Parser:
             self.fail(f"has a position or direction beyond {LARGEST_NUMBER:g}")
         if not independent(directions):
             self.fail("must be three steps in different directions, none of them zero", self._steps_name())
-        encoding = self._word("encoding", _ENCODINGS)
         line_skip = self._skip("line skip", 0)
         byte_skip = self._skip("byte skip", -1 if encoding == "raw" else 0)
-        if line_skip and encoding != "raw":
+        if line_skip and encoding in COMPRESSED:
             self.fail("must be 0 before compressed data", "line skip")
         return Header(
             dtype=dtype,
@@ -239,6 +270,7 @@ class _Parser:
             encoding=encoding,
             length=self.length,
             data_file=data_file,
+            data_place=self.place("data file"),
             line_skip=line_skip,
             byte_skip=byte_skip,
             texts=self.texts,
@@ -249,13 +281,13 @@ class _Parser:
             self.fail(f"is damaged: its header has no field {name!r}")
         return self.fields[name][1]
 
-    def _dtype(self) -> np.dtype[np.generic]:
+    def _dtype(self, encoding: Encoding) -> np.dtype[np.generic]:
         name = " ".join(self.value("type").lower().split())
         if name not in _KIND_OF_TYPE:
             known = ", ".join(names[0] for names in _TYPES.values())
             self.fail(f"unsupported type {name[:40]!r}; known: {known}", "type")
         kind = _KIND_OF_TYPE[name]
-        if kind[1] == "1":
+        if kind[1] == "1" or encoding == "ascii":  # which have no order of bytes
             return np.dtype(kind)
         order = self._word("endian", {"little": "<", "big": ">"})
         return np.dtype(order + kind)
@@ -315,16 +347,18 @@ class _Parser:
                 self.fail(f"must be numbers, got {word[:40]!r}", name)
         return numbers
 
-    def _vectors(self, name: str, count: int) -> Doubles:
+    def _vectors(self, name: str, count: int, length: int) -> Doubles:
+        """As many vectors, each of so many numbers, in parentheses."""
         rows: list[list[float]] = []
         written, place = self.value(name), 0
         while len(rows) <= count and (found := _VECTOR.match(written, place)):
             if found[2]:
                 self.fail("must be three directions: only volumes of one value per voxel are read", name)
-            rows.append(self._floats(name, re.split(r"[\s,]+", found[1].strip()), 3))
+            rows.append(self._floats(name, re.split(r"[\s,]+", found[1].strip()), length))
             place = found.end()
         if len(rows) != count or written[place:].strip():
-            what = "a vector (x,y,z)" if count == 1 else f"{count} vectors (x,y,z)"
+            vector = "(x,y,z)" if length == 3 else "(x,y,z,t)"
+            what = f"a vector {vector}" if count == 1 else f"{count} vectors {vector}"
             self.fail(f"must be {what}, got {written[:80]!r}", name)
         return np.array(rows, np.float64)
 
@@ -335,23 +369,33 @@ class _Parser:
 
     def _geometry(self, sizes: list[int]) -> tuple[Doubles, Doubles]:
         """Origin and directions, by the fields of a space or else by those of single axes."""
-        right_handed = True
+        space = _Space((1, 1, 1), 3)
         if "space" in self.fields:
-            right_handed = self._word("space", _SPACES)
-        if "space dimension" in self.fields and self._whole_number("space dimension") != 3:
-            self.fail("must be 3", "space dimension")
+            space = self._space(self.value("space"))
+        if "space dimension" in self.fields and self._whole_number("space dimension") != space.dimension:
+            shown = f" in the space {self.value('space')[:40]}" if "space" in self.fields else ""
+            self.fail(f"must be {space.dimension}{shown}", "space dimension")
         origin = np.zeros(3)
         if "space directions" in self.fields:
-            directions = self._vectors("space directions", 3)
+            found = self._vectors("space directions", 3, space.dimension)
+            if found[:, 3:].any():
+                self.fail("must be three directions in space: none may go along the time", "space directions")
+            directions = found[:, :3]
         else:
             steps, origin = self._axes(sizes)
             directions = np.diag(steps)
         if "space origin" in self.fields:
-            origin = self._vectors("space origin", 1)[0]
-        if not right_handed:
-            # Such a space is the mirror image of ours: x is reversed (left becomes right).
-            origin[0], directions[:, 0] = -origin[0], -directions[:, 0]
-        return origin, directions
+            origin = self._vectors("space origin", 1, space.dimension)[0, :3]
+        # (No -0, which files would show.)
+        return origin * space.signs + 0.0, directions * space.signs + 0.0
+
+    def _space(self, name: str) -> _Space:
+        known = _SPACES.get(name.lower())
+        if known is None:
+            near = nearest(name.lower(), _SPACES)
+            hint = f"did you mean {near!r}?" if near else _KNOWN_SPACES
+            self.fail(f"unknown space {name[:40]!r}; {hint}", "space")
+        return known
 
     def _axes(self, sizes: list[int]) -> tuple[list[float], Doubles]:
         """Steps along the axes and the middle of the first voxel, from the fields of NRRD's first version."""

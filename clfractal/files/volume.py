@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import gzip
 import json
-import math
 import os
 import re
-import zlib
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -23,7 +21,7 @@ import numpy.typing as npt
 
 from clfractal import arguments
 from clfractal.errors import FileError
-from clfractal.files import memory, nrrd
+from clfractal.files import nrrd, voxel_data
 from clfractal.files.atomic import atomic_writer, check_output, file_error, open_regular
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.regular import read_text_file
@@ -40,12 +38,10 @@ SCENE_KEY = "clfractal"
 BESIDE = ".json"
 """What is added to a NPY file's name for the file that keeps what NPY cannot."""
 
-_MAPPED = 64 << 20  # bytes; smaller data are read: a mapped file that is cut short later ends the process
-_PIECE = 1 << 20  # bytes read, written or compressed at once, so that Ctrl-C is heard in between
+_PIECE = 1 << 20  # bytes written or compressed at once, so that Ctrl-C is heard in between
 # Bytes after which the file is flushed to the disk: flushing a large file only at its end takes seconds, in which
 # Ctrl-C could not be handled properly.
 _FLUSHED = 16 << 20
-_DEFLATE_AT_MOST = 1032  # times smaller, by the format itself
 _NPY_MAGIC = b"\x93NUMPY"
 _NPY_HEADER = re.compile(
     r"\{\s*'descr':\s*'([<>|=][a-z]\d{1,2})',\s*'fortran_order':\s*(True|False),"
@@ -107,7 +103,7 @@ class Volume:
 
 
 def read_volume(path: str | Path, *, limit: int | None = None) -> Volume:
-    """Reads a volume, by its content: NRRD (attached or detached; raw or gzip) or NPY.
+    """Reads a volume, by its content: NRRD (attached or detached, in any of its encodings) or NPY.
 
     Large data that are stored as this machine wants them are mapped, and take no memory until they are used.
 
@@ -250,120 +246,18 @@ def _read_nrrd(path: str | Path, stream: BinaryIO, limit: int | None) -> Volume:
     start = stream.read(nrrd.LARGEST_HEADER)
     head = nrrd.parse(start, path, whole=len(start) < nrrd.LARGEST_HEADER)
     if head.data_file is None:
-        values = _read_nrrd_data(path, stream, head, head.length, limit)
+        values = voxel_data.read(path, stream, head, head.length, limit)
     else:
         named = Path(path).parent / head.data_file
         if not os.path.realpath(named).startswith(os.path.realpath(Path(path).parent) + os.sep):
             raise file_error(path, f"must have its data inside its folder, got {head.data_file[:80]!r}", "")
         with open_regular(named) as data:
-            values = _read_nrrd_data(named, data, head, 0, limit)
+            if os.path.samestat(os.fstat(data.fileno()), os.fstat(stream.fileno())):
+                raise FileError(
+                    "must be another file: this one is the header, and holds no voxels", head.data_place
+                )
+            values = voxel_data.read(named, data, head, 0, limit)
     return Volume(values, head.origin, head.directions, head.texts)
-
-
-def _read_nrrd_data(
-    path: str | Path, stream: BinaryIO, head: nrrd.Header, offset: int, limit: int | None
-) -> Values:
-    size = os.fstat(stream.fileno()).st_size
-    need = math.prod(head.shape) * head.dtype.itemsize
-    if head.encoding == "gzip":
-        return _inflated(path, stream, head, offset, size, limit)
-    offset = _after_lines(path, stream, offset, head.line_skip)
-    offset = max(offset, size - need) if head.byte_skip < 0 else offset + head.byte_skip
-    return _plain(path, stream, head.dtype, head.shape, offset, limit)
-
-
-def _after_lines(path: str | Path, stream: BinaryIO, offset: int, lines: int) -> int:
-    """The place after some lines; a file without that many ends the search."""
-    stream.seek(offset)
-    while lines:
-        piece = stream.readline(_PIECE)
-        if not piece:
-            raise file_error(path, "is cut short: it has fewer lines than its header skips", "")
-        lines -= piece.endswith(b"\n")
-    return stream.tell()
-
-
-def _plain(
-    path: str | Path,
-    stream: BinaryIO,
-    dtype: np.dtype[Any],
-    shape: tuple[int, int, int],
-    offset: int,
-    limit: int | None,
-) -> Values:
-    """Values as they lie in the file from `offset` on: mapped if there are many."""
-    size, need = os.fstat(stream.fileno()).st_size, math.prod(shape) * dtype.itemsize
-    if size - offset < need:
-        raise file_error(
-            path, f"is cut short: {_sides(shape)} need {need:,} bytes, it has {max(0, size - offset):,}", ""
-        )
-    native = dtype.newbyteorder("=")
-    if need >= _MAPPED and dtype == native:
-        return np.memmap(stream, dtype, "r", offset, shape)
-    values = _room(path, native, shape, limit)
-    stream.seek(offset)
-    # In the file's byte order; the bytes are swapped in place, piece by piece.
-    raw: Any = values.reshape(-1).view(np.uint8)
-    for start in range(0, need, _PIECE):
-        wanted = memoryview(raw[start : start + _PIECE])
-        if stream.readinto(wanted) != len(wanted):  # type: ignore[attr-defined]
-            raise file_error(path, "is cut short: the file ends inside its data", "")
-    if dtype != native:
-        values.byteswap(inplace=True)
-    return values
-
-
-def _inflated(
-    path: str | Path, stream: BinaryIO, head: nrrd.Header, offset: int, size: int, limit: int | None
-) -> Values:
-    """Values packed by gzip; never more is unpacked than the header tells."""
-    need = math.prod(head.shape) * head.dtype.itemsize
-    if need + head.byte_skip > (size - offset) * _DEFLATE_AT_MOST:
-        raise file_error(
-            path,
-            f"is cut short: {_sides(head.shape)} need {need:,} bytes, which {max(0, size - offset):,}"
-            " compressed ones cannot hold",
-            "",
-        )
-    native = head.dtype.newbyteorder("=")
-    values = _room(path, native, head.shape, limit)
-    raw: Any = values.reshape(-1).view(np.uint8)
-    stream.seek(offset)
-    try:
-        with gzip.GzipFile(fileobj=stream) as unpacked:
-            left = head.byte_skip
-            while left and (skipped := len(unpacked.read(min(left, _PIECE)))):
-                left -= skipped
-            filled = 0
-            while filled < need:
-                count = unpacked.readinto(memoryview(raw[filled : filled + _PIECE]))
-                if not count:
-                    raise EOFError
-                filled += count
-            unpacked.read(1)  # at the end of the data their check sum is compared
-    except EOFError as error:
-        raise file_error(path, "is cut short: its compressed data end too early", "") from error
-    except (gzip.BadGzipFile, zlib.error) as error:
-        raise file_error(path, "is damaged: its compressed data are wrong", "") from error
-    if head.dtype != native:
-        values.byteswap(inplace=True)
-    return values
-
-
-def _room(path: str | Path, dtype: np.dtype[Any], shape: tuple[int, int, int], limit: int | None) -> Values:
-    """Memory for values, if there is enough."""
-    need, have = math.prod(shape) * dtype.itemsize, memory.available() if limit is None else limit
-    if need > have:
-        raise file_error(
-            path,
-            f"is too large: {_sides(shape)} need {memory.shown(need)} of memory, {memory.shown(have)} are left",
-            "",
-        )
-    return np.empty(shape, dtype)
-
-
-def _sides(shape: tuple[int, int, int]) -> str:
-    return f"{shape[2]:,} x {shape[1]:,} x {shape[0]:,} voxels"
 
 
 def _read_npy(path: str | Path, stream: BinaryIO, limit: int | None) -> Volume:
@@ -386,11 +280,11 @@ def _read_npy(path: str | Path, stream: BinaryIO, limit: int | None) -> Volume:
         raise file_error(path, f"must be an array of three axes, got {shown}", "")
     offset = 8 + width + length
     if found[2] == "True":
-        turned = _plain(path, stream, dtype, (sides[2], sides[1], sides[0]), offset, limit)
-        values = _room(path, turned.dtype, (sides[0], sides[1], sides[2]), limit)
+        turned = voxel_data.plain(path, stream, dtype, (sides[2], sides[1], sides[0]), offset, limit)
+        values = voxel_data.room(path, turned.dtype, (sides[0], sides[1], sides[2]), limit)
         values[...] = turned.T
     else:
-        values = _plain(path, stream, dtype, (sides[0], sides[1], sides[2]), offset, limit)
+        values = voxel_data.plain(path, stream, dtype, (sides[0], sides[1], sides[2]), offset, limit)
     origin, directions, texts = _notes(path, values.shape)
     return Volume(values, origin, directions, texts)
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.scene.grid_place import GridPlace, vector_of
+from clfractal.scene.grid_values import finite_range
 
 if TYPE_CHECKING:
     from clfractal.scene.volume import Box, VolumeRenderer
@@ -29,7 +30,7 @@ class GivenGrid:
         values: shape (nz, ny, nx). Each axis of the array is the one of the file that follows x, y or z most closely, and
             goes the same way: of a grid along the axes x, y and z grow with the index.
         place: of the grid.
-        low, high: the least and largest finite value.
+        low, high: the least and largest finite value; of a single one half before and after it.
     """
 
     values: npt.NDArray[Any]
@@ -91,7 +92,9 @@ def _read(path: Path, where: Where, box: Box | None) -> GivenGrid:
     if box is not None:
         # As large as fits into the box, in its middle.
         place = place.moved(box.center, float((np.array(box.sides) / place.box).min()))
-    low, high = _range(values)
+    low, high = finite_range(values) or (0.0, 1.0)
+    if low == high:
+        low, high = low - 0.5, high + 0.5
     return GivenGrid(values, place, low, high)
 
 
@@ -105,12 +108,3 @@ def _order(directions: npt.NDArray[np.float64]) -> tuple[int, int, int]:
         left[array_axis, :] = -1
         left[:, axis] = -1
     return order[0], order[1], order[2]
-
-
-def _range(values: npt.NDArray[Any]) -> tuple[float, float]:
-    low, high = np.inf, -np.inf
-    for layer in values:
-        finite = layer[np.isfinite(layer)] if layer.dtype.kind == "f" else layer
-        if finite.size:
-            low, high = min(low, float(finite.min())), max(high, float(finite.max()))
-    return (low, high) if low < high else (0.0, 1.0) if low > high else (low - 0.5, low + 0.5)

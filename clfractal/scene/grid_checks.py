@@ -1,9 +1,8 @@
 """Checks of volumes among a scene's objects that need their grids."""
 
-import numpy as np
-
 from clfractal.errors import SceneError, Where
 from clfractal.scene.base import Vector
+from clfractal.scene.grid_values import is_finite_somewhere, lacking
 from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import PlacedGrid, placed, used_level, volumes_of
@@ -16,9 +15,9 @@ def check_grids(scene: Scene) -> None:
     """
     for name, each in volumes_of(scene.objects).items():
         grid = scene.grids[each.file]
-        if not any(bool(np.isfinite(layer).any()) for layer in grid.values):
+        if not is_finite_somewhere(grid.values):
             raise SceneError(
-                f"{each.file} holds nothing but NaN, so there is no value to show",
+                f"{each.file} {lacking(grid.values)}, so there is no value to show",
                 Where(path=f"objects.{name}.file"),
             )
         if each.is_cloud:

@@ -16,8 +16,9 @@ from clfractal import arguments
 from clfractal.device.activity import doing
 from clfractal.errors import ClfractalError, FileError, SceneError, Where
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
-from clfractal.files.embedded import is_picture, read_scene_text
+from clfractal.files.embedded import read_scene_text
 from clfractal.files.inputs import noting
+from clfractal.files.kinds import kind_of
 from clfractal.files.marks import Document, Node, node_from_plain, option
 from clfractal.files.regular import read_text_file
 from clfractal.scene.checks import check_parts
@@ -132,8 +133,14 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
 
 def read_text(path: Path) -> str:
     """The text of a scene file, or of the scene that a picture holds; FileError if it cannot be read or holds none."""
-    if not is_picture(path):
+    kind = kind_of(path)
+    if kind is None:
         return read_text_file(path)
+    if kind == "volume":
+        raise FileError(
+            "is a volume, not a scene: a scene shows it by renderer.file, and `clfractal mesh` makes triangles of it",
+            Where(str(path)),
+        )
     found = read_scene_text(path)
     if found is None:
         raise FileError("holds no scene: it was not written by clfractal", Where(str(path)))

@@ -14,7 +14,7 @@ as d does and never ties. Their ratio stays below 2^8, so that a vertex tells it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -80,21 +80,6 @@ def extract(
         if progress is not None:
             progress(done / count)
     return job.mesh()
-
-
-def value_range(values: Values) -> tuple[float, float]:
-    """The least and the largest finite value, found slab by slab; (0, 0) if there is none."""
-    low, high = np.inf, -np.inf
-    for plane in _slabs(values):
-        finite = plane[np.isfinite(plane)] if plane.dtype.kind == "f" else plane
-        if finite.size:
-            low, high = min(low, float(finite.min())), max(high, float(finite.max()))
-    return (low, high) if low <= high else (0.0, 0.0)
-
-
-def _slabs(values: Values, planes: int = 16) -> Iterator[Values]:
-    for start in range(0, values.shape[0], planes):
-        yield np.asarray(values[start : start + planes])
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from clfractal.files.mesh import Mesh
 from clfractal.files.volume import SCENE_KEY, Volume
 from clfractal.renderers.vertices import COLORED_BY, dress, on_faces
 from clfractal.scene.coloring import Coloring
+from clfractal.scene.grid_values import finite_range, in_words
 from clfractal.scene.load import load_coloring, load_scene, read_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
@@ -159,16 +160,14 @@ def _of_file(
     folder: Path | None,
     talk: Talk,
 ) -> _Found:
-    from clfractal.voxels.mesh import value_range
-
     made = _made(volume, device, precision, folder, talk)
     if level is None and made is not None and _has_level(made.job.scene):
         level = _stored(None, volume, made.job.scene)
     elif level is None:
-        low, high = value_range(volume.values)
-        if low == high:
-            raise SceneError(f"has no surface: {_values_of(volume)}")
-        level = (low + high) / 2
+        found = finite_range(volume.values)
+        if found is None or found[0] == found[1]:
+            raise SceneError(f"has no surface: {in_words(volume.values)}")
+        level = sum(found) / 2
     talk.note(_summary(volume, level))
     return _Found(volume, level, made, True)
 
@@ -218,27 +217,20 @@ def _no_surface(found: _Found, close: bool) -> ClfractalError:
     volume = found.volume
     z, y, x = volume.values.shape
     if not close and bool((np.asarray(volume.values[0, 0, 0]) >= found.level).all()):
+        inside = "the whole box is inside"
+        if found.is_file:
+            inside = f"at the level {found.level:g} {inside}, as {in_words(volume.values)}"
         return SceneError(
-            "has no surface: the whole box is inside; closed, its faces would be the surface (without --no-close)"
+            f"has no surface: {inside}; closed, its faces would be the surface (without --no-close)"
         )
     if found.is_file:
-        return SceneError(f"has no surface at the level {found.level:g}: {_values_of(volume)}")
+        return SceneError(f"has no surface at the level {found.level:g}: {in_words(volume.values)}")
     size = " x ".join(f"{side:.4g}" for side in volume.spacing * (x, y, z))
     middle = volume.origin + (np.array((x, y, z)) - 1) / 2 @ volume.directions
     place = ", ".join(f"{number:.6g}" for number in middle)
     return SceneError(
         f"nothing of the set lies in the box of {size} around [{place}], at {x} x {y} x {z} voxels"
     )
-
-
-def _values_of(volume: Volume) -> str:
-    """Which values a volume holds, in words."""
-    from clfractal.voxels.mesh import value_range
-
-    low, high = value_range(volume.values)
-    if low < high:
-        return f"its values are from {low:g} to {high:g}"
-    return f"all its values are {low:g}" if np.isfinite(volume.values).any() else "it holds nothing but NaN"
 
 
 def _dressed(mesh: Mesh, made: Made, volume: Volume, talk: Talk) -> Mesh:

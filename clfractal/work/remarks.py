@@ -22,6 +22,7 @@ from clfractal.renderers.plan import PlannedView
 from clfractal.scene.checks import inside_solid, used_boxes
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.grid_place import GridPlace
+from clfractal.scene.grid_values import in_words, is_finite_somewhere, lacking
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -238,8 +239,8 @@ def _why_no_surface(seen: _Seen) -> str:
 def _why_no_volume(seen: _Seen, renderer: VolumeRenderer) -> str:
     """Why nothing of a volume is seen; empty if that need not be a mistake."""
     scene, given = seen.scene, seen.scene.given
-    if given is not None and not _holds(given.values, np.isfinite):
-        return _ONLY_NAN
+    if given is not None and not is_finite_somewhere(given.values):
+        return _nothing_to_show(given.values)
     if given is None and (beyond := _beyond(scene, renderer)):
         return beyond
     shown = _shown_place(scene, renderer)
@@ -253,7 +254,10 @@ def _why_no_volume(seen: _Seen, renderer: VolumeRenderer) -> str:
         return "nothing of the volume is visible; renderer.transfer.opacity is 0 for all values"
     if given is None and renderer.value != "iterations" and stops is None:
         return _EMPTY
-    return "nothing of the volume is visible; renderer.transfer.opacity is 0 for the values that it holds"
+    held = f": {in_words(given.values)}" if given is not None else ""
+    return (
+        f"nothing of the volume is visible; renderer.transfer.opacity is 0 for the values that it holds{held}"
+    )
 
 
 def remarks_of_grid(scene: Scene, values: npt.NDArray[Any]) -> tuple[str, ...]:
@@ -265,7 +269,7 @@ def remarks_of_grid(scene: Scene, values: npt.NDArray[Any]) -> tuple[str, ...]:
     renderer = scene.renderer
     assert isinstance(renderer, VolumeRenderer)
     if scene.given is not None:
-        return () if _holds(values, np.isfinite) else (_ONLY_NAN,)
+        return () if is_finite_somewhere(values) else (_nothing_to_show(values),)
     if beyond := _beyond(scene, renderer):
         return (beyond,)
     if renderer.value == "iterations":
@@ -278,8 +282,11 @@ def remarks_of_grid(scene: Scene, values: npt.NDArray[Any]) -> tuple[str, ...]:
     return ()
 
 
-_ONLY_NAN = "the volume holds nothing but NaN; renderer.file has no value to show"
 _EMPTY = "the volume holds nothing of the set; a finer renderer.resolution or another renderer.box shows more"
+
+
+def _nothing_to_show(values: npt.NDArray[Any]) -> str:
+    return f"the volume {lacking(values)}; renderer.file has no value to show"
 
 
 def _holds(values: npt.NDArray[Any], wanted: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> bool:

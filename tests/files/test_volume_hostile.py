@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import json
 import tracemalloc
@@ -71,11 +72,32 @@ def test_the_good_one(tmp_path: Path) -> None:
         ({"type": "complex double"}, "type: unsupported type 'complex double'"),
         ({"endian": "middle"}, "endian: unknown endian 'middle'"),
         ({"endian": None}, "its header has no field 'endian'"),
-        ({"encoding": "bzip2"}, "encoding: unknown encoding 'bzip2'"),
-        ({"encoding": "txt"}, "encoding: unknown encoding 'txt'; known: gz, gzip, raw"),
+        (
+            {"encoding": "zrl"},
+            "encoding: unknown encoding 'zrl'; known: ascii, bz2, bzip2, gz, gzip, hex, raw",
+        ),
+        ({"encoding": "bzip2"}, "is damaged: its compressed data are wrong"),
+        ({"encoding": "txt"}, "is damaged: its number 1 is "),
+        ({"encoding": "hex"}, "is cut short: 2 x 3 x 4 voxels need 96 digits, it has 48 characters"),
+        ({"encoding": "hex", "type": "uchar"}, "is damaged: its data are not hexadecimal"),
+        (
+            {"encoding": "ascii", "sizes": "9 9 9"},
+            "is cut short: 9 x 9 x 9 voxels need 1,457 characters or more",
+        ),
         ({"encoding": "gzip"}, "is damaged: its compressed data are wrong"),
-        ({"space": "4D"}, "space: unknown space '4d'"),
-        ({"space_dimension": "2"}, "space dimension: must be 3"),
+        (
+            {"space": "4D"},
+            "space: unknown space '4D'; known: RAS, LAS, LPS or their whole names, scanner-xyz",
+        ),
+        ({"space_dimension": "2"}, "space dimension: must be 3 in the space left-posterior-superior"),
+        ({"space": None, "space_dimension": "4"}, "space dimension: must be 3"),
+        ({"space": "LPST"}, "space directions: must be 4 numbers, got 3"),
+        (
+            {"space": "LPST", "space_directions": "(1,0,0,0) (0,1,0,0) (0,0,0,1)", "space_origin": None},
+            "space directions: must be three directions in space: none may go along the time",
+        ),
+        ({"space": "LPs3"}, "unknown space 'LPs3'; did you mean 'lps'?"),
+        ({"space": "right-up"}, "space: unknown space 'right-up'"),
         ({"space_directions": "(1,0,0) (0,1,0)"}, "space directions: must be 3 vectors"),
         ({"space_directions": "(1,0,0) (0,1,0) (0,0,1) (1,1,1)"}, "space directions: must be 3 vectors"),
         ({"space_directions": "(1,0,0) (0,1,0) (0,1,0)"}, "8: space directions: must be three steps"),
@@ -102,6 +124,7 @@ def test_the_good_one(tmp_path: Path) -> None:
         ({"data_file": "slice%03d.raw 1 9 1"}, "data in several files"),
         ({"data_file": "missing.raw"}, "missing.raw: cannot be read: No such file"),
         ({"data_file": ""}, "data file: must be a path"),
+        ({"data_file": "v.nrrd"}, "v.nrrd:10: data file: must be another file: this one is the header"),
     ],
 )
 def test_a_wrong_header_in_one_line(changed: dict[str, str | None], part: str, tmp_path: Path) -> None:
@@ -159,6 +182,35 @@ def test_a_bomb_takes_no_memory(tmp_path: Path) -> None:
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 20_000_000
+
+
+@pytest.mark.parametrize("link", ["v.nrrd", "other.nhdr"])
+def test_data_that_would_be_the_header(link: str, tmp_path: Path) -> None:
+    """By another name, too: a link to the header has no voxels either."""
+    path = tmp_path / "v.nrrd"
+    path.write_bytes(header(data_file=link) + bytes(1000))
+    if link != "v.nrrd":
+        (tmp_path / link).hardlink_to(path)
+    assert "data file: must be another file" in message(path)
+
+
+@pytest.mark.parametrize(
+    ("kind", "data", "part"),
+    [
+        ("uchar", b"1 2 3 256", "its number 4 is '256', which is no uint8"),
+        ("uchar", b"1 2 -3 4", "its number 3 is '-3', which is no uint8"),
+        ("uint64", b"1 2 -3 4", "its number 3 is '-3', which is no uint64"),
+        ("short", b"1 2.5 3 4", "its number 2 is '2.5', which is no int16"),
+        ("float", b"1 2 three 4", "its number 3 is 'three', which is no float32"),
+        ("float", b"1 2 1_0 4", "its number 3 is '1_0', which is no float32"),
+        ("float", b"1 2 3     ", "is cut short: 4 x 1 x 1 voxels, but 3 numbers"),
+        ("float", b"1 2 \xff\xfe 4", "its number 3 is"),
+        ("float", b"1 2 " + b"9" * 3_000_000, "its number 3 is '9999999999999999999999999999999999999999'"),
+    ],
+)
+def test_text_that_is_no_numbers(kind: str, data: bytes, part: str, tmp_path: Path) -> None:
+    (tmp_path / "v.nrrd").write_bytes(header(encoding="text", endian=None, sizes="4 1 1", type=kind) + data)
+    assert part in message(tmp_path / "v.nrrd")
 
 
 def test_a_header_without_an_end(tmp_path: Path) -> None:
@@ -246,7 +298,15 @@ def is_read_or_refused(path: Path) -> bool:
         return "\n" not in str(error)
 
 
-STARTS = (header() + DATA, npy() + DATA, header(encoding="gzip") + gzip.compress(DATA))
+TEXT = " ".join(map(str, range(24))).encode()
+STARTS = (
+    header() + DATA,
+    npy() + DATA,
+    header(encoding="gzip") + gzip.compress(DATA),
+    header(encoding="bzip2") + bz2.compress(DATA),
+    header(encoding="ascii", endian=None) + TEXT,
+    header(encoding="hex") + DATA.hex().encode(),
+)
 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -267,7 +327,24 @@ def test_mutated_files_are_read_or_refused(
 
 
 words = st.sampled_from(
-    ["1", "-1", "0", "nan", "1e999", "9" * 30, "(1,0,0)", "none", "(", ")", ",", "raw", "gzip", "big", "%d"]
+    [
+        "1",
+        "-1",
+        "0",
+        "nan",
+        "1e999",
+        "9" * 30,
+        "(1,0,0)",
+        "none",
+        "(",
+        ")",
+        ",",
+        "raw",
+        "gzip",
+        "big",
+        "%d",
+        "hex",
+    ]
 )
 
 

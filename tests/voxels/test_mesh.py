@@ -11,7 +11,8 @@ import skimage.measure
 import trimesh
 
 from clfractal.files.mesh import Mesh
-from clfractal.voxels.mesh import extract, value_range
+from clfractal.scene.grid_values import finite_range
+from clfractal.voxels.mesh import extract
 
 marching_cubes: Any = skimage.measure.marching_cubes
 Doubles = npt.NDArray[np.float64]
@@ -253,9 +254,9 @@ def test_progress_and_range() -> None:
     told: list[float] = []
     mesh_of(ball(), brick=25, progress=told.append)
     assert told == [pytest.approx(part / 8) for part in range(1, 9)]
-    assert value_range(np.array([[[3.0, np.nan, -1.0, np.inf]]])) == (-1, 3)
-    assert value_range(np.full((2, 2, 2), np.nan)) == (0, 0)
-    assert value_range(np.arange(40 * 6, dtype=np.uint8).reshape(40, 2, 3)) == (0, 239)
+    assert finite_range(np.array([[[3.0, np.nan, -1.0, np.inf]]])) == (-1, 3)
+    assert finite_range(np.full((2, 2, 2), np.nan)) is None
+    assert finite_range(np.arange(40 * 6, dtype=np.uint8).reshape(40, 2, 3)) == (0, 239)
 
 
 class Watched:

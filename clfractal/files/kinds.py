@@ -1,0 +1,45 @@
+"""What a file is, which decides who reads it: by how it begins, or, where that says nothing, by how its name ends."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from clfractal.files.regular import read_bytes
+
+Kind = Literal["exr", "png", "photo", "volume"]
+
+_LONGEST = 12
+_PICTURES: dict[Kind, tuple[str, ...]] = {
+    "exr": (".exr",),
+    "png": (".png",),
+    "photo": (".jpg", ".jpeg", ".webp"),
+}
+_BY_ENDING: dict[str, Kind] = {
+    **{ending: kind for kind, endings in _PICTURES.items() for ending in endings},
+    **dict.fromkeys((".nrrd", ".nhdr", ".npy"), "volume"),
+}
+
+
+def kind_of(path: Path) -> Kind | None:
+    """The kind of a file; None for all that is neither a picture that may hold a scene nor a volume, such as scenes.
+
+    An empty or damaged file is of the kind that its name says: so whoever reads this kind tells what is wrong with it.
+
+    Raises:
+        FileError: it cannot be read.
+    """
+    return kind_of_start(read_bytes(path, prefix=_LONGEST)) or _BY_ENDING.get(path.suffix.lower())
+
+
+def kind_of_start(start: bytes) -> Kind | None:
+    """The kind of a file that begins with these bytes, twelve or more of them."""
+    if start.startswith(b"\x76\x2f\x31\x01"):
+        return "exr"
+    if start.startswith(b"\x89PNG\r\n\x1a\n"):
+        return "png"
+    if start.startswith(b"\xff\xd8\xff") or (start[:4] == b"RIFF" and start[8:12] == b"WEBP"):
+        return "photo"
+    if start.startswith((b"NRRD000", b"\x93NUMPY")):
+        return "volume"
+    return None
