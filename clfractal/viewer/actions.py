@@ -62,6 +62,7 @@ _TABLE: Mapping[str, tuple[tuple[str, str, str], ...]] = {
         ("*screenshot_panels", "Shift+F12", "save the picture with the panels over it"),
         ("*export", "Ctrl+E", "save the picture as EXR, with all channels"),
         ("*render_still", "F9", "render a still in the background"),
+        ("*render_film", "Shift+F9", "render the film in the background"),
     ),
     "Undo": (
         ("undo", "Ctrl+Z", "undo and redo a change of the scene"),

@@ -267,6 +267,7 @@ class Viewer:
             self._rest(True)
         self.outputs.watch(now, self.studio.tell)
         self._mind_device()
+        self.studio.films.look(now)
         self.studio.tick()
         session = self.studio.session
         told = (session.problem, session.progress, session.paused, self.studio.messages[-1:])
@@ -443,7 +444,7 @@ class Viewer:
         awaited = self.ui.memory.pop(
             "awaited", False
         )  # a panel waits for pictures, or for a thread of its own
-        if awaited or session.progress or any(not still.finished for still in self.studio.stills):
+        if awaited or session.progress or self.studio.busy_beside:
             self._wake_at = time.perf_counter() + 0.1
 
     _wake_at = 0.0
@@ -485,6 +486,8 @@ class Viewer:
         self.inputs.close()
         self.files.close()
         self.studio.session.pause()
+        for line in self.studio.films.close():
+            self.tell(line)
         self.surface.close()
         self.studio.close()
         self.small.close()

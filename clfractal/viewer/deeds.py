@@ -87,6 +87,7 @@ class Deeds:
             "screenshot_panels": lambda: files.screenshot(panels=True),
             "export": files.export,
             "render_still": self._switch("stills"),
+            "render_film": self._switch("films"),
             "pause": self._pause,
             "coarse": self._coarse,
             "orbit_style": self._orbit_style,
@@ -163,6 +164,8 @@ class Deeds:
             for still in viewer.studio.stills:
                 still.cancel()
             viewer.studio.tell("stills are cancelled")
+        elif viewer.studio.films.cancel():
+            viewer.studio.tell("films are cancelled; their frames are kept")
         else:
             viewer.motion.stop()
             viewer.studio.session.pause()
@@ -232,6 +235,7 @@ _CLOSED_BY_ESCAPE = {
     "save",
     "open",
     "stills",
+    "films",
     "history",
     "formula_editor",
 }

@@ -22,6 +22,7 @@ from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
 from clfractal.viewer.editing import edited, value_at
 from clfractal.viewer.filming import MOVING_SECONDS, InFilm
+from clfractal.viewer.films import FilmQueue
 from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.history import History, Kind
@@ -100,6 +101,7 @@ class Studio(InFilm):
         self.region: tuple[int, int, int, int] | None = None
         self.smooth = True
         self.stills: list[Still] = []
+        self.films = FilmQueue()
         self._thumbnails: dict[Hashable, Thumbnail] = {}
         self._requested: Any = None
         self._live: tuple[str, ...] = ()
@@ -346,6 +348,11 @@ class Studio(InFilm):
         self.stills.append(still)
         self.session.add(still)
         return still
+
+    @property
+    def busy_beside(self) -> bool:
+        """Whether stills or films are rendered beside the picture."""
+        return self.films.busy or any(not still.finished for still in self.stills)
 
     def begin_topic(self, topic: str) -> None:
         """What is told from now on is about something, such as an action; what was told about it before is gone."""

@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from clfractal.viewer.panels import (
     dialogs,
+    films,
     gallery,
     help,
     history,
@@ -33,6 +34,7 @@ def draw(ui: Ui) -> None:
     right_dock.fit(ui)
     variations.draw(ui)
     stills.draw(ui)
+    films.draw(ui)
     history.draw(ui)
     gallery.draw(ui)
     help.draw(ui)

@@ -1,4 +1,4 @@
-"""The column at the window's right: variations, stills and history, those that are open below each other."""
+"""The column at the window's right: variations, stills, films and history, those that are open below each other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.timeline_area import room_of
 from clfractal.viewer.panels.ui import Ui
 
-_PARTS = {"variations": (370.0, 2.0), "stills": (250.0, 0.7), "history": (230.0, 1.0)}
+_PARTS = {"variations": (370.0, 2.0), "stills": (250.0, 0.7), "films": (282.0, 0.7), "history": (230.0, 1.0)}
 """Parts in their order: the least height that they can be used with, points, and their shares of what is left."""
 _OVERLAY = 64.0
 """Points at the lower rim that belong to the overlay."""

@@ -13,10 +13,11 @@ from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.atomic import PICTURES
 from clfractal.pictures.formats import Content, check_output
 from clfractal.pictures.outputs import output_files
-from clfractal.scene.parts import MAX_PIXELS, MAX_SIDE, Image
+from clfractal.scene.parts import MAX_PIXELS, Image
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still
 from clfractal.viewer.panels import layout, right_dock, theme
+from clfractal.viewer.panels import order_form as form
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.ui import Ui
@@ -139,70 +140,20 @@ def on_their_way(stills: Iterable[Still]) -> set[Path]:
 
 
 def _settings(ui: Ui, state: Wanted) -> None:
-    size = state.size or _window_size(ui)
-    name = next((name for name, each in PRESETS.items() if each == state.size), "")
-    width = _label("Size")
-    found = w.choose("stills.preset", _preset_words(ui), name or "free", width)
-    if found is not None:
-        state.size = PRESETS.get(found, size)
-    _label("")
-    room = imgui.get_content_region_avail().x
-    each = (room - 20) / 2
-    wide = _number(ui, "stills.width", size[0], each, MAX_SIDE)
-    w.in_row(5)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.FAINT), "x")
-    w.in_row(5)
-    high = _number(ui, "stills.height", size[1], each, MAX_SIDE)
-    if wide is not None or high is not None:
-        state.size = (wide or size[0], high or size[1])
+    state.size = form.size(ui, "stills", PRESETS, state.size, _window_size(ui))
     present = ui.studio.scene.renderer.samples
-    width = _label("Samples")
-    samples = _number(ui, "stills.samples", state.samples or present, width - 30, _MOST_SAMPLES)
-    if samples is not None:
-        state.samples = samples
-    w.in_row(4)
-    about = f"As the scene says: {present}"
-    if w.icon_button(theme.RESET, about, name="stills.samples.reset", enabled=state.samples is not None):
-        state.samples = None
-    width = _label("Format")
+    state.samples = form.samples(ui, "stills", state.samples, present, _MOST_SAMPLES)
+    width = form.label("Format")
     chosen = w.choose("stills.kind", FORMATS, state.kind, width)
     if chosen is not None:
         state.kind, state.problem = chosen, ""
-    width = _label("Name")
+    width = form.label("Name")
     suggestion = _suggestion(ui, state)
     imgui.set_next_item_width(width)
     _, text = imgui.input_text_with_hint("##stills.name", suggestion, state.name)
     if text != state.name:
         state.name, state.problem = text, ""
     w.tip(f"Without ending; in {Path.cwd()} unless a folder is given")
-
-
-def _label(text: str) -> float:
-    """A label, then the place of its widget; the width that this has, points."""
-    wide = imgui.get_content_region_avail().x
-    start = imgui.get_cursor_pos_x()
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.DIM), text)
-    left = 0.27 * wide
-    imgui.same_line(start + left)
-    return float(wide - left)
-
-
-def _number(ui: Ui, name: str, value: int, width: float, most: int) -> int | None:
-    """A box with a whole number; the new one, if it was changed."""
-    # A drag over some hundred points reaches every usual size.
-    scale = w.Scale(1, most, None, False, True, "", 1.0, 1.0, (False, False))
-    change = w.number_box(w.boxes(ui), name, float(value), width, scale)
-    return None if change.value is None else round(change.value)
-
-
-def _preset_words(ui: Ui) -> dict[str, str]:
-    words = {}
-    for name, size in PRESETS.items():
-        width, height = size or _window_size(ui)
-        words[name] = f"{name}, {width} x {height}" if not name.startswith("Square") else name
-    return {**words, "free": "Free"}
 
 
 def _window_size(ui: Ui) -> tuple[int, int]:
@@ -290,7 +241,7 @@ def _still(ui: Ui, still: Still) -> None:
         if w.icon_button(theme.CROSS, "Cancel it: nothing is written", name="cancel"):
             still.cancel()
     if not still.finished:
-        _bar(still.share, wide)
+        form.bar(still.share, wide)
     color = theme.WARNING if still.problem else theme.FAINT
     with theme.font(size=12.5), theme.colors(text=color):
         imgui.push_text_wrap_pos(0.0)
@@ -328,25 +279,5 @@ def state_text(still: Still) -> str:
         return f"{size}, writing"
     if still.share <= 0:
         return f"{size}, waiting for the picture"
-    left = f", {time_text(still.remaining)} left" if still.remaining is not None else ""
+    left = f", {form.time_text(still.remaining)} left" if still.remaining is not None else ""
     return f"{size}, {100 * still.share:.0f} %{left}"
-
-
-def time_text(seconds: float) -> str:
-    """A time that is left, for people."""
-    if seconds < 90:
-        return f"{max(round(seconds), 1)} s"
-    if seconds < 90 * 60:
-        return f"{round(seconds / 60)} min"
-    return f"{seconds / 3600:.1f} h"
-
-
-def _bar(share: float, width: float) -> None:
-    corner, high = imgui.get_cursor_screen_pos(), 5.0
-    draw_list = imgui.get_window_draw_list()
-    far = imgui.ImVec2(corner.x + width, corner.y + high)
-    draw_list.add_rect_filled(corner, far, theme.packed(theme.FRAME), high / 2)
-    if share > 0:
-        filled = imgui.ImVec2(corner.x + max(share * width, high), far.y)
-        draw_list.add_rect_filled(corner, filled, theme.packed(theme.ACCENT), high / 2)
-    imgui.dummy(imgui.ImVec2(width, high))

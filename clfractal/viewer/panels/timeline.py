@@ -100,7 +100,7 @@ def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, w
     text = f"of {animation.count}   {timeline.clock(frame, animation.fps)}"
     if player.playing and ui.speed.frames and width > _ROOM:
         text += f"   {min(ui.speed.frames, animation.fps):.0f} of {animation.fps:g}/s"
-    buttons = max(width - 8 - 8 * (imgui.get_frame_height() + 2) - 12, 0.0)
+    buttons = max(width - 8 - 9 * (imgui.get_frame_height() + 2) - 12, 0.0)
     shown = clipped(text, buttons - imgui.get_cursor_pos_x() - 6)
     imgui.text_colored(theme.vec(theme.DIM), shown if shown == text else "")
     _right_buttons(ui, player, view, buttons)
@@ -141,6 +141,7 @@ def _right_buttons(ui: Ui, player: Player, view: TimelineView, left: float) -> N
         imgui.open_popup("##timeline.film")
     timeline_inspector.film_popup(ui, view)
     w.in_row(2)
+    _button(ui, "render_film", theme.DOWNLOAD, "Render the film", on="films" in ui.show)
     _button(ui, "timeline", theme.CROSS, "Close the film: show the scene as it stands")
     imgui.new_line()
 

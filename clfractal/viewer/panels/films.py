@@ -1,0 +1,263 @@
+"""Films: the scene's film as a file, rendered beside the window; how far films are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import imgui
+
+from clfractal.errors import ClfractalError, FileError, Where
+from clfractal.files.film_kinds import CONTAINERS
+from clfractal.scene.animation import Animation
+from clfractal.viewer.films import FilmOrder, RenderedFilm
+from clfractal.viewer.panels import layout, right_dock, theme
+from clfractal.viewer.panels import order_form as form
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.buttons import clipped
+from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.words import counted
+
+PRESETS: dict[str, form.Size | None] = {
+    "Scene": None,
+    "720p": (1280, 720),
+    "1080p": (1920, 1080),
+    "4K": (3840, 2160),
+}
+"""Sizes to choose from; None: the scene's."""
+KINDS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "MP4, H.264": (".mp4", ()),
+    "MP4, H.265": (".mp4", ("--codec", "h265")),
+    "MOV, ProRes": (".mov", ()),
+    "MKV, without loss": (".mkv", ()),
+    "PNG pictures": ("_####.png", ()),
+    "EXR pictures": ("_####.exr", ()),
+}
+"""Kinds of films: how their names end, and what `clfractal animate` is told more."""
+_MOST_SAMPLES = 65_536
+
+
+@dataclass(slots=True)
+class Wanted:
+    """What the panel remembers.
+
+    Attributes:
+        size: pixels; None: the scene's.
+        samples: for a pixel; None: as many as the scene says.
+        part: the first and the last frame; None: all.
+        kind: the one of `KINDS`.
+        name: of the file, without ending, relative to the current folder; empty: a usual one.
+        problem: why the last one could not begin, or empty.
+    """
+
+    size: form.Size | None = None
+    samples: int | None = None
+    part: tuple[int, int] | None = None
+    kind: str = "MP4, H.264"
+    name: str = ""
+    problem: str = ""
+
+
+def draw(ui: Ui) -> None:
+    """Draws the panel, if it is open."""
+    if "films" not in ui.show:
+        return
+    state: Wanted = ui.memory.setdefault("films", Wanted())
+    animation = ui.studio.scene.animation
+    with right_dock.window(ui, "films", "Render the film", theme.FILM):
+        imgui.begin_child("##films", imgui.ImVec2(0, 0))
+        if animation is None:
+            w.hint(ui, f"The scene has no film yet. {ui.keys.hint('timeline') or 'The timeline'} begins one.")
+        else:
+            _settings(ui, state, animation)
+            _start(ui, state, animation)
+        _list(ui)
+        imgui.end_child()
+
+
+def output_of(ui: Ui, state: Wanted) -> Path:
+    """The file of a film as the panel is set."""
+    files: Any = ui.memory.get("files")
+    path = files.source.path if files is not None else None
+    text = state.name.strip() or (path.stem if path is not None else "film")
+    ending = KINDS[state.kind][0]
+    place = Path(text).expanduser()
+    if place.suffix.lower() in (*CONTAINERS, ".png", ".exr"):
+        place = place.with_suffix("")
+    return Path.cwd() / place.with_name(f"{place.name}{ending}") if place.name else Path.cwd() / ending
+
+
+def order_of(ui: Ui, state: Wanted, animation: Animation) -> FilmOrder:
+    """What is ordered as the panel is set.
+
+    Raises:
+        ClfractalError: the name cannot be used, or the scene cannot be written.
+    """
+    output = output_of(ui, state)
+    if output.name == KINDS[state.kind][0]:
+        raise FileError("needs a name, not a folder alone", Where(str(output.parent)))
+    if output.exists():
+        raise FileError("is there already; choose another name", Where(output.name))
+    if any(not film.finished and film.order.output == output for film in ui.studio.films.films):
+        raise FileError("is under way already", Where(output.name))
+    files: Any = ui.memory["files"]
+    first, last = _part(state, animation)
+    return FilmOrder(
+        files.text(),
+        ui.studio.document.folder.absolute(),
+        output,
+        first,
+        last,
+        ui.studio.session.device.info.index,
+        state.size,
+        state.samples,
+        KINDS[state.kind][1],
+    )
+
+
+def _part(state: Wanted, animation: Animation) -> tuple[int, int]:
+    last = animation.count - 1
+    first, end = state.part or (0, last)
+    return min(first, last), max(min(end, last), min(first, last))
+
+
+def _settings(ui: Ui, state: Wanted, animation: Animation) -> None:
+    image = ui.studio.scene.image
+    state.size = form.size(ui, "films", PRESETS, state.size, (image.width, image.height))
+    usual = ui.studio.scene.renderer.samples
+    state.samples = form.samples(ui, "films", state.samples, usual, _MOST_SAMPLES)
+    width = form.label("Frames")
+    first, last = _part(state, animation)
+    each = (width - 50) / 2
+    begin = form.number(ui, "films.first", first, each, animation.count - 1, 0)
+    w.in_row(5)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(theme.FAINT), "to")
+    w.in_row(5)
+    end = form.number(ui, "films.last", last, each, animation.count - 1, 0)
+    if begin is not None or end is not None:
+        state.part = (first if begin is None else begin, last if end is None else end)
+    w.in_row(4)
+    if w.icon_button(theme.RESET, "All frames", name="films.all", enabled=state.part is not None):
+        state.part = None
+    width = form.label("Format")
+    chosen = w.choose("films.kind", {kind: kind for kind in KINDS}, state.kind, width)
+    if chosen is not None:
+        state.kind, state.problem = chosen, ""
+    width = form.label("Name")
+    imgui.set_next_item_width(width)
+    _, text = imgui.input_text_with_hint(
+        "##films.name", output_of(ui, Wanted(kind=state.kind)).stem, state.name
+    )
+    if text != state.name:
+        state.name, state.problem = text, ""
+    w.tip(f"Without ending; in {Path.cwd()} unless a folder is given")
+
+
+def _start(ui: Ui, state: Wanted, animation: Animation) -> None:
+    imgui.dummy(imgui.ImVec2(0, 1))
+    there = _there(ui, state, animation)
+    if not there:
+        if w.button("Render", icon=theme.FILM, primary=True, width=-1):
+            start(ui, state, animation)
+    else:
+        half = (imgui.get_content_region_avail().x - 4) / 2
+        about = f"{counted(there, 'frame')} of it are there" if there > 1 else "a frame of it is there"
+        if w.button("Continue", icon=theme.FILM, primary=True, width=half, about=about):
+            start(ui, state, animation, resume=True)
+        w.in_row(4)
+        if w.button("Begin anew", width=half, about=f"{about}, and would be removed"):
+            start(ui, state, animation)
+    if state.problem:
+        layout.warn(state.problem)
+
+
+def _there(ui: Ui, state: Wanted, animation: Animation) -> int:
+    """How many frames of an earlier run there are; looked at now and then, since files are asked."""
+    now = imgui.get_time()
+    key = (output_of(ui, state), _part(state, animation), len(ui.studio.films.films), ui.studio.films.busy)
+    known = ui.memory.get("films.there")
+    if known is None or known[0] != key or now - known[1] > 1.0:
+        output, (first, last) = key[0], key[1]
+        under_way = any(not film.finished and film.order.output == output for film in ui.studio.films.films)
+        order = FilmOrder("", Path(), output, first, last, "")
+        known = ui.memory["films.there"] = (key, now, 0 if under_way else order.done())
+    return int(known[2])
+
+
+def start(ui: Ui, state: Wanted, animation: Animation, *, resume: bool = False) -> RenderedFilm | None:
+    """Orders a film as the panel is set; None if it cannot begin."""
+    ui.memory.pop("films.there", None)
+    try:
+        order = order_of(ui, state, animation)
+    except ClfractalError as error:
+        state.problem = str(error)
+        return None
+    state.problem = ""
+    return ui.studio.films.order(order, resume=resume)
+
+
+# The list
+
+
+def _list(ui: Ui) -> None:
+    films = ui.studio.films.films
+    imgui.dummy(imgui.ImVec2(0, 2))
+    for film in reversed(films):
+        imgui.push_id(str(id(film)))
+        _film(ui, film)
+        imgui.pop_id()
+    ended = any(film.finished for film in films)
+    if ended and w.button("Clear the list", about="Forgets what has ended; the files stay"):
+        films[:] = [film for film in films if not film.finished]
+
+
+def _film(ui: Ui, film: RenderedFilm) -> None:
+    wide, side = imgui.get_content_region_avail().x, imgui.get_frame_height()
+    icon, color = _sign(film)
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(color), icon)
+    w.in_row(7)
+    imgui.align_text_to_frame_padding()
+    imgui.text(clipped(film.order.output.name, imgui.get_content_region_avail().x - side - 6))
+    w.tip(str(film.order.output))
+    if not film.written:
+        imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - side)
+        if not film.finished:
+            if w.icon_button(theme.CROSS, "Cancel it: what is done is kept", name="cancel"):
+                film.cancel()
+        elif w.icon_button(theme.REFRESH, "Continue it", name="continue"):
+            ui.studio.films.order(film.order, resume=True)
+    if not film.finished:
+        form.bar(film.done / film.order.count, wide)
+    with theme.font(size=12.5), theme.colors(text=theme.WARNING if film.problem else theme.FAINT):
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_unformatted(state_text(film))
+        imgui.pop_text_wrap_pos()
+    imgui.dummy(imgui.ImVec2(0, 2))
+
+
+def _sign(film: RenderedFilm) -> tuple[str, theme.Rgba]:
+    if film.problem:
+        return theme.WARN, theme.WARNING
+    if film.written:
+        return theme.CHECK, theme.GOOD
+    return (theme.CROSS, theme.FAINT) if film.cancelled else (theme.FILM, theme.ACCENT)
+
+
+def state_text(film: RenderedFilm) -> str:
+    """How far a film is, in few words."""
+    if film.problem:
+        return film.problem
+    frames = f"{film.done} of {counted(film.order.count, 'frame')}"
+    if film.written:
+        return f"{counted(film.order.count, 'frame')}, written"
+    if film.cancelled:
+        return f"cancelled, {frames} are kept"
+    if not film.running:
+        return "waiting for the film before"
+    if film.done >= film.order.count:
+        return f"{counted(film.order.count, 'frame')}, writing"
+    left = f", {form.time_text(film.remaining)} left" if film.remaining is not None else ""
+    return f"{frames}{left}"
