@@ -45,6 +45,7 @@ def test_resized_again_and_again(window: Window) -> None:
 def test_resized_while_it_moves(window: Window) -> None:
     for step in range(40):
         window.display.xdotool("windowsize", window.id, 360 + 3 * step, 240 + 2 * step)
+    wait_for(partial(_has_size, window, (360 + 3 * 39, 240 + 2 * 39)), "the last size")
     shows_its_film(window)
 
 
