@@ -235,7 +235,7 @@ def test_other_functions_name_their_arguments() -> None:
     refused(lambda: clfractal.load_scene(SCENE, folder=wrong), "folder: must be a path, got 5")
     refused(lambda: clfractal.render(wrong), "scene: must be a path")
     refused(lambda: clfractal.dump_scene(wrong), "scene: must be a Scene, got 5")
-    refused(lambda: clfractal.variations(wrong), "scene: must be a Scene")
+    refused(lambda: clfractal.variations(wrong), "scene: must be a path, YAML text or a mapping")
     refused(lambda: clfractal.variations(scene, count=2.5), "count: must be a whole number")  # type: ignore[arg-type]
     refused(lambda: clfractal.variations(scene, seed=wrong / 2), "seed: must be a whole number, got 2.5")
     refused(
@@ -271,3 +271,96 @@ def test_moves_of_a_camera_name_their_arguments() -> None:
         refused(call, message)
     turned = camera.turn(scene, azimuth=np.float32(90))  # type: ignore[arg-type]
     assert camera.angles(turned)[0] == pytest.approx(camera.angles(scene)[0] + 90)
+
+
+# --- volumes ---
+
+GRID = np.zeros((2, 3, 4), np.float32)
+
+
+@pytest.mark.parametrize(
+    ("values", "more", "message"),
+    [
+        (None, {}, "values: must be an array of integers or floats of up to 64 bits, got nothing"),
+        ("bulb.nrrd", {}, "values: must be an array of integers or floats of up to 64 bits, got <U9"),
+        (
+            [[[1, 2], [3]]],
+            {},
+            "values: must be an array of integers or floats of up to 64 bits, got a list of 1",
+        ),
+        (
+            GRID.astype(complex),
+            {},
+            "values: must be an array of integers or floats of up to 64 bits, got complex",
+        ),
+        (
+            GRID.astype(object),
+            {},
+            "values: must be an array of integers or floats of up to 64 bits, got a list",
+        ),
+        (GRID[0], {}, "values: must have the shape (nz, ny, nx), with at least one voxel, got (3, 4)"),
+        (GRID[:0], {}, "values: must have the shape (nz, ny, nx), with at least one voxel, got (0, 3, 4)"),
+        (GRID, {"origin": [0, 0]}, "origin: must be 3 numbers, all finite, got a list of 2"),
+        (GRID, {"origin": "here"}, "origin: must be 3 numbers, all finite, got 'here'"),
+        (GRID, {"origin": [0, 0, float("nan")]}, "origin: must be 3 numbers, all finite"),
+        (GRID, {"directions": 0.5}, "directions: must be 3 steps of 3 numbers each, all finite, got 0.5"),
+        (
+            GRID,
+            {"directions": np.eye(2)},
+            "directions: must be 3 steps of 3 numbers each, all finite, got an array",
+        ),
+        (GRID, {"directions": np.zeros((3, 3))}, "directions: must be steps that do not lie in one plane"),
+        (GRID, {"directions": np.diag([1, 1, 0])}, "directions: must be steps that do not lie in one plane"),
+        (GRID, {"texts": "a"}, "texts: must be a mapping of texts, got 'a'"),
+        (GRID, {"texts": {"a": 3}}, "texts: must be texts by keys that are texts, got 3"),
+        (GRID, {"inputs": "a.nrrd"}, "inputs: must be a list of paths, got 'a.nrrd'"),
+        (GRID, {"inputs": [3]}, "inputs: must be a path, got 3"),
+        (GRID, {"remarks": "a"}, "remarks: must be a list of texts"),
+    ],
+)
+def test_a_volume_is_made_of_numbers(values: Any, more: dict[str, Any], message: str) -> None:
+    refused(lambda: clfractal.Volume(values, **more), message, clfractal.SceneError)
+
+
+def test_a_volume_takes_what_numpy_makes_an_array_of(tmp_path: Path) -> None:
+    volume = clfractal.Volume(
+        GRID.tolist(),  # type: ignore[arg-type]
+        (1, 2, 3),  # type: ignore[arg-type]
+        1e-200 * np.eye(3),
+        inputs=["a.nrrd"],  # type: ignore[arg-type]
+    )
+    assert volume.values.shape == (2, 3, 4)
+    assert volume.values.dtype == np.float64
+    assert volume.origin.dtype == volume.directions.dtype == np.float64
+    assert volume.inputs == (Path("a.nrrd"),)
+    swapped = np.arange(24, dtype=">f4").reshape(2, 3, 4)
+    own = clfractal.Volume(swapped)
+    assert own.values.dtype.isnative
+    np.testing.assert_array_equal(own.values, swapped)
+    own.save(tmp_path / "a.nrrd")
+    assert clfractal.Volume(GRID).values is GRID
+
+
+def test_variations_take_what_render_takes(tmp_path: Path) -> None:
+    scene = clfractal.load_scene(SCENE)
+    (tmp_path / "a.yaml").write_text(SCENE)
+    for source in (SCENE, scene.resolved(), tmp_path / "a.yaml", str(tmp_path / "a.yaml")):
+        wanted = clfractal.variations(clfractal.load_scene(source), count=2)
+        assert [each.changes for each in clfractal.variations(source, count=2)] == [
+            each.changes for each in wanted
+        ]
+    refused(lambda: clfractal.variations(3), "scene: must be a path, YAML text or a mapping, got 3")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("formula", ["mandelbulb", "mandelbox", "apollonian", "menger_sponge"])
+def test_points_may_be_as_far_away_as_numbers_go(formula: str, precision: str) -> None:
+    """Without a warning (which is an error here): they escape as points that are merely far away do."""
+    directions = np.array([[1, 0, 0], [-1, 2, -3], [0.3, -0.7, 0.2], [1, 1, 1]])
+    far, inside = clfractal.escape(formula, directions * 5e307, iterations=20, precision=precision)
+    assert not inside.any()
+    near = clfractal.escape(formula, directions * 1e15, iterations=20, precision=precision)
+    np.testing.assert_array_equal(far, near[0])
+    assert np.isfinite(
+        clfractal.distances("mandelbulb", directions * 5e307, precision=precision).smooth
+    ).all()

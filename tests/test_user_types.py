@@ -71,3 +71,36 @@ def test_mypy_knows_the_types(tmp_path: Path) -> None:
         (str(first + 1), "attr-defined"),
         (str(first + 2), "assignment"),
     ], ended.stdout
+
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+# What a page does wrong on purpose, to show the error.
+ON_PURPOSE = {"python": ["clfractal.render(scene, samples=2.7)"]}
+
+
+def test_the_examples_of_the_pages_have_their_types(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    lines = {}
+    for page in sorted(DOCS.glob("*.md")):
+        found = re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
+        if found:
+            name = page.stem.replace("-", "_")
+            lines[name] = "\n".join(found).splitlines()
+            (tmp_path / f"{name}.py").write_text("\n".join(lines[name]) + "\n", "utf-8")
+    assert len(lines) >= 8
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "mypy",
+        "--strict",
+        "--follow-imports=silent",
+        "--ignore-missing-imports",
+    ]
+    command += ["--no-incremental", *(f"{name}.py" for name in lines)]
+    ended = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True)
+    wrong = re.findall(r"^(\w+)\.py:(\d+): error: (.*)$", ended.stdout, re.MULTILINE)
+    shown = [(name, lines[name][int(line) - 1].strip(), message) for name, line, message in wrong]
+    assert [(name, line) for name, line, _ in shown] == [
+        (name, line) for name, purpose in ON_PURPOSE.items() for line in purpose
+    ], shown

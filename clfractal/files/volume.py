@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from clfractal import arguments
 from clfractal.errors import FileError
-from clfractal.files import nrrd, voxel_data
+from clfractal.files import nrrd, volume_checks, voxel_data
 from clfractal.files.atomic import atomic_writer, check_output, file_error, open_regular
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.regular import read_text_file
@@ -57,13 +57,16 @@ class Volume:
 
     Attributes:
         values: shape (nz, ny, nx), of an integer or float type in the machine's byte order. It may be a file
-            that is mapped, and then is read only.
+            that is mapped, and then is read only. Anything that NumPy makes such an array of is taken.
         origin: the middle of the first voxel, scene units, shape (3,).
         directions: shape (3, 3), row i the step from a voxel to the next along x, y, z, the last array axis
             being x; scene units.
         texts: what else is told of it, by keys; under `SCENE_KEY` the scene that made it.
         inputs: files that were read for it, which `save` does not replace.
         remarks: on a grid that holds less than it could, one line each; mostly none.
+
+    Raises:
+        SceneError: an argument is of another kind or shape, or the directions lie in a plane; its path names it.
     """
 
     values: Values
@@ -74,10 +77,15 @@ class Volume:
     remarks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.values.ndim != 3 or 0 in self.values.shape or self.values.dtype.kind not in "biuf":
-            raise ValueError(f"a volume has numbers of shape (nz, ny, nx), got {self.values.shape}")
-        if np.shape(self.origin) != (3,) or np.shape(self.directions) != (3, 3):
-            raise ValueError("a volume's origin has 3 numbers, its directions have 3 x 3")
+        for name, checked in (
+            ("values", volume_checks.grid_of(self.values)),
+            ("origin", volume_checks.doubles("origin", self.origin, (3,), "3 numbers")),
+            ("directions", volume_checks.steps(self.directions)),
+            ("texts", volume_checks.texts(self.texts)),
+            ("inputs", volume_checks.paths(self.inputs)),
+            ("remarks", tuple(arguments.words("remarks", self.remarks))),
+        ):
+            object.__setattr__(self, name, checked)
 
     @property
     def spacing(self) -> Doubles:

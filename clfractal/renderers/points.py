@@ -153,6 +153,8 @@ def _run(
     orbit = Watched(device, body.records(precision))
     constants, sent = _upload(device, body.constants(precision))
     planes, place = len(result), 0
+    # Farther away numbers of this type have no squares, and what is as far as that escapes at once.
+    farthest = float(np.sqrt(np.finfo(precision).max)) / 4
 
     def enqueue(size: float) -> Part[_Launch] | None:
         nonlocal place
@@ -161,7 +163,7 @@ def _run(
         part = array[place : place + int(min(size, LAUNCH_POINTS))]
         count = -(-len(part) // GROUP_POINTS) * GROUP_POINTS
         padded = np.zeros((3, count), precision)
-        padded[:, : len(part)] = part.T
+        padded[:, : len(part)] = np.clip(part, -farthest, farthest).T
         with device.failures("evaluating points"):
             buffer = device.buffer(planes * count * result.itemsize, "results")
             # A kernel keeps no reference to its arguments: they must outlive the launch.

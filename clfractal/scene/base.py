@@ -103,6 +103,10 @@ class Section(BaseModel, metaclass=_Kind):
         values = {name: getattr(self, name) for name in type(self).model_fields}
         return self.checked({**values, **update}, self._context())
 
+    def __hash__(self) -> int:
+        """Equal sections have equal hashes; lists and mappings in them count by their values."""
+        return hash((type(self), *(_hashable(getattr(self, name)) for name in type(self).model_fields)))
+
     def _context(self) -> dict[str, Any]:
         """What the checks of a copy's values have to know."""
         return {}
@@ -226,3 +230,12 @@ def frame_of(normal: Vector) -> tuple[Vector, Vector, Vector]:
     axis = unit(normal)
     side = unit(cross((0.0, 1.0, 0.0) if abs(axis[1]) < 0.9 else (1.0, 0.0, 0.0), axis))
     return side, cross(axis, side), axis
+
+
+def _hashable(value: Any) -> Any:
+    """A value, with tuples and sets in the place of lists and mappings; equal values stay equal."""
+    if isinstance(value, Mapping):
+        return frozenset((key, _hashable(each)) for key, each in value.items())
+    if isinstance(value, (list, tuple)):
+        return tuple(_hashable(each) for each in value)
+    return value

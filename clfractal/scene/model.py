@@ -110,6 +110,8 @@ class Scene(Section):
         fields = type(self).model_fields
         return type(other) is type(self) and all(getattr(self, key) == getattr(other, key) for key in fields)
 
+    __hash__ = Section.__hash__  # which a class with an __eq__ of its own does not inherit
+
     @model_validator(mode="after")
     def _frame_cameras(self, info: ValidationInfo) -> Self:
         """Cameras with `frame: all` get their places, those of views and bookmarks too.

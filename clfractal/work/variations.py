@@ -16,11 +16,12 @@ import numpy as np
 from clfractal import arguments
 from clfractal.errors import ClfractalError, SceneError, Where, unknown_name
 from clfractal.formulas import reference
-from clfractal.scene.load import check_scene
+from clfractal.scene.load import as_scene, check_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.work.any_engine import SceneLike
 from clfractal.work.varied import AMOUNT, Kind, Step, Strength, changed
 from clfractal.work.vary_camera import camera_step, closeness, following_step
 from clfractal.work.vary_colors import colors_step
@@ -66,7 +67,7 @@ class Variation:
 
 
 def variations(
-    scene: Scene,
+    scene: SceneLike,
     *,
     count: int = 12,
     strength: Strength = "medium",
@@ -82,6 +83,7 @@ def variations(
     parameter, the camera follows.
 
     Args:
+        scene: a scene, or what `load_scene` takes.
         strength: `slight` ones are close relatives, `heavy` ones bold.
         kinds: what may change: `formula`, `camera`, `colors`.
         locked: dotted paths of values or sections that stay, such as `camera` or `formula.parameters.power`.
@@ -105,7 +107,7 @@ def nothing_to_vary(kinds: Collection[Kind]) -> SceneError:
 
 
 def candidates(
-    scene: Scene,
+    scene: SceneLike,
     *,
     strength: Strength = "medium",
     seed: int = 0,
@@ -119,8 +121,7 @@ def candidates(
     Raises:
         SceneError: an unknown strength or kind.
     """
-    if not isinstance(scene, Scene):
-        arguments.refuse("scene", "must be a Scene", arguments.plain(scene))
+    scene = as_scene(scene)
     arguments.word("strength", strength, STRENGTHS)
     if scene.animation is not None and scene.animation.frame is not None:
         # Of that frame as it is: tracks would take back what is varied.

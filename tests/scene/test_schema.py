@@ -139,3 +139,26 @@ def test_a_mapping_without_its_word_is_one_thing_alone() -> None:
         assert len(bare) == 1
         words = {"camera": ["projection"], "renderer": ["type"]}[key]
         assert [kind["required"] for kind in kinds if kind not in bare] == [words] * (len(kinds) - 1)
+
+
+def test_equal_scenes_have_equal_hashes() -> None:
+    """Wherever they were loaded from, and however numbers and orders were written."""
+    text = (
+        "version: 1\nformula: {name: mandelbulb, parameters: {power: 8, theta_phase: 0.5}}\ncamera: {}\n"
+        "lights: [{direction: [1, 0, 0]}, {type: point, position: [9, 0, 0]}]\nmaterials: {a: {}, b: {}}\n"
+        "coloring: {palette: ['#fff', '#000']}\nbookmarks: {here: {fov: 30}}\n"
+    )
+    scene = load_scene(text)
+    same = load_scene(
+        text.replace("power: 8, theta_phase: 0.5", "theta_phase: 0.5, power: 8.0").replace(
+            "a: {}, b: {}", "b: {}, a: {}"
+        )
+    )
+    assert scene == same
+    assert hash(scene) == hash(same) == hash(load_scene(scene.resolved()))
+    assert hash(scene.lights[0]) == hash(same.lights[0])
+    changed = scene.model_copy(update={"camera": {"fov": 30}})
+    assert len({scene, same, changed}) == 2
+    assert {scene: "mine"}[same] == "mine"
+    for file in scene_paths():
+        assert isinstance(hash(load_scene(file)), int)
