@@ -31,7 +31,11 @@ def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
 
 FILES: list[tuple[str, bytes, Kind | None]] = [
     ("empty.exr", b"", "exr"),
-    ("text.exr", b"no picture", "exr"),
+    ("bytes.exr", b"\x76\x2f\x31\x02", "exr"),
+    ("latin.exr", b"\xe4\xf6", "exr"),
+    # A scene may have any name.
+    ("scene.png", b"version: 1\n", None),
+    ("cut in a letter.exr", "# Schneeflöcke".encode()[:11], None),
     ("empty.png", b"", "png"),
     ("cut.png", b"\x89PN", "png"),
     ("empty.JPG", b"", "photo"),

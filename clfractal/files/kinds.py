@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from codecs import getincrementaldecoder
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
@@ -24,12 +26,15 @@ _BY_ENDING: dict[str, Kind] = {
 def kind_of(path: Path) -> Kind | None:
     """The kind of a file; None for all that is neither a picture that may hold a scene nor a volume, such as scenes.
 
-    An empty or damaged file is of the kind that its name says: so whoever reads this kind tells what is wrong with it.
+    An empty or damaged file is of the kind that its name says: so whoever reads this kind tells what is wrong with it. But
+    a scene may have any name, also that of a picture, if it is text.
 
     Raises:
         FileError: it cannot be read.
     """
-    return kind_of_start(read_bytes(path, prefix=_LONGEST)) or _BY_ENDING.get(path.suffix.lower())
+    start = read_bytes(path, prefix=_LONGEST)
+    named = _BY_ENDING.get(path.suffix.lower())
+    return kind_of_start(start) or (None if named != "volume" and _is_text(start) else named)
 
 
 def kind_of_start(start: bytes) -> Kind | None:
@@ -43,3 +48,12 @@ def kind_of_start(start: bytes) -> Kind | None:
     if start.startswith((b"NRRD000", b"\x93NUMPY")):
         return "volume"
     return None
+
+
+def _is_text(start: bytes) -> bool:
+    """Whether a file that begins so may be text; an empty one is none."""
+    printable = all(byte >= 32 or byte in b"\t\n\r" for byte in start)
+    with suppress(UnicodeDecodeError):
+        # The last letter may go on behind these bytes.
+        return printable and bool(getincrementaldecoder("utf-8")().decode(start))
+    return False

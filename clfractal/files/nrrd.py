@@ -66,8 +66,8 @@ class _Space:
     dimension: int
 
 
-# Ours is left-posterior-superior, as in ITK and 3D Slicer: x to the left, y to the back, z up. Spaces that know nothing of a
-# body are taken as ours if they are right-handed; left-handed ones have x reversed, so that nothing becomes a mirror image.
+# Ours is left-posterior-superior, as in ITK and 3D Slicer: x to the left, y to the back, z up. Spaces that know nothing of
+# a body are taken as ours if they are right-handed; a left-handed one has x reversed, so that nothing is mirrored.
 _SIGNS: dict[tuple[str, ...], tuple[int, int, int]] = {
     ("right-anterior-superior", "ras"): (-1, -1, 1),
     ("left-anterior-superior", "las"): (1, -1, 1),
@@ -85,7 +85,9 @@ _SPACES = {
         for name in names
     },
 }
-_KNOWN_SPACES = "known: RAS, LAS, LPS or their whole names, scanner-xyz, 3D-right-handed, 3D-left-handed, and these with -time"
+_KNOWN_SPACES = (
+    "known: RAS, LAS, LPS or whole names, scanner-xyz, 3D-right-handed, 3D-left-handed, and these with -time"
+)
 _SAME = {
     "axismins": "axis mins",
     "axismaxs": "axis maxs",

@@ -87,7 +87,7 @@ def test_the_good_one(tmp_path: Path) -> None:
         ({"encoding": "gzip"}, "is damaged: its compressed data are wrong"),
         (
             {"space": "4D"},
-            "space: unknown space '4D'; known: RAS, LAS, LPS or their whole names, scanner-xyz",
+            "space: unknown space '4D'; known: RAS, LAS, LPS or whole names, scanner-xyz",
         ),
         ({"space_dimension": "2"}, "space dimension: must be 3 in the space left-posterior-superior"),
         ({"space": None, "space_dimension": "4"}, "space dimension: must be 3"),
