@@ -24,6 +24,12 @@ from clfractal.scene.volume import VolumeRenderer
 SOLID_KINDS = {"formula": 0, "plane": 1, "sphere": 2, "box": 3, "cylinder": 4}
 JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
 
+# Around a formula's ball, in its radii: here it has a gradient and a count, for light is computed before surfaces.
+_BESIDE = 0.5
+# Where a surface is that flows into another the other is not farther off than this, in widths of the smooth union: it is lifted by a
+# quarter of the width at most, and distances that differ by more than the width do not flow.
+_FLOWS = 1.25
+
 # Kernel files that ask one formula, and what asks several solids in their place.
 _JOINED = {
     "orbit.h": "solids.h",
@@ -153,6 +159,9 @@ def numbered(text: str, after: tuple[str, ...], number: int) -> str:
 def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
     """The scene's own formula, and what is joined to it."""
     iterations = scene.formula.iterations
+    widest = max(
+        (each.smoothness for each in scene.joined.values() if each.join == "smooth_union"), default=0.0
+    )
     radius = min(scene.bounds[1], scene.formula_bounds[1])
     texts = list(_texts(scene))
     constants = _Constants()
@@ -169,6 +178,7 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             "step_scale": safe,
             "ball": ball[0],
             "ball_radius": ball[1],
+            "reach": max(_BESIDE * ball[1], _FLOWS * widest * safe),
             "potential_share": min(ball[1], scale * chain.radius) / radius,
         }
 

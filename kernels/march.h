@@ -99,6 +99,7 @@ INLINE void march_measure(march *m, sight *s, __constant const struct March *set
 #if HOLLOWS
     march_blind(m, s, settings);
 #endif
+    s->near = pick(less(s->here.step, s->here.near), s->here.near * scale, s->radius);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));
 }
@@ -106,10 +107,10 @@ INLINE void march_measure(march *m, sight *s, __constant const struct March *set
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
 INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __constant const struct March *settings) {
     const real height = s->cone * near_of(s->here, settings);
-    const mask beside = outside & less(s->radius, height) & ~BLIND(s);
+    const mask beside = outside & less(s->near, height) & ~BLIND(s);
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
     const mask between = beside & less(height, m->radius_before) & less(m->radius_before, (real)(REAL_LARGEST));
-    const real back = pick(between, (height - s->radius) / (m->radius_before - s->radius), R(0.0));
+    const real back = pick(between, (height - s->near) / (m->radius_before - s->near), R(0.0));
     m->found.touch = pick(first, pick(beside, m->t - back * (m->t - m->low), (real)(REAL_LARGEST)), m->found.touch);
     m->low = pick(outside, m->t, m->low);
     m->high = pick(inside, m->t, m->high);
@@ -120,9 +121,10 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
                          __constant const struct March *settings) {
     // Where the distance falls like that of a plane, the next sphere touches this one at 2 / (1 - slope) radii (Ban and
     // Valasek 2023, Automatic step size relaxation in sphere tracing).
-    const mask landing = marching & ~overshot & less(s->radius, goal == GOAL_SURFACE ? LANDING * s->cone : R(0.0));
+    const mask landing = marching & ~overshot & ~at_ball(s) & less(s->radius, goal == GOAL_SURFACE ? LANDING * s->cone : R(0.0));
     const real expected = (s->radius - LANDING_AIM * s->cone) / fmax(-slope, LEAST_SLOPE);
-    const real relaxed = s->radius * clamp(R(2.0) / (R(1.0) - m->slope), R(1.0), (real)(settings->relaxation));
+    const real longer = clamp(R(2.0) / (R(1.0) - m->slope), R(1.0), (real)(settings->relaxation));
+    const real relaxed = s->radius * pick(at_ball(s), R(1.0), longer);
     real step = pick(landing, fmax(fmin(expected, LANDING_STEP * s->cone), s->radius), relaxed);
 #if HAS_DERIVATIVE
     m->landing = (m->landing & ~marching) | landing;
@@ -142,7 +144,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
-    const real known = pick(BLIND(s), (real)(REAL_LARGEST), s->radius);
+    const real known = pick(BLIND(s) | at_ball(s), (real)(REAL_LARGEST), s->radius);
     m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside, known, m->radius_before);
     const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
     const real free = pick(is_blind(s->here), R(0.0), s->radius);
@@ -198,11 +200,11 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     // (Not where it has only just begun.)
     const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
-    const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~BLIND(&s);
+    const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~BLIND(&s) & ~at_ball(&s);
     const mask steep = less(m->slope, PASSED_SLOPE);
     const real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
-    m->slope = pick(BLIND(&s), R(0.0), m->slope);
+    m->slope = pick(BLIND(&s), R(0.0), pick(at_ball(&s), SLOPE_AT_FIRST, m->slope));
     march_keep(m, &s, outside, inside, settings);
 
     // The cone touches the solid, or the surface is bracketed. A hit at first sight waits for a landing, unless it is as near as
@@ -212,7 +214,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     mask touched = outside;
     if (goal == GOAL_SURFACE) {
         reach *= clamp(-LANDED * slope, LANDED_LEAST, LANDED_MOST);
-        mask landed = m->landing | less(radius, LANDED_LEAST * cone);
+        mask landed = m->landing | less(s.near, LANDED_LEAST * cone);
 #if POINTS > 1
         const mask is_point = less(m->r.known, RAY_NOTHING_KNOWN);
         landed |= is_point;
@@ -220,15 +222,15 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
 #endif
         touched &= landed;
     }
-    touched &= less(radius, reach);
-    real ahead = goal == GOAL_SURFACE ? fmin(radius / fmax(-slope, GRAZING_SLOPE), GRAZING_MOST * cone) : R(0.0);
+    touched &= less(s.near, reach);
+    real ahead = goal == GOAL_SURFACE ? fmin(s.near / fmax(-slope, GRAZING_SLOPE), GRAZING_MOST * cone) : R(0.0);
     mask passed = outside & ~outside;
 #if !HAS_DERIVATIVE
     // A landing that led through a sheet thinner than all steps sees it from behind.
     if (goal == GOAL_SURFACE) {
-        passed = outside & m->landing & steep & less(radius, cone) & less(R(0.0), vec_dot(s.surface.gradient, m->r.direction));
+        passed = outside & m->landing & steep & less(s.near, cone) & less(R(0.0), vec_dot(s.surface.gradient, m->r.direction));
         touched |= passed;
-        ahead = pick(passed, -fmin(radius, m->step_before), ahead);
+        ahead = pick(passed, -fmin(s.near, m->step_before), ahead);
     }
 #endif
     const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, BRACKETED * cone) : inside;

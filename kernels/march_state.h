@@ -30,7 +30,7 @@ typedef struct {
 typedef struct {
     vec point, on_ray;
     clearance here;
-    real radius, cone;
+    real radius, near, cone;   // how far is free; how near the surface may be, see `clearance`
 #if HOLLOWS
     mask blind;   // nobody knows how far the solid is ...
     real sure;    // ... but for what is free at least; else the radius
@@ -47,6 +47,9 @@ typedef struct {
 #define SURE(s) ((s)->radius)
 #define BLIND(s) less(R(1.0), R(0.0))
 #endif
+
+// Where a ray may go so far only because of the ball around a formula: there it is not near a surface, however narrow the step.
+INLINE mask at_ball(const sight *s) { return less(s->radius, s->near); }
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {

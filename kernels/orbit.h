@@ -146,7 +146,8 @@ INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant
 #else
     const real distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
 #endif
-    const clearance result = {pick(inside, R(0.0), distance), {o->count, inside}};
+    const real step = pick(inside, R(0.0), distance);
+    const clearance result = {step, {o->count, inside}, step};
     return result;
 }
 
@@ -221,7 +222,8 @@ INLINE clearance orbit_dual_distance(vec point, mask active, __constant const st
 #endif
     surface->square = square;
     surface->square_before = square_before;
-    const clearance result = {pick(inside, R(0.0), distance), {count, inside}};
+    const real step = pick(inside, R(0.0), distance);
+    const clearance result = {step, {count, inside}, step};
     return result;
 }
 

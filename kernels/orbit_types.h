@@ -22,6 +22,7 @@ typedef struct {
 typedef struct {
     real step;  // distance that is safe to go, in scene units; 0 inside
     orbit_end end;
+    real near;  // how near the surface may be: the same, or more where only the ball around a formula is known
 #if SOLIDS > 1
     real scale; // of several solids: the step scale of the nearest one
 #endif

@@ -38,7 +38,7 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
     const real arrival = pick(close, PROOF_ARRIVED * cone, PROOF_LANDED * cone);
     const real along = vec_dot(offset, m->r.direction);
     const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
-    const mask arrived = m->proving & (s->here.end.inside | less(s->radius, arrival)) & ~astray;
+    const mask arrived = m->proving & (s->here.end.inside | less(s->near, arrival)) & ~astray;
     const mask failed = m->proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), m->probes));
     m->found.hit |= arrived;
     m->found.last = pick(arrived, m->low, m->found.last);

@@ -12,9 +12,10 @@ INLINE vec solid_turned(__constant const struct Orbit *o, vec own) {
 }
 
 // What is known of a point and one solid, or of several: how far it is at least, below 0 in simple solids, and at most. These differ in
-// hollows only, where nobody knows how far the wall is.
+// hollows only, where nobody knows how far the wall is. `near`: how near its surface may be, the same number but where only the ball
+// around a formula is known. That is no surface: `near` is beyond all there. `apart`: by which the nearest of several is chosen.
 typedef struct {
-    real far, most, scale;
+    real far, most, near, apart, scale;
     mask inside;
     surface_point surface;
 } solid_found;

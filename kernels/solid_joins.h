@@ -64,6 +64,8 @@ INLINE void solid_hollow(solid_found *all, solid_found more) {
     all->scale = pick(counts, more.scale, all->scale);
     all->far = fmax(all->far, pick(more.inside, R(0.0), -more.far));
     all->most = pick(more.inside, all_of_it, fmax(all->most, -more.far));
+    all->near = pick(more.inside, all_of_it, fmax(all->near, -more.far));
+    all->apart = all->far;
     all->inside &= ~more.inside;
 }
 #endif
@@ -72,9 +74,9 @@ INLINE void solid_hollow(solid_found *all, solid_found more) {
 INLINE real nearest_before(__constant const struct Orbit *o, const solid_found *all) {
 #if HOLLOWS
     const scalar size = o->kind == SOLID_FORMULA ? o->ball_radius : fmax(fmax(o->sides[0], o->sides[1]), o->sides[2]);
-    return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->far);
+    return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->apart);
 #else
-    return all->far;
+    return all->apart;
 #endif
 }
 
@@ -87,13 +89,13 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
     }
 #endif
     if (o->join == JOIN_CUT) {
-        more.far = -more.far;
+        more.far = more.near = more.apart = -more.far;
         more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
     }
     if (o->join == JOIN_CUT || o->join == JOIN_INTERSECTION) {
         // A place that a search has put on a wall may lie behind it by rounding: it is on the wall.
         const real wall = o->kind == SOLID_FORMULA ? R(0.0) : rounding;
-        const mask counts = less(all->far, more.far + wall);
+        const mask counts = less(all->apart, more.apart + wall);
         // The wall of a simple solid is a part of what it cuts: its orbits are that formula's.
         if (o->kind != SOLID_FORMULA) {
             more.surface.square = all->surface.square;
@@ -111,10 +113,12 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         all->scale = pick(counts, more.scale, all->scale);
         all->far = fmax(all->far, more.far);
         all->most = fmax(all->most, more.far);
+        all->near = fmax(all->near, more.near);
+        all->apart = fmax(all->apart, more.apart);
         all->inside &= o->kind == SOLID_FORMULA ? more.inside : less(more.far, -wall);
         return;
     }
-    const mask nearer = less(more.far, nearest_before(o, all));
+    const mask nearer = less(more.apart, nearest_before(o, all));
 #if JOINS_SMOOTHLY
     if (o->join == JOIN_SMOOTH) {
         // The smooth minimum of Quilez, of distances as they are: between both, a quarter of the width is added at most.
@@ -133,6 +137,8 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         all->surface.gradient = vec_pick(flows, gradient, all->surface.gradient);
         all->far = pick(flows, lower * scale, fmin(all->far, more.far));
         all->most = pick(flows, all->far, fmin(all->most, more.far));
+        all->near = pick(flows, all->far, fmin(all->near, more.near));
+        all->apart = pick(flows, all->far, fmin(all->apart, more.apart));
         all->scale = pick(flows, scale, pick(nearer, more.scale, all->scale));
         all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));
         return;
@@ -142,5 +148,7 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
     all->scale = pick(nearer, more.scale, all->scale);
     all->far = fmin(all->far, more.far);
     all->most = fmin(all->most, more.far);
+    all->near = fmin(all->near, more.near);
+    all->apart = fmin(all->apart, more.apart);
     all->inside |= more.inside;
 }

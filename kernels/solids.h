@@ -9,7 +9,6 @@
 // Farther out than this part of its ball's radius, a formula is not asked: the distance of the ball is enough, and estimates are
 // made for its inside.
 #define SOLID_NEAR R(0.01)
-#define SOLID_BESIDE R(0.5)  // of its radius around the ball: here it has a gradient and a count, for light is computed before surfaces
 
 // What is asked of solids: how far rays may go; the gradient, too; the estimate of the distance, however far out; or behind the wall of a
 // hollow that wall's gradient.
@@ -39,17 +38,20 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     const vec own = solid_own(o, point);
     if (o->kind != SOLID_FORMULA) {
         solid_simple(o, own, &found);
+        found.near = found.apart = found.far;
         return found;
     }
     const vec arm = vec_sub(point, vec_splat(o->ball));
-    found.far = sqrt(vec_dot(arm, arm)) - (real)(o->ball_radius);
+    found.apart = sqrt(vec_dot(arm, arm));
+    found.far = found.apart - (real)(o->ball_radius);
+    found.near = (real)(REAL_LARGEST);
     found.inside = active & ~active;
     found.surface.gradient = vec_normalize(arm);
-    const mask beside = active & less(found.far, SOLID_BESIDE * (real)(o->ball_radius));
-    const mask within = active & less(found.far, (ASKS_FAR(asks) ? SOLID_BESIDE : SOLID_NEAR) * (real)(o->ball_radius));
+    const mask beside = active & less(found.far, (real)(o->reach));
+    const mask within = ASKS_FAR(asks) ? beside : active & less(found.far, SOLID_NEAR * (real)(o->ball_radius));
     const mask near = asks == ASK_STEP ? within : beside;
     if (!any_lane(near)) return found;
-    clearance here = {R(0.0), {R(0.0), near}};
+    clearance here = {R(0.0), {R(0.0), near}, R(0.0)};
     surface_point there = found.surface;
     k += o->first;
 #if HAS_DERIVATIVE
@@ -63,7 +65,12 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     case i: here = orbit_dual_distance_##i(own, near, o, k, &there); break;
 #endif
     switch (o->text) { EACH_TEXT(ASK_TEXT) }
-    found.far = pick(within, here.step * (real)(o->scale), found.far);
+    // (Outside the ball an estimate may be much too large.)
+    const real most = pick(less(R(0.0), found.far), found.apart, (real)(REAL_LARGEST));
+    const real estimate = fmin(here.step * (real)(o->scale), most);
+    found.apart = pick(near, pick(within, estimate, fmax(estimate, found.far)), found.apart);
+    found.far = pick(within, estimate, found.far);
+    found.near = pick(within, estimate, found.near);
     found.inside = within & here.end.inside;
     found.surface.count = here.end.count;
     *cost += pick(near, here.end.count, none);
@@ -73,6 +80,7 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     if (asks == ASK_BEHIND) {
         // No wall is as deep in a set as this, and no gradient counts there.
         found.far = pick(found.inside, -(real)(REAL_LARGEST), found.far);
+        found.near = found.apart = found.far;
         found.surface.gradient = vec_pick(found.inside, vec_of(none, none, none), found.surface.gradient);
     }
 #endif
@@ -99,7 +107,9 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, __cons
     }
     *surface = all.surface;
     const mask inside = active & all.inside;
-    clearance result = {pick(inside, R(0.0), fmax(all.far, R(0.0)) / all.scale), {cost, inside}, all.scale};
+    const real step = pick(inside, R(0.0), fmax(all.far, R(0.0)) / all.scale);
+    const real near = pick(inside, R(0.0), fmax(all.near, R(0.0)) / all.scale);
+    clearance result = {step, {cost, inside}, near, all.scale};
 #if HOLLOWS
     result.most = pick(in_hollow(all), all.most / all.scale, result.step);
 #endif

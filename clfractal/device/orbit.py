@@ -40,6 +40,7 @@ ORBIT = Struct(
         Field("step_scale", "real", 0, "how much of its own distance that is"),
         Field("ball", "real", 3, "centre of a ball that holds the formula's set, scene units"),
         Field("ball_radius", "real", 0, "its radius, scene units"),
+        Field("reach", "real", 0, "how far around the ball its surface may matter to others, scene units"),
         Field("potential_share", "real", 0, "this radius over that of all that is searched"),
         Field("smoothness", "real", 0, "width of a smooth union, scene units"),
         Field(CANCELLED, "int", 0, "1: the work was cancelled, and long orbits end at once"),
@@ -57,7 +58,7 @@ EXTRA_APPLICATIONS = 24
 # A formula by itself: its own space is the scene's.
 _ALONE: dict[str, object] = {
     **dict.fromkeys(("kind", "join", "text", "first", "object"), 0),
-    **dict.fromkeys(("ball_radius", "potential_share", "smoothness"), 0.0),
+    **dict.fromkeys(("ball_radius", "reach", "potential_share", "smoothness"), 0.0),
     **dict.fromkeys(("middle", "sides", "ball"), (0.0, 0.0, 0.0)),
     "own_x": (1.0, 0.0, 0.0),
     "own_y": (0.0, 1.0, 0.0),
