@@ -99,15 +99,24 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
 #endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
+    // The part of the light on rays' ways that comes: to surfaces, and past all.
+    real of_ways = result.coverage, of_past = R(1.0) - result.coverage;
 #if PLANES > 0
     plane_layers layers;
     STATE_RECALL(s, layers, STATE_LAYERS);
     comes *= layers.front_through;
+    of_ways *= layers.front_through;
+    of_past *= layers.front_through * layers.behind_through;
     const color beside = color_scale(layers.behind, layers.front_through * (R(1.0) - result.coverage));
     result = planes_into(result, seen, background, layers, a.time, w.view);
 #endif
 #if HAS_PARTS
     result.of_light = parts_of(look, in_all, found.normal, comes);
+    // Rays that meet nothing have seen what shines before it.
+    result.of_light.emission = color_add(result.of_light.emission, color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past)));
+#if HAS_GLOW
+    result.of_light.emission = color_add(result.of_light.emission, color_scale(glow, of_ways + of_past));
+#endif
 #if PLANES > 0
     result.of_light.albedo = color_add(color_add(layers.front, beside), result.of_light.albedo);
     result.of_light.normal = vec_pick(less(layers.nearest, (real)(REAL_LARGEST)), layers.normal, result.of_light.normal);

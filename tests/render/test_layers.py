@@ -17,7 +17,7 @@ from clfractal.files.channels import ALBEDO, LIGHT_LAYERS, NORMAL, RAY_CHANNELS,
 from clfractal.pictures.film import Film
 from clfractal.renderers.passes import kept_numbers
 from clfractal.scene.model import Scene
-from tests.render.shots import plan_of, repeated
+from tests.render.shots import plan_of, repeated, shoot
 from tests.render.test_paths import BLACK, path, scene_of
 from tests.variants import one_of
 
@@ -230,3 +230,53 @@ def test_every_number_of_a_pixel_is_kept_under_its_own_name(device: Device) -> N
     plan = plan_of(scene_of(lighting=path(1)), device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS))
     renderer = scene_of(renderer={"samples": 8, "noise": 0.01}).renderer
     assert len(kept_numbers(plan, renderer)) == 33
+
+
+AROUND = {"color": [1, 0.5, 0.1], "intensity": 0.25, "width": 0.05}
+
+
+@pytest.mark.parametrize("lanes", one_of(None, 1))
+@pytest.mark.parametrize(("mist", "points"), one_of((False, 1), (True, 1), (False, 4)))
+def test_the_glow_is_light_that_is_seen_at_once(
+    device: Device, lanes: int | None, mist: bool, points: int
+) -> None:
+    """The layers have it too: before the surface, and where rays meet nothing. What the set reflects of it is direct."""
+    more: dict[str, Any] = {"fog": {"color": [0, 0, 0], "density": 0.3}} if mist else {}
+    scene = scene_of(
+        formula={"name": "mandelbulb", "iterations": 4},
+        camera={"position": [1.9, -3.3, 0.9], "fov": 40},
+        image={"width": 48, "height": 40},
+        lighting=path(4),
+        glow=AROUND,
+        background="transparent",
+        renderer={"samples": 4, "points": {"count": points, "pattern": "grid"}},
+        **more,
+    )
+    film = shoot(
+        scene, device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS), **({"lanes": lanes} if lanes else {})
+    )
+    whole = layer(film, "")
+    assert np.abs(light(film) - whole).max() < 1e-5 * whole.max()
+    nothing = film["A"] == 0
+    assert whole[nothing].max() > 0.03
+    np.testing.assert_allclose(layer(film, "emission")[nothing], whole[nothing], atol=1e-6)
+
+
+def test_light_before_and_behind_planes_is_dimmed_by_them(device: Device) -> None:
+    """A plane of a picture takes the same part of the layers as of what is seen through it."""
+    plane = {"center": [0, -1.5, 0], "normal": [0, -1, 0], "width": 8, "height": 8}
+    behind = {"center": [0, 1.5, 0], "normal": [0, -1, 0], "width": 8, "height": 8}
+    scene = scene_of(
+        lighting=path(1),
+        lights=[SUN],
+        glow={**AROUND, "width": 0.3},
+        background="transparent",
+        cut_planes=[{"plane": plane, "opacity": 0.5}, {"plane": behind, "opacity": 0.25}],
+        renderer={"samples": 1},
+    )
+    without = shoot(
+        scene.model_copy(update={"cut_planes": []}), device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS)
+    )
+    film = shoot(scene, device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS))
+    through = np.where(without["A"] == 1, 0.5, 0.375)[..., None]
+    np.testing.assert_allclose(light(film), light(without) * through, atol=1e-4)
