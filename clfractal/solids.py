@@ -26,8 +26,8 @@ JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
 
 # Around a formula's ball, in its radii: here it has a gradient and a count, for light is computed before surfaces.
 _BESIDE = 0.5
-# Where a surface is that flows into another the other is not farther off than this, in widths of the smooth union: it is lifted by a
-# quarter of the width at most, and distances that differ by more than the width do not flow.
+# Where a surface is that flows into another the other is not farther off than this, in widths of the smooth union: it
+# is lifted by a quarter of the width at most, and distances that differ by more than the width do not flow.
 _FLOWS = 1.25
 
 # Kernel files that ask one formula, and what asks several solids in their place.

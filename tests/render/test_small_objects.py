@@ -72,7 +72,8 @@ def test_a_small_ball_has_its_own_shadow(
     from_ball = points - np.array([0, 0, -0.6])
     along = from_ball @ toward
     passes = np.sqrt((from_ball**2).sum(-1) - along**2) / (scale * BALL_RADIUS)
-    # A shadow ray hits where the distance is half a footprint, a fifth of the radius; and distances are half of the true ones.
+    # A shadow ray hits where the distance is half a footprint, a fifth of the radius; and distances are half of the
+    # true ones.
     dark, lit = on_floor & (passes < 0.95), on_floor & (passes > 1.45)
     annulus = lit & (passes < 3)
     shown = colors(film)[..., 0]
