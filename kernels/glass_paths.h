@@ -110,10 +110,7 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     vec origin = here->seen;
 #if HAS_OBJECTS
     const mask of_set = of_the_set(here->object, w);
-    real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
-#if HAS_SUBSURFACE
-    lift = pick(sinks & ~of_set, lift + R(0.05) * here->cone, lift);
-#endif
+    const real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
     origin = vec_pick(of_set, origin, vec_along(here->point, lift, here->normal));
     so_far->origin = vec_pick(stays_out & of_set, so_far->origin, origin);
 #else

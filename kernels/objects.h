@@ -165,6 +165,36 @@ INLINE vec object_normal(__global const struct Object *o, vec point, __global co
     return vec_normalize(vec_add(vec_add(x, y), vec_scale(vec_splat(o->own_z), n.z)));
 }
 
+// A place that a ray has met of an object's surface, without the rounding of the way there: as near to the surface as numbers can be.
+// (Of grids it stays as it was found.)
+INLINE vec object_place(__global const struct Object *o, vec point) {
+    const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
+    vec on = own;
+    const real square = own.x * own.x + own.y * own.y;
+    if (o->kind == OBJECT_SPHERE) {
+        on = vec_scale(own, R(1.0) / fmax(sqrt(square + own.z * own.z), R(1e-30)));
+    } else if (o->kind == OBJECT_BOX) {
+        const real x = fabs(own.x), y = fabs(own.y), z = fabs(own.z), largest = fmax(fmax(x, y), z);
+        on = vec_of(pick(less(x, largest), own.x, copysign(R(1.0), own.x)), pick(less(y, largest), own.y, copysign(R(1.0), own.y)),
+                    pick(less(z, largest), own.z, copysign(R(1.0), own.z)));
+    } else if (o->kind == OBJECT_CYLINDER) {
+        const mask lid = less(square, own.z * own.z);
+        const real thinner = pick(lid, R(1.0), R(1.0) / fmax(sqrt(square), R(1e-30)));
+        on = vec_of(own.x * thinner, own.y * thinner, pick(lid, copysign(R(1.0), own.z), own.z));
+    } else if (o->kind == OBJECT_PLANE) {
+        on.z = R(0.0);
+    }
+#if HAS_WATER
+    real unused;
+    if (o->kind == OBJECT_WATER) on.z = water_height(o, own.x, own.y, own, &unused);
+#endif
+    // Each of its axes is as long as a side, and its own number is the product with the axis by the side's square.
+    const vec off = vec_sub(on, own);
+    point = vec_along(point, off.x * (real)(o->sides[0] * o->sides[0]), vec_splat(o->own_x));
+    point = vec_along(point, off.y * (real)(o->sides[1] * o->sides[1]), vec_splat(o->own_y));
+    return vec_along(point, off.z * (real)(o->sides[2] * o->sides[2]), vec_splat(o->own_z));
+}
+
 #if HAS_GLASS || HAS_CUT_OBJECTS
 // Whether a place is inside an object, or below a plane.
 INLINE mask object_holds(__global const struct Object *o, vec point) {
@@ -183,9 +213,9 @@ INLINE mask object_holds(__global const struct Object *o, vec point) {
 #endif
 
 #if HAS_CUT_OBJECTS
-// What a ray has met of the objects with these numbers: where that is the face of a cut its number and normal.
+// What a ray has met of the objects with these numbers: where that is the face of a cut its number, normal and place.
 INLINE real objects_faced(vec origin, vec direction, real number, __global const struct Object *objects, __global const struct CutPlane *planes,
-                          int count, vec *normal) {
+                          int count, vec *normal, vec point, vec *place) {
     real thing = number;
     for (int i = 0; i < count; ++i) {
         const mask here = equal(number, (real)((scalar)(i + 1)));
@@ -198,11 +228,22 @@ INLINE real objects_faced(vec origin, vec direction, real number, __global const
             const real side = pick(less(R(0.0), vec_dot(front, direction)), R(-1.0), R(1.0));
             thing = pick(faced, face_number(face, number), thing);
             *normal = vec_pick(faced, vec_scale(front, side), *normal);
+            *place = vec_pick(faced, place_on_plane(planes + plane, point), *place);
         }
     }
     return thing;
 }
 #endif
+
+// The places of the objects with these numbers, as above.
+CALLED vec objects_place(const vec *point, real number, __global const struct Object *objects, int count) {
+    vec place = *point;
+    for (int i = 0; i < count; ++i) {
+        const mask here = equal(number, (real)((scalar)(i + 1)));
+        if (any_lane(here)) place = vec_pick(here, object_place(objects + i, *point), place);
+    }
+    return place;
+}
 
 // The normals of the objects at places of theirs, towards the viewer.
 CALLED vec objects_normal(const vec *point, const vec *direction, real number, __global const struct Object *objects, int count,

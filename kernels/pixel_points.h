@@ -90,9 +90,9 @@ INLINE void points_place(pixel_points *p, int turn, mask found, vec point) {
 }
 #endif
 
-INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, real object, world w) {
+INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, real object, vec base, world w) {
     const mask found = mask_of(met.hit);
-    const vec point = vec_along(r.origin, met.t, r.direction), base = vec_along(r.origin, met.touch, r.direction);
+    const vec point = vec_along(r.origin, met.t, r.direction);
     p->count += met.hit;
     real across, below;
     point_offset(point_of_turn(turn), p->seed, &across, &below);

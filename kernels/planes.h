@@ -49,6 +49,12 @@ INLINE void plane_cut(__global const struct CutPlane *plane, int i, vec origin, 
     *far = pick(~down, fmin(*far, t), *far);
 }
 
+// A place that a ray has met on a plane, without the rounding of the way there.
+INLINE vec place_on_plane(__global const struct CutPlane *plane, vec point) {
+    const vec normal = vec_splat(plane->normal);
+    return vec_along(point, -vec_dot(vec_sub(point, vec_splat(plane->center)), normal), normal);
+}
+
 // Cuts a ray to the part that the planes leave of the set; lanes without such a part are not in the result. `face`: the plane
 // at which a lane now begins, or -1.
 INLINE mask planes_cut(ray *r, real *face, plane_set set) {

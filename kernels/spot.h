@@ -63,18 +63,20 @@ INLINE real face_count(real thing, world w) {
 }
 #endif
 
-// What a ray for a spot has met: the set, or the object with this number, or the face of an object's cut.
-INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
+// What a ray for a spot has met: the set, or the object with this number, or the face of an object's cut; and the place where it is shaded.
+INLINE encounter surface_met(stage s, int turn, ray r, real *object, vec *place, world w) {
     encounter met = queue_met(s.q, turn, s.slot);
     *object = R(0.0);
+    *place = vec_along(r.origin, met.touch, r.direction);
 #if HAS_OBJECTS
     *object = queue_object(s.q, turn, s.slot, met);
     const mask here = less(R(0.0), *object);
     if (any_lane(here)) {
         const vec point = vec_along(r.origin, met.t, r.direction);
+        *place = vec_pick(here, objects_place(&point, *object, w.objects, w.settings->object_count), *place);
         vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count, w.tables);
 #if HAS_CUT_OBJECTS
-        *object = objects_faced(r.origin, r.direction, *object, w.objects, w.planes.planes, w.settings->object_count, &normal);
+        *object = objects_faced(r.origin, r.direction, *object, w.objects, w.planes.planes, w.settings->object_count, &normal, point, place);
 #endif
         met.normal = vec_pick(here, normal, met.normal);
         met.touch = pick(here, met.t, met.touch);
@@ -92,24 +94,37 @@ INLINE encounter surface_met(stage s, int turn, ray r, real *object, world w) {
     return met;
 }
 
+#define LIFT_ERRORS R(32.0)   // roundings of the largest number by which a place is told
+
+INLINE real largest_of(vec a) { return fmax(fmax(fabs(a.x), fabs(a.y)), fabs(a.z)); }
+
 // How far over a spot rays leave it: far enough from the set not to meet the very bump that they start from. An object has none, nor
-// has a face.
+// has a face: from those rays leave as near as numbers are sure to be on the right side (Pharr, Jakob, Humphreys 2023, sec. 6.8).
 INLINE real lift_of(const spot *here, world w) {
-    const real over_set = here->cone * (real)(w.settings->shadow_lift);
+    real lift = here->cone * (real)(w.settings->shadow_lift);
 #if HAS_OBJECTS || HAS_FACES
-    const real far_out = fmax(fmax(fabs(here->point.x), fabs(here->point.y)), fabs(here->point.z));
-    const real over_object = R(0.05) * here->cone + R(64.0) * (real)(REAL_EPSILON) * far_out;
-    return pick(of_the_set(here->object, w), over_set, over_object);
-#else
-    return over_set;
+    const real own = largest_of(here->point), each = LIFT_ERRORS * (real)(REAL_EPSILON);
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        __global const struct Object *o = w.objects + i;
+        const mask on = o->kind == OBJECT_JOINED ? less(R(1.0), R(0.0)) : equal(here->object, (real)((scalar)(i + 1)));
+        lift = pick(on, (real)(o->lift) * here->cone + each * ((real)(o->error_share) * own + (real)(o->error)), lift);
+    }
+#if HAS_FACES
+    const real plane = plane_of_face(here->object);
+    for (int i = 0; i < PLANES; ++i) {
+        const mask on = equal(plane, (real)((scalar)i));
+        lift = pick(on, each * (own + largest_of(vec_splat(w.planes.planes[i].center))), lift);
+    }
 #endif
+#endif
+    return lift;
 }
 
 // The spot where one ray has met the surface.
-INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
+INLINE spot spot_of_ray(ray r, encounter met, real object, vec place, world w) {
     spot here;
     here.found = met.hit;
-    here.point = vec_along(r.origin, met.touch, r.direction);
+    here.point = place;
     here.seen = vec_along(r.origin, met.t, r.direction);
     here.normal = met.normal;
     here.cone = r.footprint + r.spread * met.t;
@@ -129,14 +144,18 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, world w) {
 
 #if HAS_FACES
 // Where the ray for a spot meets a face of the set before all else, that is the spot: such lanes are the result.
-INLINE mask spot_on_face(stage s, ray r, spot *here) {
+INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
     plane_face face;
     STATE_RECALL(s, face, STATE_FACE);
     const mask bare = less(R(0.0), face.number);
     if (!any_lane(bare)) return bare;
     here->found = pick(bare, R(1.0), here->found);
     here->seen = vec_pick(bare, vec_along(r.origin, face.t, r.direction), here->seen);
-    here->point = vec_pick(bare, here->seen, here->point);
+    const real number = plane_of_face(face.number);
+    for (int i = 0; i < PLANES; ++i) {
+        const mask on = bare & equal(number, (real)((scalar)i));
+        here->point = vec_pick(on, place_on_plane(w.planes.planes + i, here->seen), here->point);
+    }
     here->normal = vec_pick(bare, face.normal, here->normal);
     here->cone = pick(bare, r.footprint + r.spread * face.t, here->cone);
     here->smooth = pick(bare, face.count, here->smooth);
@@ -151,11 +170,13 @@ INLINE mask spot_on_face(stage s, ray r, spot *here) {
 
 #if HAS_GLASS_SET
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.
-INLINE encounter met_within(stage s, ray r, encounter met, real *object, world w) {
+INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *place, world w) {
     const ray second = queue_ray(s.q, 1, s.slot);
     const mask within = less(second.near, second.far);
     real other_object;
-    const encounter other = surface_met(s, 1, r, &other_object, w);
+    vec other_place;
+    const encounter other = surface_met(s, 1, r, &other_object, &other_place, w);
+    *place = vec_pick(within, other_place, *place);
     for (int i = 0; i < NUMBERS_OF(encounter); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
     *object = pick(within, other_object, *object);
     return met;

@@ -110,10 +110,11 @@ INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, real
     for (int turn = 0; turn < POINTS; ++turn) {
         const ray r = queue_ray(s.q, turn, s.slot);
         real object;
-        const encounter met = surface_met(s, turn, r, &object, w);
+        vec place;
+        const encounter met = surface_met(s, turn, r, &object, &place, w);
         tally_met(cost, met, 1);
         first->steps += met.steps;
-        points_add(s, &points, turn, r, met, object, w);
+        points_add(s, &points, turn, r, met, object, place, w);
     }
     first->coverage = points.count * (R(1.0) / (real)(POINTS));
     return points_spot(s, &points, w);
@@ -143,17 +144,18 @@ STAGE(find_spots) {
 #endif
     {
         real object;
-        encounter met = surface_met(s, 0, r, &object, w);
+        vec place;
+        encounter met = surface_met(s, 0, r, &object, &place, w);
 #if HAS_GLASS_SET
-        if (bounce > 0) met = met_within(s, r, met, &object, w);
+        if (bounce > 0) met = met_within(s, r, met, &object, &place, w);
 #endif
         tally_met(&cost, met, 1);
         at_first.coverage = met.hit;
         at_first.steps = met.steps;
-        found = spot_of_ray(r, met, object, w);
+        found = spot_of_ray(r, met, object, place, w);
     }
 #if HAS_FACES
-    at_first.coverage = pick(spot_on_face(s, r, &found), R(1.0), at_first.coverage);
+    at_first.coverage = pick(spot_on_face(s, r, &found, w), R(1.0), at_first.coverage);
 #endif
     if (bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
     STATE_KEEP(s, cost, STATE_TALLY);

@@ -32,6 +32,9 @@ OBJECT_KINDS = {
     "volume": 6,
     "cloud": 7,
 }
+# In footprints at `detail` 1: surfaces in grids are where a search has found them, and no equation tells how far off
+# that is.
+GRID_LIFT = 0.05
 # Roughness up to which a material mirrors sharply in Phong's light, and from which on it does not.
 MIRRORS, DULL = 0.1, 0.4
 _LARGEST_EXPONENT = 1e5
@@ -61,6 +64,9 @@ OBJECT = Struct(
         Field("radiance", "real", 3, "of one that is asked for, linear Rec. 709"),
         Field("luminance", "real", 0, "of that"),
         Field("sides", "real", 3, "of a solid: how far its sides are from its middle, scene units"),
+        Field("lift", "real", 0, "how far over it rays leave it at least, in footprints"),
+        Field("error_share", "real", 0, "of a place's largest coordinate, and ..."),
+        Field("error", "real", 0, "... with it the largest number by which places on it are told, scene units"),
         Field("wave_x", "real", WAVES, "changes of phase, radians by scene unit"),
         Field("wave_y", "real", WAVES, ""),
         Field("wave_height", "real", WAVES, "scene units"),
@@ -152,6 +158,9 @@ def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
         "middle": each.position,
         **dict.fromkeys(("wave_x", "wave_y", "wave_height", "wave_phase"), nothing),
         "sides": (1.0, 1.0, 1.0),
+        "lift": GRID_LIFT * scene.surface.detail if isinstance(each, VolumeObject) else 0.0,
+        "error_share": 1.0,
+        "error": max(map(abs, each.position)),
         **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
     }
     if isinstance(each, Solid):
@@ -178,6 +187,8 @@ def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
             wave_sharp=waves.sharp,
             wave_reach=waves.reach,
             wave_slope=waves.slope,
+            error_share=1 + waves.slope,
+            error=(1 + waves.slope) * max(map(abs, each.position)) + waves.reach,
         )
     return row
 
