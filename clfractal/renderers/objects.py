@@ -66,7 +66,9 @@ OBJECT = Struct(
         Field("sides", "real", 3, "of a solid: how far its sides are from its middle, scene units"),
         Field("lift", "real", 0, "how far over it rays leave it at least, in footprints"),
         Field("error_share", "real", 0, "of a place's largest coordinate, and ..."),
-        Field("error", "real", 0, "... with it the largest number by which places on it are told, scene units"),
+        Field(
+            "error", "real", 0, "... with it the largest number by which places on it are told, scene units"
+        ),
         Field("wave_x", "real", WAVES, "changes of phase, radians by scene unit"),
         Field("wave_y", "real", WAVES, ""),
         Field("wave_height", "real", WAVES, "scene units"),

@@ -223,6 +223,19 @@ def test_a_lamp_shines_through_a_cloud_once(device: Device, folder: Path) -> Non
     np.testing.assert_allclose(blocks[0], blocks[1], atol=0.1 * expected.max())
 
 
+def test_layers_have_the_light_of_clouds(device: Device, folder: Path) -> None:
+    """Before nothing too, where coverage says that nothing is seen."""
+    shine = {"emission": [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [0.04, 0.02, 0.01]}]}
+    objects = {"cloud": cloud("cube.nrrd", 0.5, 0.05, transfer=shine)}
+    scene = scene_of(
+        folder, objects, samples=4, background="transparent", lighting={"mode": "path", "bounces": 2}
+    )
+    layers = [f"{name}.R" for name in ("emission", "direct", "indirect")]
+    film = shoot(scene, device, channels=["R", "A", *layers])
+    assert film["R"][film["A"] == 0].max() > 0.05
+    np.testing.assert_allclose(sum(film[name] for name in layers), film["R"], atol=1e-6)
+
+
 @pytest.mark.combination
 def test_a_cloud_shines_by_itself(device: Device, folder: Path) -> None:
     """j (1 - exp(-sigma L)) / sigma of a black cloud, and of one in front of another."""
