@@ -36,6 +36,7 @@ NEAR = ("camera.position=[0.4, -1.5, 0.2]", "camera.target=[0.3, 0, 0]")
 BELOW = ("camera.position=[0, -3.2, -2.2]",)
 FLAT = ("camera={position: [0, -4, 0.6], projection: orthographic, height: 3}",)
 ASIDE = ("camera.target=[-3, 0, 0]",)
+BESIDE = ("objects.ball={type: sphere, position: [1.6, 0, 0], radius: 0.3}",)
 VIEWS = pytest.mark.parametrize(
     "view", [(), NEAR, BELOW, FLAT, ASIDE], ids=["", "near", "below", "flat", "aside"]
 )
@@ -150,7 +151,7 @@ def _light(engine: Engine, scene: Scene, light: dict[str, Any]) -> npt.NDArray[n
 
 
 @pytest.mark.parametrize("kind", ["directional", "point", "spot", "sphere", "rectangle", "set"])
-@pytest.mark.parametrize("view", [(), NEAR], ids=["", "near"])
+@pytest.mark.parametrize("view", [(), NEAR, BESIDE], ids=["", "near", "beside a ball"])
 def test_a_new_light_lights_what_is_seen(
     engine: Engine, monkeypatch: pytest.MonkeyPatch, kind: str, view: tuple[str, ...]
 ) -> None:

@@ -31,7 +31,7 @@ _LEAST_FREE = 0.25
 _BALL, _AREA, _CONE = 0.1, 0.6, 60.0
 # Of lights on the set: their number; radii, and heights over the surface to light it, parts of the bounds' radius;
 # and how bright they are.
-_COUNT, _SMALL, _HIGH, _BRIGHT = 600, 1 / 90, 1 / 20, 20.0
+_COUNT, _SMALL, _HIGH, _BRIGHT = 600, 1 / 90, 1 / 20, 12.0
 _FORMULA_ADDED = {"name": "mandelbulb", "iterations": 8}
 _LIT = ("color", "temperature", "intensity", "shadow")
 

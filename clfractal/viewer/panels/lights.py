@@ -113,9 +113,8 @@ def _kinds_popup() -> str | None:
     found = None
     if imgui.begin_popup("##lights"):
         for kind, title in KINDS.items():
-            if imgui.selectable(f"{title}##{kind}", False)[0]:
+            if imgui.selectable(f"{title}: light {_ABOUT[kind]}##{kind}", False)[0]:
                 found = kind
-            w.tip(f"Light {_ABOUT[kind]}")
         imgui.end_popup()
     return found
 
