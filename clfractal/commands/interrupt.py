@@ -42,7 +42,7 @@ wake: Callable[[], None] = _sleep_on
 
 
 def status() -> int:
-    """The exit status for the signal that came, by the shells' convention: 128 and its number; without one that of Ctrl-C."""
+    """The exit status for the signal that came, as shells have it: 128 and its number; without one that of Ctrl-C."""
     return STATUS_SIGNALLED + _came
 
 
