@@ -52,6 +52,11 @@ class Frame:
         return cls(number, request, scene, job, growth.views, canvas, *grown, canvas.stamp)
 
     @property
+    def is_draft(self) -> bool:
+        """Whether it is shaded cheaply, because the scene moves whose light goes along paths."""
+        return self.job.scene.lighting != self.scene.lighting
+
+    @property
     def arrangement(self) -> Arrangement:
         """Where its views lie."""
         return Arrangement.of(self.job)

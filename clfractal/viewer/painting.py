@@ -1,16 +1,60 @@
-"""Renders a job's views onto a canvas, so that they can be shown while they grow."""
+"""A session's executors, and what renders a job's views onto a canvas, so that they can be shown while they grow."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.renderers.resources import Borrowing, Kept
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.work.canvas import Canvas, CanvasKernels, CanvasStore
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import Progress, run
+
+BUDGET_SECONDS = 0.02
+"""Limit of the work that is queued on the device: what cannot be told to end, ends after this time."""
+
+
+class Executors:
+    """A session's executors on one device.
+
+    Args:
+        tell: given lines about what takes long.
+
+    Attributes:
+        picture: makes the picture.
+        looking: measures. Looks have another size and would replace the picture's buffers; they fill its grid.
+        aside: for tasks. Many small pictures must not push out the grid that the picture on the screen is made of.
+    """
+
+    def __init__(self, device: Device, tell: Callable[[str], None]) -> None:
+        self.device, self._tell = device, tell
+        self.picture = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=tell)
+        self.looking = self.another(self.picture.kept)
+        self.aside = self.another(Borrowing(self.picture.kept))
+
+    def another(self, kept: Kept) -> LocalExecutor:
+        """One more, with these data."""
+        made = LocalExecutor(self.device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
+        made.kept = kept
+        return made
+
+    @contextmanager
+    def waiting(self, waits: bool) -> Iterator[None]:
+        """Whether the picture waits for what has to be built or filled first; else there is `NotReady`."""
+        self.picture.waits = self.looking.waits = waits
+        try:
+            yield
+        finally:
+            self.picture.waits = self.looking.waits = True
+
+    def close(self) -> None:
+        """Frees their memory."""
+        for executor in (self.picture, self.looking, self.aside):
+            executor.close()
 
 
 class Painter:

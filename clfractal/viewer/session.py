@@ -6,6 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -15,11 +16,12 @@ from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, File
 from clfractal.renderers.resources import Borrowing, Kept
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import Task, do_some
+from clfractal.viewer.drafts import Drafts
 from clfractal.viewer.fitting import Fits
 from clfractal.viewer.frame import CanvasPool, Frame, Growth
 from clfractal.viewer.gathering import Gathering
 from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.painting import Painter
+from clfractal.viewer.painting import Executors, Painter
 from clfractal.viewer.preparing import (
     Preparation,
     Wanted,
@@ -32,13 +34,10 @@ from clfractal.viewer.preparing import (
 from clfractal.viewer.resting import clean
 from clfractal.work.canvas import CHANNELS, Canvas
 from clfractal.work.job import Job
-from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
 from clfractal.work.refine import has_room
 from clfractal.work.run import Progress
 
-BUDGET_SECONDS = 0.02
-"""Limit of the work that is queued on the device: what cannot be told to end, ends after this time."""
 SETTLE_SECONDS = 0.15
 """A picture that moves is not refined before nothing has come for so long."""
 TRIED_AGAIN = 0.1
@@ -77,14 +76,9 @@ class Session:
         self._frames = 0
         self._busy = False
         self._shielded = False
-        self._executor = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
-        # Looks have another size: they would replace the picture's buffers. They fill the grid that the picture needs.
-        self._looking = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
-        self._looking.kept = self._executor.kept
-        # Many small pictures must not push out the grid that the picture on the screen is made of.
-        self._aside = LocalExecutor(device, budget_seconds=BUDGET_SECONDS, tell=self._tell)
-        self._aside.kept = Borrowing(self._executor.kept)
-        self._fits = Fits(device, self._looking)
+        self._executors = Executors(device, self._tell)
+        self._executor = self._executors.picture
+        self._fits = Fits(device, self._executors.looking)
         self._painter = Painter(device, self.pool, self._executor)
         self._gathered: Gathering | None = None
         self._current: Wanted | Gathering | Task | Preparation | None = None
@@ -93,6 +87,8 @@ class Session:
         self._tried: Wanted | None = None
         self._tried_at = 0.0
         self._seen: Wanted | None = None
+        self._begins: Wanted | None = None  # the one whose first frames were begun last
+        self._drafts = Drafts(pacing)
         self._thread = threading.Thread(target=self._work, name="clfractal-session", daemon=True)
 
     def start(self) -> None:
@@ -126,11 +122,9 @@ class Session:
             self._number += 1
             self._wanted = Wanted(self._number, scene, moving, region, exposed_in)
             self.paused = False
-            preparation = self._preparation
-            stays = follows or preparation is None or differs_by_view(preparation.wanted.scene, scene)
-            if preparation is not None and not stays:
-                preparation.cancel()
-                self._preparation = None
+            begun = self._preparation
+            if begun is not None and not follows and not differs_by_view(begun.wanted.scene, scene):
+                self._drop_preparation()
             # A coarse frame of a movement is short, and is finished: if each move of a pointer ended it, none would come.
             if not (follows and self._shielded):
                 self._token.cancel()
@@ -165,17 +159,18 @@ class Session:
             if paused:
                 self._token.cancel()
             if paused and self._preparation is not None:
-                self._preparation.cancel()
                 self._wanted = self._wanted or self._preparation.wanted
-                self._preparation = None
+                self._drop_preparation()
             self._changed.notify_all()
 
     @property
     def idle(self) -> bool:
         """Whether nothing is under way and nothing is wanted."""
         with self._changed:
+            gathered = self._gathered
+            draws = self._wanted is not None or (gathered is not None and not gathered.finished)
             waits = self._busy or self._tasks or self._preparation is not None
-            return not waits and (self.paused or not self._draws())
+            return not waits and (self.paused or not draws)
 
     def close(self, timeout: float | None = 10.0) -> bool:
         """Ends the thread and frees the device's memory; whether it ended in time."""
@@ -222,9 +217,8 @@ class Session:
                 self._failed(internal_error(error))
             finally:
                 if self._preparation is None:
-                    self._say("")
-        for executor in (self._executor, self._looking, self._aside):
-            executor.close()
+                    self._tell("")
+        self._executors.close()
 
     def _next(self) -> Wanted | Gathering | Task | Preparation | None:
         """What comes next: a new picture until it has a sample, then all tasks, then more samples.
@@ -246,11 +240,6 @@ class Session:
         more = gathered is not None and not gathered.finished and not self.paused
         return gathered if more else None
 
-    def _draws(self) -> bool:
-        """Whether the picture is not finished."""
-        gathered = self._gathered
-        return self._wanted is not None or (gathered is not None and not gathered.finished)
-
     def _failed(self, error: ClfractalError) -> None:
         self._gathered = None
         self._executor.forget()
@@ -270,6 +259,9 @@ class Session:
             else:
                 return
         with self._changed:
+            # (At rest a movement's end may need more than the movement did.)
+            if self._begins is not None and self._begins.number == wanted.number:
+                wanted = self._begins
             newest = self._wanted or wanted
             if self.paused or self._closed:
                 self._wanted = newest
@@ -287,39 +279,39 @@ class Session:
         Raises:
             NotReady: it needs what is not there, and is not to be waited for.
         """
-        self._executor.waits = self._looking.waits = waits
         try:
-            self._begun(wanted, token)
+            with self._executors.waiting(waits):
+                self._begun(wanted, token)
         except Stopped:
             with self._changed:
                 self._wanted = self._wanted or wanted
             raise
-        finally:
-            self._executor.waits = self._looking.waits = True
 
     def _follow(self, newest: Wanted, token: CancelToken) -> None:
         """The old picture as a request looks at it whose own picture is not there yet."""
         old, before = self._seen, self._gathered
         seen = seen_from(old.scene, newest.scene) if old is not None else None
         if old is None or seen is None or seen == old.scene:
-            return
-        self._executor.waits = self._looking.waits = False
-        try:
-            self._begun(replace(old, scene=seen, moving=True, region=None), token, old=True)
-        except NotReady:
-            self._gathered = before
-        finally:
-            self._executor.waits = self._looking.waits = True
+            return None
+        followed = replace(old, scene=seen, moving=True, region=None)
+        with self._executors.waiting(False):
+            for plain in (
+                False,
+                True,
+            ):  # its draft may not have been prepared; or the picture itself is no longer there
+                with suppress(NotReady):
+                    return self._begun(followed, token, old=True, plain=plain)
+        self._gathered = before
+        return None
 
     def _make_ready(self, wanted: Wanted, token: CancelToken) -> Kept:
         """Programs, grids and measures of a picture; in the preparation's thread."""
-        executors = [LocalExecutor(self.device, budget_seconds=BUDGET_SECONDS, tell=self._tell) for _ in "12"]
-        making, looking = executors
-        making.kept = looking.kept = Borrowing(self._executor.kept)
+        kept = Borrowing(self._executor.kept)
+        making, looking = self._executors.another(kept), self._executors.another(kept)
         scene = self._fits.fitted(wanted.scene, wanted.moving, token, wanted.exposed_in, looking)
-        job = self._prepared(sharp(scene))
-        making.make_ready(replace(job, views=tuple(view.coarse(2) for view in job.views)), token)
-        return making.kept
+        job = self._prepared(sharp(self._drafts.shaded(scene, wanted.moving)))
+        making.make_ready(job.coarse(2), token)
+        return kept
 
     def _is_ready(self) -> None:
         """Called by a preparation that has ended."""
@@ -345,21 +337,28 @@ class Session:
             self._executor.kept.adopt(done.kept)
         self._show(wanted, token, waits=True)
 
-    def _begun(self, wanted: Wanted, token: CancelToken, *, old: bool = False) -> None:
-        """The coarse frames of a picture, and what is gathered next; `old`: while another one is prepared."""
-        self._gathered = None
+    def _begun(self, wanted: Wanted, token: CancelToken, *, old: bool = False, plain: bool = False) -> None:
+        """The coarse frames of a picture, and what is gathered next.
+
+        Args:
+            old: while another one is prepared.
+            plain: not as a draft.
+        """
+        self._gathered, self._begins = None, wanted
         self._executor.forget()
         with self._changed:
             newest, self._shielded = self._wanted, wanted.moving
         scene = self._fits.fitted(wanted.scene, wanted.moving, token, wanted.exposed_in)
-        job = self._prepared(sharp(scene))
+        shaded = self._drafts.shaded(scene, wanted.moving and not plain)
+        pacing = self._drafts.pacing(shaded is not scene)
+        job = self._prepared(sharp(shaded))
         pixels = sum(view.plan.region.pixels for view in job.views)
-        divider = self.pacing.divider(pixels)
+        divider = pacing.divider(pixels)
         seconds = 0.0
         # A part of a picture that is there is refined: the rest stays as it is.
         shown = shows_whole(self.frame, wanted)
         if not shown and (divider > 1 or wanted.moving or wanted.region is not None):
-            seconds += self._coarse(wanted, job, divider, token, seconds)
+            seconds += self._coarse(wanted, job, divider, token, seconds, pacing)
         else:
             divider = 1
             self._executor.make_ready(job, token)
@@ -367,13 +366,13 @@ class Session:
             self._drop_preparation()  # of an older request
         if wanted.moving:
             self._settle(token, newest)
-            if scene is not wanted.scene:
-                scene = self._fits.fitted(wanted.scene, False, token, wanted.exposed_in)
-                job = self._prepared(sharp(scene))
-        while divider > 2 and self.pacing.estimate(pixels) > _HALVED_ABOVE:
+            if scene is not wanted.scene or shaded is not scene:
+                self._begun(replace(wanted, moving=False), token, old=old)
+                return
+        while divider > 2 and pacing.estimate(pixels) > _HALVED_ABOVE:
             divider //= 2
             if divider > 1:
-                seconds += self._coarse(wanted, job, divider, token, seconds)
+                seconds += self._coarse(wanted, job, divider, token, seconds, pacing)
         self._gathered = Gathering(wanted, job if scene.animation is None else self._prepared(scene), seconds)
 
     def _drop_preparation(self) -> None:
@@ -400,13 +399,15 @@ class Session:
         """Whether a preparation has ended, whose picture is to be shown."""
         return self._preparation is not None and self._preparation.finished
 
-    def _coarse(self, wanted: Wanted, job: Job, divider: int, token: CancelToken, before: float) -> float:
+    def _coarse(
+        self, wanted: Wanted, job: Job, divider: int, token: CancelToken, before: float, pacing: Pacing
+    ) -> float:
         """Renders and publishes a coarse picture; gives the seconds that it took."""
-        coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
+        coarse = job.coarse(divider)
         canvas = self._painter.canvas(coarse, self.frame)
         state = self._painter.run(coarse, canvas, token)
         seconds = state.seconds
-        self.pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, seconds)
+        pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, seconds)
         self._publish(wanted, job, canvas, Growth(coarse.views, divider, 1, False, before + seconds, seconds))
         return seconds
 
@@ -438,7 +439,7 @@ class Session:
         """Takes the noise out of the whole picture, as its scene wants; one that cannot be stays as it is."""
         problem = None
         try:
-            clean(work.job.scene, canvas, self._aside, token, self._tell)
+            clean(work.job.scene, canvas, self._executors.aside, token, self._tell)
         except FileError as error:
             problem = error
         self._publish(work.wanted, work.job, canvas, work.growth(finished=True))
@@ -457,6 +458,10 @@ class Session:
         work.seconds += seconds
         work.samples = samples[1]
         work.prepared = True
+        if samples[0] == 0:
+            foreseen = self._drafts.foreseen(work.wanted.scene, self._prepared)
+            if foreseen is not None:
+                self.add(foreseen)
         if samples[1] == 1:
             pixels = sum(view.plan.region.pixels for view in part.views)
             self.pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
@@ -481,15 +486,12 @@ class Session:
 
     def _do(self, task: Task, token: CancelToken) -> None:
         """Some of a task's work; what is unfinished is gone on with later."""
-        do_some(task, self._aside, token, self._tell)
+        do_some(task, self._executors.aside, token, self._tell)
         with self._changed:
             self._tasks.remove(task)
         self.woken()
 
     def _tell(self, line: str) -> None:
-        self._say(line)
-
-    def _say(self, line: str) -> None:
         if line != self.progress:
             self.progress = line
             self.woken()

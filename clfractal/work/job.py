@@ -124,6 +124,10 @@ class Job:
                 return replace(self, views=views, device=device, others=())
         return None
 
+    def coarse(self, divider: int) -> Job:
+        """The same job with fewer pixels, each with one sample; see `PlannedView.coarse`."""
+        return replace(self, views=tuple(view.coarse(divider) for view in self.views))
+
     @property
     def denoises(self) -> bool:
         """Whether the views' pictures are denoised when their rays are done."""

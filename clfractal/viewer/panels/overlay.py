@@ -12,6 +12,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import zoom_box
+from clfractal.viewer.frame import Frame
 from clfractal.viewer.panels import stereo as stereo_panel
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.timeline_area import room_of
@@ -34,6 +35,7 @@ _FOR_NARROW = (
     "stereo",
     "parallax",
 )
+DRAFT = "Draft: light comes when it rests"
 _SPINNER = "|/-\\"
 
 
@@ -219,17 +221,24 @@ def _wrapped(rows: list[list[Pair]], room: float) -> list[list[Pair]]:
     return found
 
 
-def _state(ui: Ui, left: float, bottom: float) -> None:
-    """What takes long, and why the newest scene cannot be shown."""
+def state_lines(ui: Ui, frame: Frame | None) -> list[tuple[str, theme.Rgba]]:
+    """What takes long, why the newest scene cannot be shown, and that a picture is a draft: lines from the bottom up."""
     session = ui.studio.session
     told: list[tuple[str, theme.Rgba]] = []
+    if frame is not None and frame.is_draft and ui.show & {"overlay", "panels"}:
+        told.append((DRAFT, theme.ACCENT))
     if session.problem is not None:
         told.append((str(session.problem), theme.WARNING))
     if session.progress:
         turn = _SPINNER[int(time.perf_counter() * 8) % len(_SPINNER)]
         told.append((f"{turn}  {session.progress}", theme.ACCENT))
+    return told
+
+
+def _state(ui: Ui, left: float, bottom: float) -> None:
+    """What takes long, and why the newest scene cannot be shown."""
     canvas = imgui.get_background_draw_list()
-    for text, color in told:
+    for text, color in state_lines(ui, ui.studio.frame):
         room = ui.size[0] - left - theme.MARGIN - 20
         size = imgui.calc_text_size(text, False, room)
         top = bottom - size.y - 10

@@ -1,0 +1,135 @@
+"""Scenes whose light goes along paths are shaded cheaply while they move, and say so; at rest they are the shell's."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.scene.light_paths import DirectLighting
+from clfractal.scene.lighting import DirectionalLight
+from clfractal.scene.parts import PerspectiveCamera
+from clfractal.viewer.drafts import draft
+from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.panels import overlay
+from clfractal.work.films import JobFilms
+from clfractal.work.local import LocalExecutor
+from clfractal.work.prepare import prepare
+from clfractal.work.run import run
+from tests.viewer.panel_harness import make_ui
+from tests.viewer.sessions import BULB, equal_pictures, films_of, scene_of, session_on, wait_for
+from tests.viewer.test_preparing import Slow, slow  # noqa: F401 (a fixture)
+from tests.viewer.test_session import shell, turned
+
+PATHS = (
+    "lighting={mode: path}",
+    "materials={red: {base: {color: [0.8, 0.05, 0.05]}}}",
+    "material={name: red}",
+)
+SKY = (*PATHS, "environment={name: studio}", "lights=[]", "camera.f_number=0.5", "output.exposure=1.0")
+
+
+def test_a_draft_has_the_lights_and_nothing_that_takes_long() -> None:
+    lamps = ("lights=[{type: sphere, position: [0, -3, 2], radius: 0.3, intensity: 5}]", "fog={density: 0.1}")
+    scene = scene_of(BULB, *PATHS, *lamps)
+    found = draft(scene)
+    assert isinstance(found.lighting, DirectLighting)
+    assert found.fog is None
+    assert [(light.type, light.shadow) for light in found.lights] == [("sphere", False)]
+    assert (found.formula, found.camera) == (scene.formula, scene.camera)
+    assert (found.material.color, found.coloring.by) == ((0.8, 0.05, 0.05), "solid")
+    # What the eye sees by the light of a sky is lit from the eye, as bright as the exposure wants.
+    found = draft(scene_of(BULB, *SKY))
+    assert found.environment is not None
+    assert found.environment.rays == 0
+    (light,) = found.lights
+    assert isinstance(light, DirectionalLight)
+    ahead = np.subtract(found.camera.target, found.camera.position)
+    assert np.cross(light.direction, ahead) == pytest.approx([0, 0, 0])
+    assert light.intensity == pytest.approx(0.35)
+    assert isinstance(found.camera, PerspectiveCamera)
+    assert found.camera.lens_radius < 1e-5
+
+
+def test_other_scenes_have_none() -> None:
+    for options in ((), ("renderer={type: volume, resolution: 24}",)):
+        scene = scene_of(BULB, *options)
+        assert draft(scene) is scene
+
+
+@pytest.mark.parametrize("options", [PATHS, SKY])
+def test_it_is_a_draft_while_it_moves_alone(options: tuple[str, ...], device: Device) -> None:
+    scene = scene_of(BULB, *options)
+    with session_on(device) as watch:
+        watch.finished(scene)
+        watch.frames.clear()
+        for step in range(1, 6):
+            number = watch.session.request(turned(scene, 0.1 * step), moving=True)
+            wait_for(lambda: watch.frames and watch.frames[-1].request == number)  # noqa: B023
+        assert all(each.is_draft for each in watch.frames)
+        red, green = (planes_of(watch.frames[-1].canvas.read(device.transfers, 0), name) for name in "RG")
+        assert red > 2 * green, "it has its colour"
+        frame = watch.rest()
+        assert (frame.request, frame.finished, frame.is_draft) == (number, True, False)
+        equal_pictures(films_of(frame).picture(), shell(turned(scene, 0.5)))
+
+
+def planes_of(planes: dict[str, np.ndarray], name: str) -> float:
+    """The mean of a channel where the set is."""
+    return float(planes[name][np.isfinite(planes["Z"]) & (planes["Z"] > 0)].mean())
+
+
+def test_where_pictures_are_never_coarse_there_are_no_drafts(device: Device) -> None:
+    scene = scene_of(BULB, *PATHS)
+    with session_on(device, Pacing(coarsest=1)) as watch:
+        watch.finished(scene)
+        watch.session.request(turned(scene, 0.2), moving=True)
+        watch.rest()
+        assert not any(each.is_draft for each in watch.frames)
+
+
+def test_the_first_move_compiles_nothing(device: Device, slow: Slow) -> None:  # noqa: F811
+    """The draft's program is compiled behind the first picture; and only once, wherever the camera goes."""
+    scene = scene_of(BULB, *PATHS)
+    with session_on(device) as watch:
+        watch.finished(scene)
+        begun = slow.begun
+        slow.seconds = 20.0
+        start = time.perf_counter()
+        for step in range(1, 4):
+            watch.session.request(turned(scene, 0.1 * step), moving=True)
+            frame = watch.rest()
+            assert not frame.is_draft
+        assert time.perf_counter() - start < 20
+        assert slow.begun == begun
+        assert any(each.is_draft for each in watch.frames)
+
+
+def test_a_draft_takes_a_part_of_the_time(device: Device) -> None:
+    scene = scene_of(BULB, *SKY, "image.width=480", "image.height=320")
+    times = {}
+    for name, shown in (("paths", scene), ("draft", draft(scene))):
+        executor, job = LocalExecutor(device), prepare(shown, device, channels=("R", "G", "B", "A", "Z"))
+        times[name] = min(rendered(executor, JobFilms(job.coarse(2))) for _ in range(3))
+    assert times["draft"] < 0.5 * times["paths"]
+
+
+def rendered(executor: LocalExecutor, films: JobFilms) -> float:
+    """Milliseconds of the kernels."""
+    return run(films.job, films.films, executor).kernel_ms
+
+
+def test_it_is_told(device: Device) -> None:
+    scene = scene_of(BULB, *PATHS)
+    ui = make_ui(scene)[0]
+    with session_on(device) as watch:
+        watch.finished(scene)
+        watch.session.request(turned(scene, 0.3), moving=True)
+        frame = watch.rest()
+        drafted = next(each for each in watch.frames if each.is_draft)
+    assert [text for text, _ in overlay.state_lines(ui, drafted)] == [overlay.DRAFT]
+    assert overlay.state_lines(ui, frame) == []
+    ui.show.clear()  # nothing lies over a picture that is shown alone
+    assert overlay.state_lines(ui, drafted) == []
