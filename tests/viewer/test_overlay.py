@@ -63,6 +63,7 @@ def frame(ui: Ui, **changes: Any) -> None:
         "samples": 3,
         "finished": False,
         "job": SimpleNamespace(samples=16, precision="float32"),
+        "is_draft": False,
         "arrangement": SimpleNamespace(size=lambda look: (640, 360)),
         **changes,
     }
