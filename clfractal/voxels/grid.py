@@ -17,6 +17,7 @@ from clfractal.voxels.pool import Parts
 
 Kind = Literal["byte", "float"]
 SAMPLE_BYTES: dict[Kind, int] = {"byte": 1, "float": 4}
+_PIECE = 16 << 20  # bytes that are read at once
 DTYPES: dict[Kind, type[np.generic]] = {"byte": np.uint8, "float": np.float32}
 
 # Red, green and blue of a sample without a normal.
@@ -140,15 +141,19 @@ class Grid:
         order = np.argsort(flat, kind="stable")
         slots = flat[order]
         by, bx = self.table_entries.shape[1:]
-        for buffer, (first, after) in zip(pool, self.parts.ranges(), strict=True):
-            samples = np.empty((after - first, BRICK_STRIDE, *more), dtype)
-            with self.device.failures("reading the grid"):
-                cl.enqueue_copy(self.device.queue, samples, buffer)
-            cubes = samples[:, : BRICK_SIDE**3].reshape(-1, BRICK_SIDE, BRICK_SIDE, BRICK_SIDE, *more)
-            for index in order[np.searchsorted(slots, first) : np.searchsorted(slots, after)].tolist():
-                z, y, x = index // (by * bx), index // bx % by, index % bx
-                place = (_span(z), _span(y), _span(x))
-                yield place, cubes[flat[index] - first]
+        each = np.dtype((dtype, (BRICK_STRIDE, *more))).itemsize
+        some = max(_PIECE // each, 1)
+        for buffer, (begin, end) in zip(pool, self.parts.ranges(), strict=True):
+            for first in range(begin, end, some):  # a whole pool is as large as what is made of it
+                after = min(first + some, end)
+                samples = np.empty((after - first, BRICK_STRIDE, *more), dtype)
+                with self.device.failures("reading the grid"):
+                    cl.enqueue_copy(self.device.queue, samples, buffer, src_offset=(first - begin) * each)
+                cubes = samples[:, : BRICK_SIDE**3].reshape(-1, BRICK_SIDE, BRICK_SIDE, BRICK_SIDE, *more)
+                for index in order[np.searchsorted(slots, first) : np.searchsorted(slots, after)].tolist():
+                    z, y, x = index // (by * bx), index // bx % by, index % bx
+                    place = (_span(z), _span(y), _span(x))
+                    yield place, cubes[flat[index] - first]
 
 
 def _span(brick: int) -> slice:

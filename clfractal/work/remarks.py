@@ -186,11 +186,12 @@ def _of_lighting(scene: Scene) -> list[str]:
             return []
         return [f"material.name {material.name} is for lighting.mode path; Phong's keys are shown"]
     unused = []
-    if material.name is None:
-        unused += [f"material.{key}" for key in ("ambient", "reflection") if key in material.model_fields_set]
-    else:
+    keys: tuple[str, ...] = ("ambient", "reflection")
+    if material.name is not None:
         keys = ("ambient", "diffuse", "specular", "shininess", "reflection")
-        unused += [f"material.{key}" for key in keys if key in material.model_fields_set]
+    # Not by which keys were given: the scene in a picture's header has all of them.
+    defaults = type(material).model_fields
+    unused += [f"material.{key}" for key in keys if getattr(material, key) != defaults[key].default]
     if isinstance(scene.renderer, SurfaceRenderer) and scene.surface.ambient_occlusion is not None:
         unused.append("renderer.ambient_occlusion")
     lines = [f"lighting.mode path does not use {' and '.join(unused)}"] if unused else []
@@ -342,10 +343,18 @@ def _of_plane(seen: _Seen, renderer: CutPlaneRenderer) -> list[str]:
     if not seen.whole or not all(_is_one_color(store) for store in seen.stores):
         return []
     placed = renderer.plane.placed
-    x, y, z = (float(each) for each in placed.center)
-    if inside_solid(seen.scene, [(x, y, z)])[0]:
+    if all(inside_solid(seen.scene, [placed.at(x, y) for x in (0, 0.5, 1) for y in (0, 0.5, 1)])):
         return [
             "all of the plane is inside the set, so the picture has one colour; move or enlarge renderer.plane"
+        ]
+    center, radius = seen.scene.bounds
+    axes = np.array([placed.side, placed.up, placed.normal])
+    from_middle = np.abs(axes @ (np.array(center) - np.array(placed.center)))
+    beside = np.maximum(from_middle - np.array([placed.width, placed.height, 0]) / 2, 0)
+    if float(np.linalg.norm(beside)) < radius:
+        return [
+            f"the plane of {placed.width:g} x {placed.height:g} is so large, or goes through so little of the set, that the"
+            " picture has one colour; a smaller renderer.plane shows more"
         ]
     return ["the plane is so far from the set that the picture has one colour; move renderer.plane"]
 

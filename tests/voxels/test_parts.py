@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+import pyopencl as cl
 import pytest
 
-from clfractal.voxels import programs
+from clfractal.voxels import grid, programs
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.grid import Grid
 from tests.voxels.grids import device, filled, place_of, volume_scene
@@ -43,3 +45,23 @@ def test_parts_of_bricks(made: Callable[[], Grid], monkeypatch: pytest.MonkeyPat
     off = np.abs(parts.dense_normals().astype(int) - whole.dense_normals().astype(int)).max(axis=-1)
     assert np.unique(whole.dense_normals()).size > 100
     assert (off <= 1).mean() > 0.999
+
+
+@pytest.mark.parametrize("made", [of_counts, of_an_array])
+def test_a_grid_is_read_in_pieces(made: Callable[[], Grid], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Never as a whole: its pool is as large as the array that is made of it."""
+    whole = made()
+    values, normals = whole.dense(), whole.dense_normals()
+    read: list[int] = []
+    copy = cl.enqueue_copy
+
+    def counted(queue: cl.CommandQueue, target: Any, source: Any, **settings: Any) -> Any:
+        read.append(target.nbytes)
+        return copy(queue, target, source, **settings)
+
+    monkeypatch.setattr(grid, "_PIECE", 10_000)
+    monkeypatch.setattr(cl, "enqueue_copy", counted)
+    np.testing.assert_array_equal(whole.dense(), values)
+    np.testing.assert_array_equal(whole.dense_normals(), normals)
+    assert len(read) > 10
+    assert max(read) <= 10_000

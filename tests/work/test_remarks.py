@@ -182,6 +182,31 @@ def test_planes_of_one_color(engine: Engine) -> None:
     assert of(engine, renderer=plane(width=4, height=4)) == ()
 
 
+def test_a_plane_that_is_too_large(engine: Engine) -> None:
+    """Its middle is inside the set, which is less than a pixel of it."""
+    scene = load_scene(
+        "version: 1\nformula: {name: mandelbulb, iterations: 60}\nimage: {width: 200, height: 200}\ncamera: {}\n"
+        "renderer: {type: cut_plane, plane: {width: 1e+6, height: 1e+6}}\n"
+    )
+    one(engine.render(scene).remarks, "the plane of 1e+06 x 1e+06 is so large", "a smaller renderer.plane")
+
+
+def test_a_picture_made_again_has_the_same_remarks(engine: Engine, tmp_path: Path) -> None:
+    """Its header holds every key, also those that nobody wrote; only what differs from the default would be missed."""
+    scene = load_scene(
+        "version: 1\nformula: {name: hast, iterations: 3}\nimage: {width: 32, height: 24}\n"
+        "camera: {position: [1.7, -2.9, 1.4]}\nlighting: {mode: path}\nlights: []\nbackground: [1, 1, 1]\n"
+        "materials: {m: {base: {color: [1, 1, 1]}}}\nmaterial: {name: m}\nrenderer: {samples: 4}\n"
+    )
+    film = engine.render(scene)
+    assert film.remarks == ()
+    film.save(tmp_path / "a.png")
+    assert engine.render(tmp_path / "a.png").remarks == ()
+    shiny = scene.model_copy(update={"material": {"name": "m", "shininess": 50}})
+    for source in (shiny, shiny.resolved()):
+        one(engine.render(source).remarks, "lighting.mode path does not use material.shininess")
+
+
 def test_refined_pictures_have_them_at_the_end(engine: Engine) -> None:
     adaptive = {"type": "surface", "samples": 8, "noise": 1.0, "min_samples": 4}
     films = list(engine.refine(scene_of(BALL, CAMERA, SIZE, renderer=adaptive)))
