@@ -127,6 +127,9 @@ INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mas
     so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
 }
 
+// The normal of a spot that a path sees: past a rim that of the set faces away, and what sees a surface from behind would have no light.
+INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) * fmax(vec_dot(normal, direction), R(0.0)), direction); }
+
 // Adds what a spot shines with by itself.
 INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *here, color light, mask shows, world w) {
     color more = color_mul(light, so_far->through);
