@@ -34,6 +34,7 @@ def test_a_white_set_is_as_bright_as_its_furnace(
         image={"width": 48, "height": 48},
         renderer={"samples": 24, "firefly_limit": None},
         lighting={"mode": "path", "bounces": bounces},
+        lights=[],
         background=WHITE,
         camera={"position": position, "fov": 40},
         materials={"white": {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}},
