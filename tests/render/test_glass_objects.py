@@ -75,7 +75,7 @@ def plain_scene(objects: dict[str, Any]) -> dict[str, Any]:
     one_of(("box", 0.5), ("sphere", 0), ("cylinder", 0), ("box", 0), ("sphere", 0.5), ("cylinder", 0.5)),
 )
 def test_glass_before_white_is_not_seen(body: str, roughness: float) -> None:
-    samples = 128 if roughness else 16
+    samples = 256 if roughness else 16
     body_of_glass = {**BODIES[body], "material": "glass"}
     colors = colors_of(scene({"body": body_of_glass}, {"glass": glass(roughness)}), samples)
     assert abs(colors.mean() - 1) < 0.005
