@@ -34,7 +34,7 @@ RENDER = ("render", "scene.yaml", "-o", "picture.png")
 FIRST = "first picture of a formula"
 COMMANDS = {"render, 320 x 180": RENDER, "check": ("check", "scene.yaml"), FIRST: RENDER}
 # Parts of the program's cache folder that hold programs; the rest is what was measured of devices.
-_PROGRAMS = ("programs", "pocl")
+_PROGRAMS = ("programs",)
 _PR_SET_CHILD_SUBREAPER = 36  # <sys/prctl.h>
 _WITHOUT = ("PYTHONDONTWRITEBYTECODE", "PYTHONUNBUFFERED", "POCL_CACHE_DIR")
 

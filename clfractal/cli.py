@@ -33,8 +33,12 @@ def main() -> None:
         else:
             os.write(2, b"clfractal: interrupted\n")
 
+    def forced() -> None:
+        last_words()
+        _clear_away(in_order=False)
+
     try:
-        interrupt.watch(last_words)
+        interrupt.watch(forced)
         from clfractal.commands.shell import Shell
 
         shell = Shell(owns_process=True)
@@ -43,8 +47,17 @@ def main() -> None:
     except KeyboardInterrupt:
         # While this is handled the traceback keeps every object of the driver alive: none is waited for.
         last_words()
+        _clear_away()
         os._exit(interrupt.status())
+    _clear_away()
     os._exit(status)
+
+
+def _clear_away(*, in_order: bool = True) -> None:
+    """Removes the folder that drivers write into, if one was made. Out of order nothing is waited for."""
+    folder = sys.modules.get("clfractal.device.drivers_folder")
+    if folder is not None:
+        folder.remove(in_order=in_order)
 
 
 def _start_fast() -> None:

@@ -89,13 +89,17 @@ class FileError(ClfractalError):
 
 
 class CacheWarning(UserWarning):
-    """The cache cannot be where it should be; the work is done all the same."""
+    """The cache cannot be where it should be, or takes nothing more; the work is done all the same."""
 
 
 class DeviceError(ClfractalError):
     """No device, an unknown one (status 2), or one that failed while running (status 3)."""
 
     status = STATUS_DEVICE_FAILED
+
+
+class UntriedError(DeviceError):
+    """What a device can do was not found out, for a reason that lies elsewhere, and may be gone the next time."""
 
 
 class KernelBuildError(ClfractalError):

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import HealthCheck, settings
 
-from clfractal.device.cache_folder import set_drivers_folder
+from clfractal.device import drivers_folder
 
 if TYPE_CHECKING:
     from tests.shell import InProcess
 
-# Where it belongs, although a test may be the first to use OpenCL that has a cache folder of its own.
-set_drivers_folder()
+# Where it belongs, although a test may be the first to use OpenCL that has a temporary folder of its own.
+drivers_folder.path()
 
 # The same examples on every run: a failure must be repeatable on another machine.
 settings.register_profile(

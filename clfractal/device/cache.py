@@ -1,7 +1,8 @@
 """The user's cache folder: compiled programs, and facts measured once per device and driver.
 
 The cache is optional: if it fails (no space, no permission, a damaged file), the work is
-done again. So no function here raises an error because of the disk.
+done again. So no function here raises an error because of the disk. Everything has a check sum: what was damaged is
+as if it had never been there. What cannot be written is told once, by a `CacheWarning`, and tried again the next time.
 """
 
 from __future__ import annotations
@@ -10,20 +11,28 @@ import contextlib
 import hashlib
 import json
 import os
+import re
+import shutil
 import tempfile
+import time
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from clfractal.device.cache_folder import ENVIRONMENT_VARIABLE as ENVIRONMENT_VARIABLE
 from clfractal.device.cache_folder import folder as folder
+from clfractal.errors import CacheWarning
 from clfractal.files import system
 
-# A binary is some 100 KB; the oldest go first.
-MAXIMUM_BLOBS = 400
+# A program has some 200 KB; the oldest go first.
+MAXIMUM_BLOBS = 1000
 
 _MAGIC = b"clfractal-blob-1\n"
 _DIGEST_BYTES = 32
+_NEW = ".new-"
+_ABANDONED_S = 3600.0  # age of a file that nobody writes any more
+_told: set[str] = set()  # folders that take nothing more
 
 
 def key_of(*parts: object) -> str:
@@ -47,14 +56,16 @@ def load_blob(key: str) -> bytes | None:
     return payload
 
 
-def store_blob(key: str, payload: bytes) -> None:
-    """Keep `payload` under `key`. Readers see all of it or nothing."""
+def store_blob(key: str, payload: bytes) -> bool:
+    """Keep `payload` under `key`, and say whether that was possible. Readers see all of it or nothing."""
     path = _blob_path(key)
     try:
-        _replace(path, _MAGIC + hashlib.sha256(payload).digest() + payload)
         _drop_oldest(path.parent)
-    except OSError:
-        pass
+        _replace(path, _MAGIC + hashlib.sha256(payload).digest() + payload)
+    except OSError as error:
+        _tell(error)
+        return False
+    return True
 
 
 def drop_blob(key: str) -> None:
@@ -64,12 +75,13 @@ def drop_blob(key: str) -> None:
 
 
 def recall(section: str) -> dict[str, Any]:
-    """All facts remembered in `section`, a JSON object; empty if there are none."""
+    """All facts remembered in `section`, a JSON object; empty if there are none, or if they are damaged."""
     try:
-        facts = json.loads((folder() / f"{section}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        kept = json.loads((folder() / f"{section}.json").read_text(encoding="utf-8"))
+        facts: dict[str, Any] = kept["facts"]
+        return facts if kept["sha256"] == _sum_of(facts) else {}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return {}
-    return facts if isinstance(facts, dict) else {}
 
 
 def remember(section: str, key: str, fact: object) -> None:
@@ -78,10 +90,25 @@ def remember(section: str, key: str, fact: object) -> None:
         with _locked(section):
             facts = recall(section)
             facts[key] = fact
-            text = json.dumps(facts, indent=1, sort_keys=True)
+            text = json.dumps({"facts": facts, "sha256": _sum_of(facts)}, indent=1, sort_keys=True)
             _replace(folder() / f"{section}.json", text.encode())
-    except OSError:
-        pass
+    except OSError as error:
+        _tell(error)
+
+
+def _sum_of(facts: dict[str, Any]) -> str:
+    return key_of("facts", facts)
+
+
+def _tell(error: OSError) -> None:
+    root = str(folder())
+    if root not in _told:
+        _told.add(root)
+        warnings.warn(
+            f"the cache folder {root!r} takes nothing more: {error.strerror or error}; working without it",
+            CacheWarning,
+            stacklevel=3,
+        )
 
 
 def _blob_path(key: str) -> Path:
@@ -90,7 +117,7 @@ def _blob_path(key: str) -> Path:
 
 def _replace(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=".new-", dir=path.parent)
+    handle, temporary = tempfile.mkstemp(prefix=_NEW, dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
@@ -102,11 +129,25 @@ def _replace(path: Path, content: bytes) -> None:
 
 
 def _drop_oldest(blobs: Path) -> None:
+    """Makes room: drops what was used longest ago, what killed processes left, and what PoCL kept for earlier versions."""
+    now = time.time()
+    for left in (*blobs.glob(f"{_NEW}*"), *blobs.parent.glob(f"{_NEW}*")):
+        with contextlib.suppress(OSError):
+            if now - left.stat().st_mtime > _ABANDONED_S:
+                left.unlink()
+    for left in (blobs.parent / "pocl").glob("*"):
+        if re.fullmatch(r"[A-P]{2}", left.name):
+            shutil.rmtree(left, ignore_errors=True)
+        elif left.name.startswith("tempfile"):
+            left.unlink(missing_ok=True)
     entries = list(blobs.glob("*.bin"))
-    if len(entries) <= MAXIMUM_BLOBS:
+    if len(entries) < MAXIMUM_BLOBS:
         return
-    by_age = sorted(entries, key=lambda entry: entry.stat().st_mtime)
-    for entry in by_age[: len(entries) - MAXIMUM_BLOBS * 3 // 4]:
+    ages: list[tuple[float, Path]] = []
+    for entry in entries:
+        with contextlib.suppress(OSError):  # another process makes room, too
+            ages.append((entry.stat().st_mtime, entry))
+    for _, entry in sorted(ages)[: len(entries) - MAXIMUM_BLOBS * 3 // 4]:
         with contextlib.suppress(OSError):
             entry.unlink()
 

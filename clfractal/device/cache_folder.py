@@ -1,7 +1,7 @@
-"""Where the cache is, and that drivers find a folder for theirs in it.
+"""Where the cache is.
 
-The usual place may be missing: a service user without a home, a read-only container. PoCL has no device at all without a
-folder that it can write into. So a temporary folder takes the cache's place, with a remark.
+The usual place may be missing: a service user without a home, a read-only container. Then a temporary folder takes
+its place, with a remark.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import stat
 import sys
 import tempfile
 import warnings
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
-from clfractal.errors import CacheWarning, DeviceError, FileError, Where
+from clfractal.errors import CacheWarning, FileError, Where
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_CACHE"
-POCL_VARIABLE = "POCL_CACHE_DIR"
 
 
 def folder() -> Path:
@@ -30,30 +30,6 @@ def folder() -> Path:
     """
     override = os.environ.get(ENVIRONMENT_VARIABLE)
     return _usable(os.path.abspath(override) if override else _usual(), bool(override))
-
-
-def set_drivers_folder() -> None:
-    """Lets PoCL keep its programs in our cache folder, unless its own variable names another one.
-
-    To be called before OpenCL is used; child processes inherit it. Raises FileError as `folder` does.
-    """
-    if not os.environ.get(POCL_VARIABLE):
-        own = folder() / "pocl"
-        own.mkdir(exist_ok=True)
-        os.environ[POCL_VARIABLE] = str(own)
-
-
-def drivers_problem() -> DeviceError | None:
-    """The error for a folder that somebody chose for PoCL and that it cannot use; None if it can."""
-    chosen = os.environ.get(POCL_VARIABLE, "")
-    reason = problem(os.path.abspath(chosen)) if chosen else ""
-    if not reason:
-        return None
-    return DeviceError(
-        f"{POCL_VARIABLE}: PoCL cannot write into {chosen[:200]!r}: {reason}; without the variable it uses "
-        "clfractal's cache",
-        status=2,
-    )
 
 
 def problem(path: str) -> str:
@@ -91,23 +67,30 @@ def _usable(wanted: str, is_chosen: bool) -> Path:
     return found
 
 
-def _temporary(wanted: str, reason: str) -> Path:
-    """A temporary folder that nobody else can write into: always the same one for a user, if nobody took its name."""
+def private_temporary() -> Path:
+    """A folder in the system's temporary one that nobody else can write into: always the same one for a user, if nobody
+    took its name.
+
+    Raises:
+        OSError: none can be made.
+    """
     own = -1
     if sys.platform != "win32":
         own = os.getuid()
     user = "" if own < 0 else f"-{own}"
-    try:
+    with suppress(OSError):
         path = Path(tempfile.gettempdir(), f"clfractal-cache{user}")
         path.mkdir(mode=0o700, exist_ok=True)
         status = path.lstat()
         is_ours = own < 0 or (status.st_uid == own and not status.st_mode & 0o022)
         if stat.S_ISDIR(status.st_mode) and is_ours and not problem(str(path)):
             return path
-    except OSError:
-        pass
+    return Path(tempfile.mkdtemp(prefix="clfractal-"))
+
+
+def _temporary(wanted: str, reason: str) -> Path:
     try:
-        return Path(tempfile.mkdtemp(prefix="clfractal-"))
+        return private_temporary()
     except OSError as error:
         raise FileError(
             f"the cache folder {wanted!r} cannot be used: {reason}; and there is no temporary folder",

@@ -22,10 +22,13 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+from clfractal.device import drivers_folder
 from clfractal.errors import ClfractalError
 
 REQUEST, ANSWER, NOISE = "request.json", "answer.json", "driver.log"
 DONE = b"done\n"
+FAILED = 86
+"""Status of a child whose job failed by a fault of ours, or for want of memory."""
 
 # The process holds some 200 MB of the compiler's memory, so it does not wait long.
 IDLE_S = 10.0
@@ -46,6 +49,7 @@ def main() -> None:
     _leave_signals_to_the_parent()
     _die_with(int(sys.argv[1]))
     _leave_no_core()
+    drivers_folder.nest()
     folders: queue.SimpleQueue[Path] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(folders,), daemon=True).start()
     for _ in range(MOST_JOBS):
@@ -92,11 +96,11 @@ def _work(folder: Path) -> None:
     try:
         answer: dict[str, Any] = {"value": getattr(importlib.import_module(module), function)(request)}
     except ClfractalError as error:
-        answer = {"error": [type(error).__name__, error.message, error.details, error.status]}
+        answer = {"error": [type(error).__name__, str(error), error.details, error.status]}
     except BaseException:
         traceback.print_exc()
         sys.stderr.flush()
-        os._exit(1)
+        os._exit(FAILED)
     temporary = folder / f"{ANSWER}.new"
     temporary.write_text(json.dumps(answer), encoding="utf-8")
     temporary.replace(folder / ANSWER)

@@ -18,8 +18,9 @@ import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from clfractal.device import drivers_folder
 from clfractal.device.child import DONE
-from clfractal.errors import DeviceError, Stopped
+from clfractal.errors import Stopped, UntriedError
 
 POLL_S = 0.01
 """Seconds between checks whether a waiting caller should stop."""
@@ -122,9 +123,10 @@ class Child:
             self.process.wait()
 
     def end(self) -> None:
-        """End it and close its pipes; the caller must be the only one to use it."""
+        """End it, close its pipes and remove what it left; the caller must be the only one to use it."""
         self.kill()
         self.close()
+        drivers_folder.drop_nested(self.process.pid)
 
     def close(self) -> None:
         """Close the pipes. A second call does nothing."""
@@ -158,7 +160,7 @@ class Children:
         `give_back` must be called afterwards, whatever happens here.
 
         Raises:
-            DeviceError: status 3, no process can be started.
+            UntriedError: no process can be started.
             Stopped: `stopped` answered True.
         """
         with self._changed:
@@ -166,7 +168,7 @@ class Children:
                 if stopped is not None and stopped():
                     raise Stopped
                 if lease.failure is not None:
-                    raise DeviceError(f"the process for compiling cannot be started: {lease.failure}")
+                    raise UntriedError(f"the process for compiling cannot be started: {lease.failure}")
                 self._drop_useless(environment)
                 if lease not in self._leases and len(self._leases) < self._most:
                     self._leases.add(lease)
@@ -232,7 +234,7 @@ class Children:
                 with self._changed:
                     for ended in [each for each in self._idle if each.has_ended()]:
                         self._idle.remove(ended)
-                        ended.close()
+                        ended.end()
                 continue
             child: Child | None = None
             try:

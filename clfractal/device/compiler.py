@@ -17,12 +17,12 @@ from typing import Any, Literal
 import numpy as np
 import pyopencl as cl
 
+from clfractal.device import driver_files, drivers_folder
 from clfractal.device.groups import fitting
 from clfractal.device.select import Device, by_key, is_pocl
+from clfractal.errors import DeviceError
 
 BINARY = "binary"  # the file that `compile_job` leaves
-# Stored instead of a binary: the driver has its own cache, and finds the machine code by the program's text.
-KEPT_BY_DRIVER = b"kept by the driver"
 
 ArgumentKind = Literal["buffer", "scalar", "bytes", "local"]
 
@@ -102,24 +102,53 @@ def load_binary(device: Device, binary: bytes, flags: Sequence[str]) -> Any | No
         return None
 
 
-def load_kept(device: Device, binary: bytes, text: str, flags: Sequence[str]) -> Any | None:
-    """The program from the result of `binary_of`; None if the driver refuses it."""
-    if binary != KEPT_BY_DRIVER:
-        return load_binary(device, binary, flags)
+def load_kept(device: Device, kept: bytes, text: str, flags: Sequence[str]) -> Any | None:
+    """The program from what `compile_and_keep` gave for it; None if the driver refuses it.
+
+    Raises:
+        FileError: there is no room for the driver's files.
+    """
+    if not driver_files.is_packed(kept):
+        return load_binary(device, kept, flags)
+    driver_files.unpack(kept)
     try:
         return compile_source(device, text, flags)
-    except BuildFailureError:
+    except (BuildFailureError, DeviceError) as error:
+        drivers_folder.check_room()
+        if isinstance(error, DeviceError):
+            raise
         return None
 
 
-def binary_of(device: Device, program: Any) -> bytes:
-    """The driver's binary of a program built for one device; empty if the driver has none.
+def compile_and_keep(
+    device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]
+) -> tuple[Any, bytes]:
+    """The program, after its first launches, and what to keep of it, which may be empty: files of the driver or a binary.
 
-    PoCL has a cache of its own, which holds what a first launch made. For a binary it compiles every kernel once more,
-    for any size of work-group: a renderer would take twice as long to build.
+    For a binary PoCL compiles every kernel once more, for any size of work-group: a renderer would take twice as long to
+    build. With its files it finds the machine code that a first launch made, by the program's text.
+
+    Raises:
+        BuildFailureError: with the compiler's log.
+        DeviceError: the driver failed otherwise.
     """
-    if is_pocl(device.info) and os.environ.get("POCL_KERNEL_CACHE", "1") != "0":
-        return KEPT_BY_DRIVER
+    if not is_pocl(device.info) or os.environ.get("POCL_KERNEL_CACHE", "1") == "0":
+        program = _compiled(device, text, flags, warm)
+        return program, binary_of(program)
+    with driver_files.recorded() as record:
+        program = _compiled(device, text, flags, warm)
+    return program, driver_files.packed(record.folders) or binary_of(program)
+
+
+def _compiled(device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]) -> Any:
+    program = compile_source(device, text, flags)
+    for launch in warm:
+        warm_up(device, program, launch)
+    return program
+
+
+def binary_of(program: Any) -> bytes:
+    """The driver's binary of a program built for one device; empty if the driver has none."""
     try:
         binaries = program.get_info(cl.program_info.BINARIES)
     except cl.Error:
@@ -143,15 +172,21 @@ def warm_up(device: Device, program: Any, warm: Warm) -> None:
 
 
 def compile_job(request: Mapping[str, Any]) -> str | None:
-    """Compile and warm up in a child: leaves the binary in the folder, or returns the compiler's log."""
+    """Compile and warm up in a child: leaves what to keep in the folder, or returns the compiler's log.
+
+    Raises:
+        FileError: there is no room for it.
+    """
     device = by_key(*request["device"])
+    warm = [Warm.from_data(launch) for launch in request["warm"]]
     try:
-        program = compile_source(device, request["text"], request["flags"])
+        _, kept = compile_and_keep(device, request["text"], request["flags"], warm)
     except BuildFailureError as failure:
         return str(failure)
-    for launch in request["warm"]:
-        warm_up(device, program, Warm.from_data(launch))
-    (Path(request["folder"]) / BINARY).write_bytes(binary_of(device, program))
+    try:
+        (Path(request["folder"]) / BINARY).write_bytes(kept)
+    except OSError as error:
+        raise drivers_folder.no_room(error) from error
     return None
 
 

@@ -9,20 +9,33 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
+import signal
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import clfractal
 from clfractal import errors
-from clfractal.device import children
-from clfractal.device.child import ANSWER, NOISE, REQUEST
+from clfractal.device import children, drivers_folder
+from clfractal.device.child import ANSWER, FAILED, NOISE, REQUEST
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError
-from clfractal.files.atomic import file_error
+from clfractal.errors import DeviceError, UntriedError
 
 _NOISE_SHOWN = 20_000  # characters
+# Signals that no driver ends a process by: other programs send them, and the system where memory or time is short.
+_FROM_OUTSIDE = frozenset(
+    int(getattr(signal, name))
+    for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT", "SIGXCPU")
+    if hasattr(signal, name)
+)
+# Signals that no driver ends a process by: other programs send them, and the system where memory or time is short.
+_FROM_OUTSIDE = frozenset(
+    int(getattr(signal, name))
+    for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT", "SIGXCPU")
+    if hasattr(signal, name)
+)
 
 
 class DriverAbortedError(DeviceError):
@@ -53,20 +66,21 @@ def run(
             the child is ended.
 
     Raises:
-        DeviceError: status 3, the child was ended by a signal, failed, or took too long; what the driver wrote is in
-            the details. Errors of this package raised by the job are raised here again.
-        FileError: the folder has no room for the request.
+        DeviceError: status 3, the driver aborted, failed, or took too long; what it wrote is in the details. Errors of this
+            package raised by the job are raised here again.
+        UntriedError: the child was ended from outside, or failed without the driver.
+        FileError: there is no room for the request, or for what the driver writes.
         Stopped: `stopped` answered True.
     """
     if folder is None:
-        with tempfile.TemporaryDirectory(prefix="clfractal-") as temporary:
+        with job_folder() as temporary:
             return run(
                 job,
                 device,
                 arguments,
                 doing=doing,
                 timeout_s=timeout_s,
-                folder=Path(temporary),
+                folder=temporary,
                 stopped=stopped,
             )
     request = {
@@ -79,10 +93,34 @@ def run(
     try:
         (folder / REQUEST).write_text(json.dumps(request), encoding="utf-8")
     except OSError as error:
-        # (The folder itself has a name that nobody knows, and is gone when this is read.)
-        raise file_error(folder.parent, "has no room for temporary files", error) from error
+        raise drivers_folder.no_room(error) from error
     status = _wait_for_child(folder, timeout_s, stopped)
-    return _answer(folder, status, device.info.name, doing, timeout_s)
+    try:
+        return _answer(folder, status, device.info.name, doing, timeout_s)
+    except DeviceError:
+        drivers_folder.check_room()
+        raise
+
+
+@contextlib.contextmanager
+def job_folder() -> Iterator[Path]:
+    """A folder for request, answer and files.
+
+    Raises:
+        FileError: there is no room for it.
+    """
+    root = drivers_folder.path()
+    try:
+        root.mkdir(
+            parents=True, exist_ok=True
+        )  # what is old in a temporary folder may have been cleared away
+        temporary = tempfile.mkdtemp(prefix="job-", dir=root)
+    except OSError as error:
+        raise drivers_folder.no_room(error) from error
+    try:
+        yield Path(temporary)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def end_children() -> None:
@@ -90,11 +128,19 @@ def end_children() -> None:
     children.pool.close()
 
 
+drivers_folder.users.append(end_children)
+
+
 def _wait_for_child(folder: Path, timeout_s: float, stopped: Callable[[], bool] | None) -> int | None:
     """0 once a request is answered; else the child's exit status; None if it was killed for taking too long."""
     package_root = str(Path(clfractal.__file__).resolve().parent.parent)
     paths = [package_root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(paths),
+        # The child's own folder is made in this process's.
+        drivers_folder.POCL_VARIABLE: str(drivers_folder.path()),
+    }
     while True:
         pool, lease, status = children.pool, children.Lease(), None
         try:
@@ -115,6 +161,10 @@ def _answer(folder: Path, status: int | None, device_name: str, doing: str, time
         raise DeviceError(
             f"{device_name}: the driver took more than {timeout_s:g} s while {doing}", details=noise
         )
+    if -status in _FROM_OUTSIDE:
+        raise UntriedError(f"{device_name}: signal {-status} from outside ended {doing}", details=noise)
+    if status == FAILED:
+        raise UntriedError(f"{device_name}: clfractal's own program failed while {doing}", details=noise)
     if status < 0:
         raise DriverAbortedError(
             f"{device_name}: the driver aborted (signal {-status}) while {doing}", details=noise

@@ -36,7 +36,8 @@ def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:
     precision: Precision = request["precision"]
     lanes = int(request["lanes"])
     flat = program_text(lanes, precision)
-    program = build(device, flat.text, flags=math_flags(precision), sources=flat.sources, isolated=False)
+    flags = math_flags(precision)
+    program = build(device, flat.text, flags=flags, sources=flat.sources, isolated=False, keep=False)
     fault = _built_ins_fault(program, precision, lanes) or _mixed_lanes_fault(program, precision, lanes)
     width, rows = (_WIDTH_SIMULATED, _ROWS_SIMULATED) if is_simulator(device.info) else (_WIDTH, _ROWS)
     counts = _launch(program, "escape_counts", precision, rows, width, rows * width // lanes)

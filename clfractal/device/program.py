@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -16,7 +15,7 @@ from weakref import WeakValueDictionary
 
 import pyopencl as cl
 
-from clfractal.device import activity, cache, compiler, isolate
+from clfractal.device import activity, cache, compiler, driver_files, drivers_folder, isolate
 from clfractal.device.compiler import BuildFailureError, Warm
 from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
 from clfractal.device.source import SourceMap
@@ -29,8 +28,9 @@ LEAST_FILE_SIZE = 4 << 20
 """Bytes; the largest programs take half of that, and PoCL keeps several files of each."""
 
 _REMARK_SECONDS = 1.5  # longer than a failing build takes, so that no remark precedes an error
-_FORMAT = 4  # of what is kept under a key
+_FORMAT = 5  # of what is kept under a key
 _TURN_SECONDS = 0.02
+_TOLD_BY_COMPILERS = "error:"  # in the log of a text that is wrong
 _turns: WeakValueDictionary[str, Any] = WeakValueDictionary()  # locks, as long as somebody needs them
 _turns_lock = threading.Lock()
 
@@ -75,6 +75,7 @@ def build(
     sources: SourceMap | None = None,
     warm: Sequence[Warm] = (),
     isolated: bool = True,
+    keep: bool = True,
     on_compile: Callable[[str], None] | None = None,
     stopped: Callable[[], bool] | None = None,
     waits: bool = True,
@@ -89,6 +90,7 @@ def build(
         warm: first launches to perform before the binary is kept, so that later runs start at once.
         isolated: compile in a child process, so that a driver that aborts takes only the child with it, and
             an interrupt is answered at once.
+        keep: whether a later process may want it.
         on_compile: called with a message, from another thread, if compiling takes more than a moment.
         stopped: asked at least every 20 ms while a child process compiles; it ends the child by answering True.
         waits: whether it is built if it is not loaded yet.
@@ -96,7 +98,7 @@ def build(
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
         DeviceError: the driver failed or aborted.
-        FileError: the process may write only files that are too small for programs.
+        FileError: there is no room for the driver's files, or the process may write only files that are too small for them.
         Stopped: `stopped` answered True.
         NotReady: it is not loaded, and the caller does not wait.
     """
@@ -112,7 +114,7 @@ def build(
     # Of devices of one kind one compiles, and the others find it in the cache.
     with device.loaded.building, _alone(key, stopped):
         try:
-            program, cached = _built(device, key, text, flags, warm, isolated, on_compile, stopped)
+            program, cached = _built(device, key, text, flags, warm, isolated, keep, on_compile, stopped)
         except BuildFailureError as failure:
             from clfractal.device.buildlog import build_error
 
@@ -176,6 +178,7 @@ def _built(
     flags: Sequence[str],
     warm: Sequence[Warm],
     isolated: bool,
+    keep: bool,
     on_compile: Callable[[str], None] | None,
     stopped: Callable[[], bool] | None,
 ) -> tuple[Any, bool]:
@@ -184,6 +187,7 @@ def _built(
     if binary is not None:
         program = compiler.load_kept(device, binary, text, flags)
         if program is not None:
+            _note(key, binary)
             return program, True
         cache.drop_blob(key)
     remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"compiling for {device.info.name}, once"))
@@ -194,9 +198,14 @@ def _built(
             program, binary = _compile(device, text, flags, warm, isolated=isolated, stopped=stopped)
     finally:
         remark.cancel()
-    if binary:
-        cache.store_blob(key, binary)
+    if binary and keep and cache.store_blob(key, binary):
+        _note(key, binary)
     return program, False
+
+
+def _note(key: str, kept: bytes) -> None:
+    if driver_files.is_packed(kept):
+        driver_files.note(key, kept)
 
 
 def _tell(listener: Callable[[str], None] | None, line: str) -> None:
@@ -213,17 +222,14 @@ def _compile(
     isolated: bool,
     stopped: Callable[[], bool] | None,
 ) -> tuple[Any, bytes]:
-    """The program and its binary, which may be empty."""
+    """The program and what to keep of it, which may be empty."""
     if isolated:
         binary = _compile_in_child(device, text, flags, warm, stopped)
         program = compiler.load_kept(device, binary, text, flags) if binary else None
         if program is not None:
             return program, binary
         # A driver without binaries (or that cannot read its own): the child has shown that compiling is safe.
-    program = compiler.compile_source(device, text, flags)
-    for launch in warm:
-        compiler.warm_up(device, program, launch)
-    return program, compiler.binary_of(device, program)
+    return compiler.compile_and_keep(device, text, flags, warm)
 
 
 def _compile_in_child(
@@ -235,27 +241,29 @@ def _compile_in_child(
 ) -> bytes:
     request = {"text": text, "flags": list(flags), "warm": [launch.as_data() for launch in warm]}
 
-    def attempt(folder: str) -> str | None:
+    def attempt(folder: Path) -> str | None:
         failure: str | None = isolate.run(
             "clfractal.device.compiler:compile_job",
             device,
             request,
             doing="building a program",
             timeout_s=BUILD_TIMEOUT_S,
-            folder=Path(folder),
+            folder=folder,
             stopped=stopped,
         )
         return failure
 
-    with tempfile.TemporaryDirectory(prefix="clfractal-") as temporary:
+    with isolate.job_folder() as temporary:
         try:
             failure = attempt(temporary)
         except isolate.DriverAbortedError:
             # Intel's compiler crashes on one text in some ten, at random, and builds it the next time.
             failure = attempt(temporary)
         if failure is not None:
+            if _TOLD_BY_COMPILERS not in failure:
+                drivers_folder.check_room()
             raise BuildFailureError(failure)
-        return (Path(temporary) / compiler.BINARY).read_bytes()
+        return (temporary / compiler.BINARY).read_bytes()
 
 
 def _key(device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]) -> str:

@@ -18,14 +18,20 @@ from typing import Any, Literal
 import pyopencl as cl
 
 from clfractal.arguments import plain, shown
-from clfractal.device import bundled, cache
+from clfractal.device import bundled, cache, drivers_folder
 from clfractal.device.advice import install_hint
-from clfractal.device.cache_folder import drivers_problem, set_drivers_folder
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
 from clfractal.device.subdevices import divided, without_parts
 from clfractal.device.unknown_cpu import name_processor
-from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, Where, unknown_name
+from clfractal.errors import (
+    STATUS_BAD_INPUT,
+    STATUS_DEVICE_FAILED,
+    DeviceError,
+    UntriedError,
+    Where,
+    unknown_name,
+)
 
 # pyopencl's own cache holds only how arguments are passed. It lies in the home folder, where one may not be able to
 # write, and reading it takes longer than making its contents anew (15 ms of a start, instead of 10).
@@ -222,7 +228,7 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
         raise DeviceError(message, Where(path="device"), status=STATUS_BAD_INPUT)
     found = _found()
     if not found:
-        raise drivers_problem() or DeviceError(install_hint())
+        raise drivers_folder.problem() or DeviceError(install_hint())
     spec, counts = without_parts(
         (spec if spec is not None else os.environ.get(ENVIRONMENT_VARIABLE, "")).strip()
     )
@@ -232,12 +238,12 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
         )
     fitting = _fitting(found, spec)
     if not fitting:
-        raise drivers_problem() or _nothing_fits(found, spec)
+        raise drivers_folder.problem() or _nothing_fits(found, spec)
     speeds = cache.recall(SPEEDS)
     if any(device.info.key not in speeds for device in fitting):
         speeds = {}  # speeds count only if all these devices were measured
     best = max(fitting, key=lambda device: _score(device.info, speeds))
-    wrong = drivers_problem() if is_pocl(best.info) else None
+    wrong = drivers_folder.problem() if is_pocl(best.info) else None
     if wrong is not None:
         raise wrong
     if counts:
@@ -246,14 +252,10 @@ def choose(spec: str | None = None, *, properties: Properties = ()) -> Device:
 
 
 def by_key(index: str, key: str) -> Device:
-    """The device with that `DeviceInfo.key`, the one at `index` if several are alike.
-
-    Raises:
-        DeviceError: status 3, it is no longer there.
-    """
+    """The device with that `DeviceInfo.key`, the one at `index` if several are alike; UntriedError if it is gone."""
     alike = [device for device in _found() if device.info.key == key]
     if not alike:
-        raise DeviceError(f"the device {index} was removed or has changed")
+        raise UntriedError(f"the device {index} was removed or has changed")
     return next((device for device in alike if device.info.index == index), alike[0])
 
 
@@ -363,10 +365,14 @@ def _found() -> list[Device]:
 @cache_of_calls
 def _find() -> list[Device]:
     """Once for a process: the devices whose contexts are shared by all who ask for no context of their own."""
+    bundled.offer()
+    with drivers_folder.given_to_drivers():
+        return _look()
+
+
+def _look() -> list[Device]:
     found: list[Device] = []
     seen: set[int] = set()
-    bundled.offer()
-    set_drivers_folder()
     try:
         platforms = cl.get_platforms()
     except cl.Error:  # PLATFORM_NOT_FOUND_KHR: the loader found no driver
@@ -377,8 +383,7 @@ def _find() -> list[Device]:
         except cl.Error:  # a driver without its hardware
             continue
         for device_index, cl_device in enumerate(cl_devices):
-            # The same driver may be registered twice (the wheel's PoCL by itself and through
-            # OCL_ICD_VENDORS).
+            # The same driver may be registered twice (the wheel's PoCL by itself and through OCL_ICD_VENDORS).
             if cl_device.int_ptr not in seen:
                 seen.add(cl_device.int_ptr)
                 info = _describe(f"{platform_index}:{device_index}", platform, cl_device)

@@ -13,13 +13,20 @@ from typing import Any
 from clfractal.device import activity, cache, isolate
 from clfractal.device.select import Device, compiles_packets_slowly, has_float64, vectorises_across_work_items
 from clfractal.device.structs import Precision
-from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
+from clfractal.errors import (
+    STATUS_BAD_INPUT,
+    STATUS_DEVICE_FAILED,
+    ClfractalError,
+    DeviceError,
+    FileError,
+    UntriedError,
+)
 
 LANE_COUNTS = (1, 4, 8, 16)
 PROBE = "clfractal.device.probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
-_VERSION = 6  # of the probes: older measurements no longer count
+_VERSION = 7  # of the probes: older measurements no longer count
 _SECTION = "lanes"
 
 
@@ -52,6 +59,7 @@ def lane_reports(
 
     Raises:
         DeviceError: status 2, the device has no float64.
+        FileError: there is no room for what the driver writes.
     """
     if precision == "float64" and not has_float64(device.info):
         raise DeviceError(f"{device.info.name} has no float64", status=STATUS_BAD_INPUT)
@@ -64,8 +72,9 @@ def lane_reports(
             if on_start is not None:
                 on_start(f"measuring {device.info.name}, once")
                 on_start = None
-            report = _try(device, precision, lanes)
-            cache.remember(_SECTION, key, asdict(report))
+            report, is_known = _try(device, precision, lanes)
+            if is_known:
+                cache.remember(_SECTION, key, asdict(report))
         reports.append(report)
     return tuple(reports)
 
@@ -90,7 +99,16 @@ def promising(device: Device) -> tuple[tuple[int, ...], ...]:
     return (1, 4), (8, 16)
 
 
-def _try(device: Device, precision: Precision, lanes: int) -> LaneReport:
+def is_of_the_device(error: ClfractalError) -> bool:
+    """Whether a trial failed by what the device or its driver does: only that will be so the next time.
+
+    Memory that others use, a full disk, a process that was ended from outside say nothing of it.
+    """
+    return error.status == STATUS_DEVICE_FAILED and not isinstance(error, UntriedError)
+
+
+def _try(device: Device, precision: Precision, lanes: int) -> tuple[LaneReport, bool]:
+    """The report, and whether it may be remembered."""
     try:
         with activity.doing(f"measuring {device.info.name}"):
             answer = isolate.run(
@@ -100,9 +118,11 @@ def _try(device: Device, precision: Precision, lanes: int) -> LaneReport:
                 doing=f"trying {lanes} lanes",
                 timeout_s=PROBE_TIMEOUT_S,
             )
+    except FileError:
+        raise
     except ClfractalError as error:
-        return LaneReport(lanes, error.message)
-    return LaneReport(lanes, str(answer["fault"]))
+        return LaneReport(lanes, error.message), is_of_the_device(error)
+    return LaneReport(lanes, str(answer["fault"])), True
 
 
 def _from_data(data: Any) -> LaneReport | None:

@@ -14,7 +14,7 @@ from typing import Any
 from clfractal.device import activity, cache, isolate, select, tune
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError
+from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers.trial import RULES, Rule, march, picture_side
@@ -22,7 +22,7 @@ from clfractal.renderers.trial import RULES, Rule, march, picture_side
 LANES_VARIABLE = "CLFRACTAL_LANES"
 JOB = "clfractal.renderers.lanes:march_job"
 
-_VERSION = 2  # of this measurement: older ones no longer count
+_VERSION = 3  # of this measurement: older ones no longer count
 _SECTION = "marches"
 _TIMEOUT_S = 60.0
 # What a picture has beside the trial gains from wide packets: they are chosen up to so many times the best time.
@@ -70,6 +70,7 @@ def best_lanes(
     Raises:
         DeviceError: status 2 for a variable that is no lane count, or a device without float64; status 3 if no lane count
             works.
+        FileError: there is no room for what the driver writes.
     """
     override = os.environ.get(LANES_VARIABLE, "").strip()
     if override:
@@ -155,8 +156,12 @@ def _measured(
                 JOB, device, request, doing=f"marching with {lanes} lanes", timeout_s=_TIMEOUT_S
             )
         report = MarchReport(lanes=lanes, fault="", **answer)
+    except FileError:
+        raise
     except ClfractalError as error:
         report = MarchReport(lanes, 0.0, 0.0, error.message)
+        if not tune.is_of_the_device(error):
+            return report
     cache.remember(_SECTION, key, asdict(report))
     return report
 

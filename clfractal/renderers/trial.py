@@ -157,7 +157,9 @@ class _Trial:
         formula = write_formula(chain)
         flat = program_text(formula, lanes, precision)
         flags = program.math_flags(precision)
-        built = program.build(device, flat.text, flags=flags, sources=flat.sources, isolated=False)
+        built = program.build(
+            device, flat.text, flags=flags, sources=flat.sources, isolated=False, keep=False
+        )
         self.kernel = built.kernel("march_probe")
         self.scene = [
             self._upload(array)

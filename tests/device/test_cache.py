@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from clfractal.device import cache
+from clfractal.errors import CacheWarning
 
 
 def test_what_is_stored_comes_back(empty_cache: Path) -> None:
@@ -67,8 +69,47 @@ def test_damaged_facts_are_no_facts(empty_cache: Path) -> None:
     empty_cache.mkdir()
     (empty_cache / "facts.json").write_text("{")
     assert cache.recall("facts") == {}
-    (empty_cache / "facts.json").write_text("[1]")
+    for text in ("[1]", "{}", '{"facts": {"a": 1}}', '{"facts": [], "sha256": ""}', "[" * 100_000, "\x00"):
+        (empty_cache / "facts.json").write_text(text)
+        assert cache.recall("facts") == {}, text[:20]
+    (empty_cache / "facts.json").write_bytes(b"\xff")
     assert cache.recall("facts") == {}
+
+
+def test_every_changed_bit_of_facts_is_noticed(empty_cache: Path) -> None:
+    """A number that changed a little would still be a number."""
+    cache.remember("facts", "a", {"lanes": 16, "scalar": 78.25})
+    stored = (empty_cache / "facts.json").read_bytes()
+    for bit in range(8 * len(stored)):
+        changed = bytearray(stored)
+        changed[bit // 8] ^= 1 << bit % 8
+        (empty_cache / "facts.json").write_bytes(changed)
+        found = cache.recall("facts")
+        assert found in ({}, {"a": {"lanes": 16, "scalar": 78.25}}), bit
+        # (White space may be changed: what it says is still the same.)
+        assert not found or chr(stored[bit // 8]).isspace() or chr(changed[bit // 8]).isspace(), bit
+    for length in range(len(stored)):
+        (empty_cache / "facts.json").write_bytes(stored[:length])
+        assert cache.recall("facts") == {}, length
+    cache.remember("facts", "b", 2)
+    assert cache.recall("facts") == {"b": 2}
+
+
+def test_what_earlier_versions_and_killed_processes_left_goes(empty_cache: Path) -> None:
+    for name in (
+        "pocl/CB/IIDBO/program.bc",
+        "pocl/tempfile_x",
+        "pocl/mine/a",
+        ".new-old",
+        "programs/.new-new",
+    ):
+        path = empty_cache / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+    os.utime(empty_cache / ".new-old", (1, 1))
+    cache.store_blob("a", b"binary")
+    left = {path.relative_to(empty_cache).as_posix() for path in empty_cache.rglob("*") if path.is_file()}
+    assert left == {"pocl/mine/a", "programs/.new-new", "programs/a.bin"}
 
 
 def test_a_folder_that_can_no_longer_be_written_is_no_error(
@@ -78,8 +119,10 @@ def test_a_folder_that_can_no_longer_be_written_is_no_error(
     assert cache.folder() == tmp_path / "cache"
     cache.folder().rmdir()
     cache.folder().touch()
-    cache.store_blob("a", b"binary")
+    with pytest.warns(CacheWarning, match="takes nothing more: .*; working without it$") as told:
+        assert not cache.store_blob("a", b"binary")
     cache.remember("facts", "a", 1)
+    assert len(told) == 1
     cache.drop_blob("a")
     assert cache.load_blob("a") is None
     assert cache.recall("facts") == {}

@@ -20,7 +20,7 @@ PROGRAM = """
 import json, os, warnings
 import numpy as np
 import pyopencl as cl
-from clfractal.device import cache, program
+from clfractal.device import cache, drivers_folder, program
 from clfractal.device.select import choose
 
 with warnings.catch_warnings(record=True) as told:
@@ -38,7 +38,8 @@ with warnings.catch_warnings(record=True) as told:
 assert (values == 7).all()
 print(json.dumps({
     "folder": str(cache.folder()),
-    "pocl": os.environ["POCL_CACHE_DIR"],
+    "pocl": str(drivers_folder.path()),
+    "told pocl": os.environ.get("POCL_CACHE_DIR"),
     "kept": cache.recall("facts"),
     "told": [str(each.message) for each in told if each.category.__name__ == "CacheWarning"],
 }))
@@ -77,7 +78,8 @@ def test_homes_that_cannot_be_used(tmp_path: Path, home: str) -> None:
     found = run({"HOME": home.format(file=file)}, tmp_path / "tmp")
     folder = tmp_path / "tmp" / f"clfractal-cache-{os.getuid()}"
     assert found["folder"] == str(folder)
-    assert found["pocl"] == str(folder / "pocl")
+    assert Path(found["pocl"]).parent == folder / "running"
+    assert list((folder / "running").iterdir()) == []
     assert found["kept"] == {"a": 1}
     (told,) = found["told"]
     assert f"using {str(folder)!r}" in told
@@ -96,8 +98,10 @@ def test_a_file_as_the_folder_of_caches(tmp_path: Path) -> None:
 def test_our_variable_alone_is_enough(tmp_path: Path) -> None:
     found = run({"HOME": "/proc", "CLFRACTAL_CACHE": str(tmp_path / "own")}, tmp_path / "tmp")
     assert found["told"] == []
-    assert found["pocl"] == str(tmp_path / "own" / "pocl")
-    assert not list((tmp_path / "tmp").iterdir())
+    assert found["told pocl"] is None
+    (left,) = (tmp_path / "tmp").iterdir()
+    assert Path(found["pocl"]).parent == left / "running"
+    assert [path.name for path in left.rglob("*")] == ["running"]
 
 
 def test_a_chosen_folder_that_cannot_be_used_is_named(

@@ -21,7 +21,7 @@ from clfractal.device import child, children, isolate
 from clfractal.device.children import Children
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError, FormulaError, Stopped
+from clfractal.errors import DeviceError, FormulaError, Stopped, UntriedError
 
 _HERE = "tests.device.test_isolate"
 
@@ -287,7 +287,7 @@ def test_our_errors_pass_through(device: Device) -> None:
 
 
 def test_a_failing_job_shows_its_cause_in_the_details(device: Device) -> None:
-    with pytest.raises(DeviceError, match=r"the driver failed \(status 1\) while testing") as caught:
+    with pytest.raises(UntriedError, match=r": clfractal's own program failed while testing") as caught:
         _run(device, "fail_job")
     assert caught.value.status == 3
     assert "a fault of ours" in caught.value.details

@@ -13,13 +13,14 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from clfractal.device import isolate
+from clfractal.device import cache, compiler, driver_files, isolate
 from clfractal.device.compiler import Warm
 from clfractal.device.program import math_flags
-from clfractal.device.select import Device, is_pocl
+from clfractal.device.select import Device, by_key, is_pocl
 from clfractal.device.source import flatten
 from clfractal.renderers.lanes import best_lanes
 from clfractal.resources import folder as resources
@@ -53,28 +54,41 @@ Build = Callable[[str, programs.Recipe], None]
 
 
 @pytest.fixture
-def build_in_child(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Build:
-    """Builds and launches a program in a new child process; PoCL keeps what it generates in a folder of the test."""
-    if is_pocl(device.info):
-        monkeypatch.setenv("POCL_CACHE_DIR", str(tmp_path / "pocl"))
+def build_in_child(device: Device, tmp_path: Path) -> Build:
+    """Builds and launches a program in a new child process, and loads it in another.
+
+    What PoCL generates is laid out in a folder of the test.
+    """
 
     def build(text: str, recipe: programs.Recipe) -> None:
         folder = tmp_path / "job"
         folder.mkdir(exist_ok=True)
         launch = Warm(recipe.kernel, (recipe.items, recipe.group[1]), recipe.group, recipe.arguments)
         request = {"text": text, "flags": list(math_flags(recipe.precision)), "warm": [launch.as_data()]}
-        isolate.end_children()
-        failure = isolate.run(
-            "clfractal.device.compiler:compile_job",
-            device,
-            request,
-            doing="building",
-            timeout_s=120,
-            folder=folder,
-        )
-        assert failure is None, failure
+        for job in ("clfractal.device.compiler:compile_job", "tests.device.test_library_calls:load_job"):
+            isolate.end_children()
+            failure = isolate.run(job, device, request, doing="building", timeout_s=120, folder=folder)
+            assert failure is None, failure
+        lay_out((folder / compiler.BINARY).read_bytes(), tmp_path / "pocl")
 
     return build
+
+
+def lay_out(kept: bytes, folder: Path) -> None:
+    """Writes the files of PoCL, if it has left some."""
+    for name, content in driver_files.contents(kept) if driver_files.is_packed(kept) else ():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def load_job(request: dict[str, Any]) -> None:
+    """In a child: loads what another one kept, and launches it."""
+    device = by_key(*request["device"])
+    kept = (Path(request["folder"]) / compiler.BINARY).read_bytes()
+    program = compiler.load_kept(device, kept, request["text"], request["flags"])
+    assert program is not None
+    for launch in request["warm"]:
+        compiler.warm_up(device, program, Warm.from_data(launch))
 
 
 @pytest.mark.parametrize("radius", [0, 1, 3])
@@ -84,7 +98,6 @@ def test_programs_that_store_bricks_can_be_loaded_again(build_in_child: Build, r
     recipe = programs.store_recipe("bits", "byte", "byte", radius)
     structs = {"structs.h": EXTENT.c_text()}
     text = flatten(recipe.entry, generated=structs, defines=recipe.defines).text
-    build_in_child(text, recipe)
     build_in_child(text, recipe)
 
 
@@ -96,11 +109,14 @@ def rendered(device: Device, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "CLFRACTAL_CACHE": str(where / "cache"),
         "CLFRACTAL_LANES": str(best_lanes(device, "float32")),
         "CLFRACTAL_DEVICE": device.info.index,
-        "POCL_CACHE_DIR": str(where / "pocl"),
     }
     command = [sys.executable, "-P", str(Path(__file__).with_name("render_and_record.py")), str(where)]
     ended = subprocess.run(command, env=environment(settings), capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
+    for entry in (where / "cache" / "programs").glob("*.bin"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv("CLFRACTAL_CACHE", str(where / "cache"))
+            lay_out(cache.load_blob(entry.stem) or b"", where / "pocl")
     return where
 
 

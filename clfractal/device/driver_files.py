@@ -1,0 +1,129 @@
+"""What PoCL keeps of a program, as bytes for the cache: its files, put together after compiling, laid out before loading.
+
+PoCL has a folder for each program, with machine code for each kernel and size of work-group, in folders of two letters. It
+notes the last use of each, which tells the folders of one program from those of others.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePosixPath
+
+from clfractal.device import cache, drivers_folder
+
+MAGIC = b"clfractal-files-1\n"
+_USED = "last_accessed"
+# How names of files begin and end that are being written.
+_UNFINISHED, _TEMPORARY = (".new-", "tempfile"), (".temp", ".tmp", ".o")
+
+_recording = threading.RLock()
+_kept: dict[str, tuple[tuple[str, ...], frozenset[str]]] = {}
+"""By the key in the cache: the folders of a program, and which files of them the cache has."""
+
+
+class Record:
+    """The programs that PoCL made or loaded while it was recorded."""
+
+    def __init__(self) -> None:
+        self.folders: tuple[str, ...] = ()
+
+
+@contextmanager
+def recorded() -> Iterator[Record]:
+    """Tells of which programs PoCL makes files within the block; those of other threads may be among them."""
+    root = drivers_folder.path()
+    record = Record()
+    with _recording:
+        for note in root.glob(f"??/*/{_USED}"):
+            note.unlink(missing_ok=True)
+        yield record
+        record.folders = tuple(
+            sorted(note.parent.relative_to(root).as_posix() for note in root.glob(f"??/*/{_USED}"))
+        )
+
+
+def packed(folders: tuple[str, ...]) -> bytes:
+    """The files of programs as bytes; empty if there are none."""
+    root = drivers_folder.path()
+    found = {name: (root / name).read_bytes() for name in _files(root, folders)}
+    if not found:
+        return b""
+    index = json.dumps([list(folders), [[name, len(content)] for name, content in found.items()]])
+    return b"".join([MAGIC, index.encode(), b"\n", *found.values()])
+
+
+def is_packed(payload: bytes) -> bool:
+    """Whether it is the result of `packed`."""
+    return payload.startswith(MAGIC)
+
+
+def contents(payload: bytes) -> Iterator[tuple[str, memoryview]]:
+    """The names of the files in the result of `packed`, and what is in them."""
+    start = payload.index(b"\n", len(MAGIC)) + 1
+    for name, size in _index(payload)[1]:
+        yield name, memoryview(payload)[start : start + size]
+        start += size
+
+
+def unpack(payload: bytes) -> None:
+    """Lays the files out for PoCL, but those that are there.
+
+    Raises:
+        FileError: there is no room for them.
+    """
+    root = drivers_folder.path()
+    try:
+        for name, content in contents(payload):
+            target = root / name
+            if not target.exists():
+                target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+                beside = target.with_name(f".new-{threading.get_ident()}")
+                beside.write_bytes(content)
+                os.replace(beside, target)
+    except OSError as error:
+        raise drivers_folder.no_room(error) from error
+
+
+def note(key: str, payload: bytes) -> None:
+    """The cache has `payload`, a result of `packed`, under `key`: see `keep_new`."""
+    folders, files = _index(payload)
+    _kept[key] = tuple(folders), frozenset(name for name, _ in files)
+
+
+def keep_new() -> None:
+    """Adds to the cache what PoCL has made since for programs in it: machine code for another size of work-group."""
+    root = drivers_folder.path() if _kept else Path()
+    for key, (folders, files) in list(_kept.items()):
+        with suppress(OSError):
+            if files.issuperset(_files(root, folders)):
+                continue
+            payload = packed(folders)
+            if payload and cache.store_blob(key, payload):
+                note(key, payload)
+
+
+drivers_folder.users.append(keep_new)
+
+
+def _index(payload: bytes) -> tuple[list[str], list[tuple[str, int]]]:
+    folders, files = json.loads(payload[len(MAGIC) : payload.index(b"\n", len(MAGIC))])
+    names = [*folders, *(name for name, _ in files)]
+    if any(PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts for name in names):
+        raise ValueError("a name leads out of the folder")
+    return folders, [(name, size) for name, size in files]
+
+
+def _files(root: Path, folders: tuple[str, ...]) -> list[str]:
+    """The files of folders, by names that begin at `root`; without empty ones and those that are being written."""
+    found = []
+    for folder in folders:
+        for where, _, names in os.walk(root / folder):
+            for name in names:
+                path = Path(where, name)
+                if not (name.startswith(_UNFINISHED) or name.endswith(_TEMPORARY)) and path.stat().st_size:
+                    found.append(path.relative_to(root).as_posix())
+    return sorted(found)

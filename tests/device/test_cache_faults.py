@@ -1,0 +1,319 @@
+"""Faults of the disk that the cache is on: each is told or healed, and after it everything is as it was.
+
+A full disk is a small one in memory, in a name space of mounts that goes with the process; where the system permits none,
+and beside it, writes are made to fail.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device import cache, drivers_folder, isolate, tune
+from clfractal.device.select import Device, choose, is_pocl
+from clfractal.errors import CacheWarning, DeviceError, FileError, UntriedError
+from clfractal.renderers import lanes
+from clfractal.work import thumbnails
+from tests.interrupts import planes
+from tests.shell import SCENE, Ended, command, environment, process
+
+SECTIONS = ("lanes", "marches", "speeds")
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the scene, its picture, and the cache after it."""
+    folder = tmp_path_factory.mktemp("good")
+    (folder / "scene.yaml").write_text(SCENE)
+    ended = process(
+        ["render", "scene.yaml", "-o", "a.exr"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")}
+    )
+    assert ended.status == 0, ended
+    assert all((folder / "cache" / f"{section}.json").exists() for section in SECTIONS)
+    assert len(list((folder / "cache" / "programs").iterdir())) >= 2
+    return folder
+
+
+def again(good: Path, folder: Path) -> Ended:
+    """Renders the scene with the cache in `folder`; the picture has to be the same."""
+    ended = process(
+        ["render", str(good / "scene.yaml"), "-o", "b.exr", "--quiet"],
+        folder,
+        {"CLFRACTAL_CACHE": str(folder / "cache")},
+    )
+    assert ended.status == 0, ended
+    assert planes(folder / "b.exr") == planes(good / "a.exr")
+    return ended
+
+
+def is_whole(cache_folder: Path, good: Path) -> bool:
+    """Whether nothing in it is damaged, and nothing is missing: the same facts are known, and the programs are there.
+
+    (Another measurement may prefer another lane count, which is another program.)
+    """
+    found = []
+    for each in (cache_folder, good / "cache"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setenv(cache.ENVIRONMENT_VARIABLE, str(each))
+            blobs = [cache.load_blob(entry.stem) for entry in (each / "programs").glob("*.bin")]
+            facts = {section: sorted(cache.recall(section)) for section in SECTIONS}
+            found.append((len(blobs) >= 2, all(blobs), facts))
+    return found[0] == found[1]
+
+
+def _flip(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    path.write_bytes(content)
+
+
+def _cut(path: Path) -> None:
+    os.truncate(path, path.stat().st_size * 2 // 3)
+
+
+def _empty(path: Path) -> None:
+    os.truncate(path, 0)
+
+
+@pytest.mark.parametrize("damage", [_flip, _cut, _empty], ids=["a bit flipped", "cut short", "empty"])
+def test_damaged_programs(good: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
+    shutil.copytree(good / "cache", tmp_path / "cache")
+    for entry in (tmp_path / "cache" / "programs").iterdir():
+        damage(entry)
+    assert again(good, tmp_path).err == ""
+    assert is_whole(tmp_path / "cache", good)
+
+
+def test_damaged_facts(good: Path, tmp_path: Path) -> None:
+    shutil.copytree(good / "cache", tmp_path / "cache")
+    for section, damage in zip(SECTIONS, (_flip, _cut, _empty), strict=True):
+        damage(tmp_path / "cache" / f"{section}.json")
+    assert again(good, tmp_path).err == ""
+    assert is_whole(tmp_path / "cache", good)
+
+
+def test_every_damaged_byte_of_a_program(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(good / "cache", tmp_path / "cache")
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
+    entry = min((tmp_path / "cache" / "programs").iterdir(), key=lambda path: path.stat().st_size)
+    stored = entry.read_bytes()
+    for place in np.random.default_rng(1).integers(len(stored), size=200):
+        entry.write_bytes(stored[:place] + bytes([stored[place] ^ 1]) + stored[place + 1 :])
+        assert cache.load_blob(entry.stem) is None, place
+        entry.write_bytes(stored[:place])
+        assert cache.load_blob(entry.stem) is None, place
+    entry.write_bytes(stored)
+    assert cache.load_blob(entry.stem) is not None
+
+
+@pytest.mark.parametrize("damage", [_flip, _cut, _empty], ids=["a bit flipped", "cut short", "empty"])
+def test_damaged_small_pictures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: Callable[[Path], None]
+) -> None:
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path))
+    pixels = np.random.default_rng(1).integers(0, 255, (thumbnails.SIZE[1], thumbnails.SIZE[0], 3), np.uint8)
+    thumbnails.store("a", pixels)
+    (path,) = (tmp_path / "thumbnails").iterdir()
+    damage(path)
+    assert thumbnails.load("a") is None
+    thumbnails.store("a", pixels)
+    np.testing.assert_array_equal(thumbnails.load("a"), pixels)
+
+
+# In a name space of mounts: renders with a cache on a disk of some KB, then with room; tells how each ended.
+FULL = """
+import json, subprocess, sys
+size, command = sys.argv[1], sys.argv[2:]
+
+def mount(*options):
+    subprocess.run(["mount", *options, "cache"], check=True, capture_output=True)
+
+def run():
+    ended = subprocess.run(command, capture_output=True, text=True)
+    kept = subprocess.run(["sh", "-c", "cd cache && find . -type f -size +0"], capture_output=True, text=True)
+    return [ended.returncode, ended.stderr, sorted(kept.stdout.split())]
+
+mount("-t", "tmpfs", "-o", f"size={size}", "tmpfs")
+told = [run()]
+mount("-o", "remount,size=64m")
+told += [run(), run()]
+subprocess.run(["cp", "-r", "cache", "kept"], check=True)
+print(json.dumps(told))
+"""
+
+
+def _mounts() -> list[str] | None:
+    """How a process gets a name space in which it may mount; None if it may not."""
+    for how in (["unshare", "-m"], ["unshare", "-r", "-m"]):
+        if shutil.which("unshare") and shutil.which("mount"):
+            tried = [*how, "sh", "-c", f"mount -t tmpfs tmpfs {tempfile.gettempdir()}"]
+            if subprocess.run(tried, capture_output=True, check=False).returncode == 0:
+                return how
+    return None
+
+
+@pytest.mark.parametrize("size", ["4k", "300k"])
+def test_a_full_disk(good: Path, tmp_path: Path, size: str) -> None:
+    how = _mounts()
+    if how is None:
+        pytest.skip("this system lets nobody mount a small disk; writes that fail are tried beside it")
+    (tmp_path / "cache").mkdir()
+    render = [*command("render", good / "scene.yaml", "-o", "b.exr")]
+    ended = subprocess.run(
+        [*how, sys.executable, "-c", FULL, size, *render],
+        cwd=tmp_path,
+        env=environment({"CLFRACTAL_CACHE": str(tmp_path / "cache")}),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    full, healed, warm = json.loads(ended.stdout)
+    assert [run[0] for run in (full, healed, warm)] == [0, 0, 0], (full, healed, warm)
+    told = [line for line in full[1].splitlines() if "the cache folder" in line]
+    assert len(told) == 1, full[1]
+    assert str(tmp_path / "cache") in told[0]
+    assert "No space left on device" in told[0]
+    assert "the cache folder" not in healed[1]
+    assert healed[2] == warm[2]
+    assert "measuring" not in warm[1]
+    assert is_whole(tmp_path / "kept", good)
+    assert planes(tmp_path / "b.exr") == planes(good / "a.exr")
+
+
+def no_space(*_: object, **__: object) -> Any:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty cache, and a device that has loaded nothing."""
+    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setattr(cache, "_told", set())
+    choose().loaded.clear()
+    yield tmp_path / "cache"
+    choose().loaded.clear()
+
+
+def test_no_space_for_programs(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from clfractal.device.program import build
+
+    device, text = choose(), "__kernel void one(__global int *a) { a[0] = 1; }"
+    with monkeypatch.context() as patch:
+        patch.setattr(cache, "_replace", no_space)
+        with pytest.warns(
+            CacheWarning, match="takes nothing more: No space left on device; working without it"
+        ):
+            assert not build(device, text, flags=()).cached
+    assert not list(here.rglob("*.bin"))
+    device.loaded.clear()
+    build(device, text, flags=())
+    device.loaded.clear()
+    assert build(device, text, flags=()).cached
+
+
+def test_no_space_for_facts(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(cache, "_replace", no_space)
+        with pytest.warns(CacheWarning, match="No space left on device"):
+            cache.remember("lanes", "a", 1)
+    assert cache.recall("lanes") == {}
+    cache.remember("lanes", "a", 1)
+    assert cache.recall("lanes") == {"a": 1}
+
+
+def test_no_space_for_what_drivers_write(here: Path, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is no fault of the device, and the cache keeps what it has."""
+    from clfractal.device.program import build
+
+    if not is_pocl(device.info):
+        pytest.skip("this driver writes no files")
+    text = "__kernel void two(__global int *a) { a[0] = 2; }"
+    build(device, text, flags=())
+    (entry,) = here.rglob("*.bin")
+    device.loaded.clear()
+    shutil.rmtree(drivers_folder.path())
+    drivers_folder.path().mkdir()
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", no_space)
+        with pytest.raises(
+            FileError, match=r"has no room for temporary files: No space left on device$"
+        ) as caught:
+            build(device, text, flags=())
+    assert str(drivers_folder.path().parent) in str(caught.value)
+    assert entry.exists()
+    assert build(device, text, flags=()).cached
+
+
+@pytest.mark.parametrize("of_the_device", [False, True])
+def test_only_what_a_device_does_is_remembered(
+    here: Path, device: Device, monkeypatch: pytest.MonkeyPatch, of_the_device: bool
+) -> None:
+    kind = DeviceError if of_the_device else UntriedError
+
+    def fail(*_: object, **__: object) -> Any:
+        raise kind("aborted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(isolate, "run", fail)
+        patch.setattr(lanes, "_reports", {})
+        with pytest.raises(DeviceError, match=r"no kernel works on this device: 1\d? lanes: aborted$"):
+            lanes.march_reports(device, "float32")
+    assert bool(cache.recall("lanes")) == of_the_device
+    assert tune.is_of_the_device(kind("x")) == of_the_device
+
+
+def test_a_full_disk_under_the_driver_is_not_the_driver_s_fault(
+    here: Path, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It aborts, or fails in any other way; the disk is looked at afterwards."""
+    monkeypatch.setenv("CLFRACTAL_TEST_ABORT", "trying 1")
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", no_space)
+        with pytest.raises(FileError, match="has no room for temporary files: No space left on device"):
+            tune.lane_reports(device, "float32", (1,))
+    assert cache.recall("lanes") == {}
+    assert "aborted (signal 6)" in tune.lane_reports(device, "float32", (1,))[0].fault
+    assert len(cache.recall("lanes")) == 1
+
+
+def test_a_cache_that_cannot_be_written(good: Path, tmp_path: Path) -> None:
+    """Another folder serves, which is named; with the folder there again everything is as before."""
+    (tmp_path / "cache").write_bytes(b"")
+    (tmp_path / "tmp").mkdir()
+    extra = {"CLFRACTAL_CACHE": str(tmp_path / "cache"), "TMPDIR": str(tmp_path / "tmp")}
+    ended = process(
+        ["render", str(good / "scene.yaml"), "-o", "b.exr"], tmp_path, {**extra, "CLFRACTAL_LANES": "1"}
+    )
+    assert ended.status == 0, ended
+    assert f"the cache folder {str(tmp_path / 'cache')!r} cannot be used: " in ended.err
+    (tmp_path / "cache").unlink()
+    shutil.copytree(good / "cache", tmp_path / "cache")
+    assert again(good, tmp_path).err == ""
+
+
+def test_processes_that_fill_one_cache_at_once(good: Path, tmp_path: Path) -> None:
+    shutil.copytree(good / "cache", tmp_path / "cache")
+    shutil.rmtree(tmp_path / "cache" / "programs")
+    extra = environment({"CLFRACTAL_CACHE": str(tmp_path / "cache")})
+    running = [
+        subprocess.Popen(
+            command("render", good / "scene.yaml", "-o", f"{n}.exr", "-q"),
+            cwd=tmp_path,
+            env=extra,
+        )
+        for n in range(3)
+    ]
+    assert [each.wait(240) for each in running] == [0, 0, 0]
+    assert all(planes(tmp_path / f"{n}.exr") == planes(good / "a.exr") for n in range(3))
+    assert is_whole(tmp_path / "cache", good)
