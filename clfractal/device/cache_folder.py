@@ -67,9 +67,12 @@ def _usable(wanted: str, is_chosen: bool) -> Path:
     return found
 
 
-def private_temporary() -> Path:
+def private_temporary(within: str = "") -> Path:
     """A folder in the system's temporary one that nobody else can write into: always the same one for a user, if nobody
     took its name.
+
+    Args:
+        within: instead of the system's temporary folder.
 
     Raises:
         OSError: none can be made.
@@ -79,13 +82,13 @@ def private_temporary() -> Path:
         own = os.getuid()
     user = "" if own < 0 else f"-{own}"
     with suppress(OSError):
-        path = Path(tempfile.gettempdir(), f"clfractal-cache{user}")
+        path = Path(within or tempfile.gettempdir(), f"clfractal-cache{user}")
         path.mkdir(mode=0o700, exist_ok=True)
         status = path.lstat()
         is_ours = own < 0 or (status.st_uid == own and not status.st_mode & 0o022)
         if stat.S_ISDIR(status.st_mode) and is_ours and not problem(str(path)):
             return path
-    return Path(tempfile.mkdtemp(prefix="clfractal-"))
+    return Path(tempfile.mkdtemp(prefix="clfractal-", dir=within or None))
 
 
 def _temporary(wanted: str, reason: str) -> Path:

@@ -14,6 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 
 from clfractal.device import cache, drivers_folder
+from clfractal.files import system
 
 MAGIC = b"clfractal-files-1\n"
 _USED = "last_accessed"
@@ -78,14 +79,31 @@ def unpack(payload: bytes) -> None:
     root = drivers_folder.path()
     try:
         for name, content in contents(payload):
-            target = root / name
-            if not target.exists():
-                target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-                beside = target.with_name(f".new-{threading.get_ident()}")
-                beside.write_bytes(content)
-                os.replace(beside, target)
+            _lay_out(f"{root}/{name}", content)
     except OSError as error:
         raise drivers_folder.no_room(error) from error
+
+
+def _lay_out(path: str, content: memoryview) -> None:
+    """Writes a file for PoCL, whole before it has its name; plain system calls, since every start waits for them."""
+    if os.path.exists(path):
+        return
+    beside = f"{path}.{threading.get_ident()}.tmp"
+    try:
+        descriptor = os.open(beside, system.CREATE, 0o700)
+    except FileNotFoundError:
+        os.makedirs(os.path.dirname(path), mode=0o700, exist_ok=True)
+        descriptor = os.open(beside, system.CREATE, 0o700)
+    try:
+        try:
+            system.write_at(descriptor, [bytes(content)], 0)
+        finally:
+            os.close(descriptor)
+        os.replace(beside, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(beside)
+        raise
 
 
 def note(key: str, payload: bytes) -> None:
@@ -119,11 +137,15 @@ def _index(payload: bytes) -> tuple[list[str], list[tuple[str, int]]]:
 
 def _files(root: Path, folders: tuple[str, ...]) -> list[str]:
     """The files of folders, by names that begin at `root`; without empty ones and those that are being written."""
-    found = []
-    for folder in folders:
-        for where, _, names in os.walk(root / folder):
-            for name in names:
-                path = Path(where, name)
-                if not (name.startswith(_UNFINISHED) or name.endswith(_TEMPORARY)) and path.stat().st_size:
-                    found.append(path.relative_to(root).as_posix())
+    found: list[str] = []
+    waiting = list(folders)
+    while waiting:
+        folder = waiting.pop()
+        with suppress(FileNotFoundError), os.scandir(root / folder) as entries:
+            for entry in entries:
+                name = f"{folder}/{entry.name}"
+                if entry.is_dir(follow_symlinks=False):
+                    waiting.append(name)
+                elif not (entry.name.startswith(_UNFINISHED) or entry.name.endswith(_TEMPORARY)):
+                    found += [name] if entry.stat().st_size else []
     return sorted(found)

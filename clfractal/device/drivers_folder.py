@@ -4,8 +4,9 @@ PoCL keeps programs as files and believes what it finds there: a file that was c
 ends the process by a signal, at every start. So what PoCL writes stays within a process. The cache keeps copies that have a
 check sum (`driver_files.py`), and a process gets those that it needs.
 
-The folder is in the system's temporary one, which is on this machine where homes are on a network; else, if that has no
-room or may not hold programs, in the cache. A process that was killed leaves its folder; the next one takes it away.
+The folder is in memory where the system has such files, or in its temporary folder, which is on this machine where
+homes are on a network; else, if these have no room or may not hold programs, in the cache. A process that was killed
+leaves its folder; the next one takes it away.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ LEAST_ROOM = 32 << 20
 _RUNNING = "running"  # within our own folders
 _PREFIX = "clfractal-"
 _LOCK = ".lock"
+_MEMORY = "/dev/shm"
 _ABANDONED_S = 3600.0
 # What a failure is looked into with; a program of all features takes less.
 _TRIAL_BYTES = 8 << 20
@@ -50,7 +52,7 @@ class _Folder:
         self.process = os.getpid()
 
     def remove(self) -> None:
-        shutil.rmtree(self.path, ignore_errors=True)
+        _empty(str(self.path))
         if self.lock is None:
             return
         if not system.RENAMES_OPEN_FILES:
@@ -199,8 +201,8 @@ def _is_chosen() -> bool:
 def _bases() -> Iterator[Path]:
     """Where it may be made, the best place first: one that suits; else where there is most room."""
     left = []
-    for find in (cache_folder.private_temporary, cache_folder.folder):
-        with suppress(OSError):
+    for find in (_in_memory, cache_folder.private_temporary, cache_folder.folder):
+        with suppress(OSError, FileError):
             base = find() / _RUNNING
             base.mkdir(exist_ok=True)
             if _may_run_programs(base) and _room(base) >= LEAST_ROOM:
@@ -254,6 +256,20 @@ def _sweep(base: Path, prefix: str) -> None:
                     shutil.rmtree(base / name, ignore_errors=True)
 
 
+def _empty(folder: str) -> None:
+    """Removes a folder that only this user can write into. (`shutil.rmtree` guards against others, and takes five times as
+    long; every process waits for it at its end.)"""
+    with suppress(OSError):
+        with os.scandir(folder) as entries:
+            for entry in entries:
+                if entry.is_dir(follow_symlinks=False):
+                    _empty(entry.path)
+                else:
+                    with suppress(OSError):
+                        os.unlink(entry.path)
+        os.rmdir(folder)
+
+
 def _lock_of(folder: Path) -> Path:
     return folder.with_name(folder.name + _LOCK)
 
@@ -268,6 +284,18 @@ def _room(base: Path) -> int:
     with suppress(OSError):
         return shutil.disk_usage(base).free
     return 0
+
+
+def _in_memory() -> Path:
+    """On Linux a file system in memory, where nobody has named another place: on a disk the folders take longer to make and
+    remove than all else here.
+
+    Raises:
+        OSError: there is none.
+    """
+    if any(os.environ.get(name) for name in ("TMPDIR", "TEMP", "TMP")) or not os.path.isdir(_MEMORY):
+        raise FileNotFoundError(_MEMORY)
+    return cache_folder.private_temporary(_MEMORY)
 
 
 def _may_run_programs(base: Path) -> bool:

@@ -34,6 +34,7 @@ time.sleep(600)
 def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A temporary folder of the test's own, and a process that has made no folder yet."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "tmp"))
+    monkeypatch.setattr(drivers_folder, "_MEMORY", str(tmp_path / "none"))
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
     monkeypatch.delenv(drivers_folder.POCL_VARIABLE, raising=False)
     monkeypatch.setattr(drivers_folder, "_own", None)
@@ -117,11 +118,24 @@ def test_it_is_in_the_cache_where_the_temporary_folder_does_not_serve(
         monkeypatch.setattr(drivers_folder, "_may_run_programs", lambda base: not is_temporary(base))
     else:
 
-        def fail() -> Path:
+        def fail(_: str = "") -> Path:
             raise OSError(28, "No space left on device")
 
         monkeypatch.setattr(cache_folder, "private_temporary", fail)
     assert drivers_folder.path().is_relative_to(fresh / "cache")
+
+
+def test_memory_comes_first_where_no_other_place_is_named(
+    fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (fresh / "memory").mkdir()
+    monkeypatch.setattr(drivers_folder, "_MEMORY", str(fresh / "memory"))
+    for name in ("TMPDIR", "TEMP", "TMP"):
+        monkeypatch.delenv(name, raising=False)
+    assert drivers_folder.path().is_relative_to(fresh / "memory")
+    drivers_folder.remove()
+    monkeypatch.setenv("TMPDIR", str(fresh / "tmp"))
+    assert drivers_folder.path().is_relative_to(fresh / "tmp")
 
 
 def test_little_room_everywhere(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,7 +151,7 @@ def test_a_chosen_folder(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_folder_at_all(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail() -> Path:
+    def fail(_: str = "") -> Path:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(cache_folder, "private_temporary", fail)
