@@ -169,16 +169,17 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 #endif
 }
 
-// Paths that come from below the boundary of their spot leave the medium there; the result says which.
-INLINE mask path_comes_out(int bounce, carried *with, const spot *here, mask lands, world w) {
+// Paths that come from below the boundary of their spot leave the medium there; the result says which. All others see the spot from
+// outside: its normal faces them.
+INLINE mask path_comes_out(int bounce, carried *with, spot *here, vec direction, mask lands, world w) {
+    mask emerges = lands & ~lands;
 #if HAS_SUBSURFACE
-    const mask emerges = lands & path_emerges(bounce, with, here, w);
+    emerges = lands & path_emerges(bounce, with, here, w);
     media_leave(with, body_of(with->medium), emerges);
     if (any_lane(emerges)) media_found(with, medium_of(with->medium, w), emerges);
-    return emerges;
-#else
-    return lands & ~lands;
 #endif
+    here->normal = vec_pick(emerges, here->normal, facing(here->normal, direction));
+    return emerges;
 }
 
 // How wide a path is from a spot on: as a pixel there, and as fast as the pixel grows before the first spot.

@@ -20,8 +20,7 @@ STAGE(scatter_paths) {
     const carried within = with;
     with.awaited = color_of(R(0.0), R(0.0), R(0.0));
     so_far.on_path = number_of(lands);
-    const mask emerges = path_comes_out(bounce, &with, &found, lands, w);
-    found.normal = vec_pick(emerges, found.normal, facing(found.normal, arrived.direction));
+    const mask emerges = path_comes_out(bounce, &with, &found, arrived.direction, lands, w);
     ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
     color reflects = color_of(R(1.0), R(1.0), R(1.0));

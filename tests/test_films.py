@@ -220,7 +220,7 @@ animation: {frames: 2, tracks: {camera.position.0: {expression: u}}}
         Path("beside.mkv").unlink()
     # A film that is interrupted between its kinds of frames goes on.
     Path("beside.mkv.partial").mkdir()
-    Path("beside.mkv.partial/000001.8.png").write_bytes(b"cut short")
+    Path("beside.mkv.partial/000001.8.png").write_bytes(Path("p_1.png").read_bytes()[:100])
     assert clf("animate", "dim.yaml", "-o", "beside.mkv", "-o", "a.mov", "--resume").status == 0
 
 

@@ -77,9 +77,7 @@ def private_temporary(within: str = "") -> Path:
     Raises:
         OSError: none can be made.
     """
-    own = -1
-    if sys.platform != "win32":
-        own = os.getuid()
+    own: int = getattr(os, "getuid", lambda: -1)()  # Windows has no numbers of users
     user = "" if own < 0 else f"-{own}"
     with suppress(OSError):
         path = Path(within or tempfile.gettempdir(), f"clfractal-cache{user}")

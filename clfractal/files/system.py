@@ -38,8 +38,10 @@ def file_size_limit() -> int | None:
     """The most bytes that this process may write into one file (`ulimit -f`); None: as many as there is room for."""
     if sys.platform == "win32":
         return None
-    import resource
-
+    try:
+        import resource
+    except ImportError:  # a Python without it
+        return None
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     return None if limit == resource.RLIM_INFINITY else limit
 

@@ -248,8 +248,8 @@ class TestCost:
         self.pair(stereo_scene(kind), device)
         entry = "STAGE(march_rays)" if kind in ("surface", "planes") else f"kernel void {kind}("
         pictures = [text for text in texts if entry in text]
-        assert len(pictures) == 2
-        assert len(set(pictures)) == 1
+        # (The second eye's is loaded when it is wanted, and need not be built.)
+        assert len(pictures) == 1
         assert len(made) == len(set(texts))
 
     def test_one_grid(self, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
