@@ -99,9 +99,16 @@ def test_a_frame_of_random_bytes_is_missing_and_told(clf: InProcess, name: str) 
     told = f"{name}: is no picture, as its name says; remove it, or render without --resume"
     assert clf(*order, "--resume").is_one_line(2, told)
     assert Path(name).read_bytes() == noise
-    Path(name).unlink()
+    Path(name).write_bytes(bytes(5000))  # as a power failure leaves it
+    assert clf(*order, "--missing").out.split() == ["1"]
     assert clf(*order, "--resume").status == 0
     assert clf(*order, "--missing").out == ""
+
+
+def test_what_is_no_frame_is_told_before_any_is_rendered(clf: InProcess) -> None:
+    Path("f_5.png").write_text("notes")
+    assert clf("animate", "scene.yaml", "-o", "f_#.png", "--resume").is_one_line(2, "f_5.png: is no picture")
+    assert not Path("f_0.png").exists()
 
 
 def test_a_damaged_frame_is_told_with_advice(clf: InProcess) -> None:

@@ -43,10 +43,11 @@ def _runs_everywhere() -> bool:
     if frame is None:
         return False
     try:
-        lines = ast.parse(Path(file).read_bytes()).body
+        module = ast.parse(Path(file).read_bytes())
     except (OSError, SyntaxError, ValueError):
         return False
-    before = [each for each in lines if each.lineno <= frame.f_lineno and isinstance(each, ast.If)]
+    # (One may stand within a `try` or a `with`.)
+    before = [each for each in ast.walk(module) if isinstance(each, ast.If) and each.lineno <= frame.f_lineno]
     return not any(
         isinstance(part, ast.Name) and part.id == _NAME for each in before for part in ast.walk(each.test)
     )

@@ -159,8 +159,24 @@ def _render_frames(
     with speaking_of(order.scene), doing("checking all frames"):
         for number in files:
             movement_of(scene).scene(number)
+    if order.resume:
+        _check_pictures(scene, files)
     with engine_of(order, shell) as engine:
         return _render_on(engine, order, scene, files, begun, kept, shell)
+
+
+def _check_pictures(scene: Scene, files: Mapping[int, tuple[Path, ...]]) -> None:
+    """Makes sure that no frame's file is somebody else's, before any is rendered.
+
+    Raises:
+        FileError: one of them is no picture.
+    """
+    from clfractal.pictures.outputs import output_files
+
+    for paths in files.values():
+        for file in (each for path in paths for each in output_files(scene.stereo, path)):
+            if is_foreign(file):
+                raise FileError(f"is no picture, as its name says; {_ADVICE}", Where(str(file)))
 
 
 def _render_on(
@@ -274,9 +290,6 @@ def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path, int]) -> bo
         for path in paths
         for file in output_files(scene.stereo, path)
     }
-    for file in files:
-        if is_foreign(file):
-            raise FileError(f"is no picture, as its name says; {_ADVICE}", Where(str(file)))
     there = [file for file in files if is_whole(file)]
     wanted = job.header()["scene"]
     for file in there:

@@ -14,6 +14,7 @@ from clfractal.files.regular import decode, read_bytes
 MAX_TABLE_BYTES = 64_000_000
 # Of a frame: seconds in tables are rounded.
 _TOLERANCE = 0.25
+_MOST_FRAMES = 1e9
 
 
 def read_columns(path: Path, wanted: Mapping[str, None], name: str, fps: float) -> dict[str, list[float]]:
@@ -64,7 +65,11 @@ def _frame(row: list[str], place: int, title: str, fps: float, where: Where) -> 
     """The frame that a row says it belongs to."""
     number = _number(row, place, title, where)
     frame = number * fps if title == "time" else number
-    if frame < -_TOLERANCE or abs(frame - round(frame)) > (_TOLERANCE if title == "time" else 0):
+    # (What is beyond all films may be beyond whole numbers, too.)
+    is_one = -_TOLERANCE <= frame <= _MOST_FRAMES and abs(frame - round(frame)) <= (
+        _TOLERANCE if title == "time" else 0
+    )
+    if not is_one:
         what = f"of {fps:g} a second" if title == "time" else "counted from 0"
         raise FileError(f"column {title!r} must tell a frame {what}, got {row[place].strip()[:40]!r}", where)
     return round(frame)

@@ -59,6 +59,8 @@ def is_whole(path: Path) -> bool:
 def is_foreign(path: Path) -> bool:
     """Whether a file is there that was never such a picture, cut short or not, as its name says: notes, or random bytes.
 
+    Zeros, which a power failure leaves in the place of a file, are nobody's.
+
     Raises:
         FileError: it cannot be read.
     """
@@ -70,7 +72,7 @@ def is_foreign(path: Path) -> bool:
             start = stream.read(len(signature))
         except OSError as error:
             raise file_error(path, "cannot be read", error) from error
-    return not signature.startswith(start)
+    return bool(start.strip(b"\0")) and not signature.startswith(start)
 
 
 def _is_whole_exr(path: Path) -> bool:

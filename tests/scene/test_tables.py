@@ -38,6 +38,7 @@ TABLES = {
     "frame,bass\n0,1\n0.5,1\n": "sound.csv:3: column 'frame' must tell a frame counted from 0, got '0.5'",
     "frame,bass\n-1,1\n": "sound.csv:2: column 'frame' must tell a frame counted from 0, got '-1'",
     "frame,bass\nnan,1\n": "sound.csv:2: column 'frame' must hold finite numbers, got 'nan'",
+    "time,bass\n0,1\n1e308,1\n": "sound.csv:3: column 'time' must tell a frame of 30 a second, got '1e308'",
     "time,bass\n0,1\n0.2,1\n": "sound.csv:3: column 'time' leaves out frame 1, before frame 6",
     "time,bass\n0,1\n0.05,1\n": "sound.csv:3: column 'time' must tell a frame of 30 a second, got '0.05'",
 }

@@ -179,6 +179,7 @@ def test_a_program_without_its_guard_is_told_in_a_line(line: str, tmp_path: Path
         "if __name__ == '__main__':\n    check_main('local:2')\n",
         "def work():\n    check_main('local:2')\nif '__main__' == __name__:\n    work()\n",
         "if __name__ != '__main__':\n    raise SystemExit\ncheck_main('local:2')\n",
+        "try:\n    if __name__ == '__main__':\n        check_main('local:2')\nfinally:\n    pass\n",
     ],
 )
 def test_a_program_with_a_guard_may_start_processes(text: str, tmp_path: Path) -> None:
