@@ -296,8 +296,9 @@ class Viewer:
         return {} if wide is None else {"screen_width": round(wide, 4)}
 
     def _mind_comfort(self) -> None:
-        """Warns of a pair that strains the eyes, as of one that is written to a file."""
-        if self.controls.dragging or self.motion.active or self.player.playing:
+        """Warns of a pair that strains the eyes, as of one that is written to a file; a shot is of the picture."""
+        moves = self.controls.dragging or self.motion.active or self.player.playing
+        if moves or self.files.options.shot is not None:
             return
         warning = self.depth_range.look(self.surface.shown)
         if warning:
