@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands.film_parts import Part, frame_file
+from clfractal.commands.film_parts import Part
 from clfractal.errors import SceneError
 from clfractal.files.exr import read_exr
+from clfractal.files.frame_names import frame_file
 from clfractal.work import run as work
 from tests.shell import InProcess, command, environment
 

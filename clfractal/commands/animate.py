@@ -14,14 +14,12 @@ from clfractal.commands.engines import engine_of, shares_of
 from clfractal.commands.film_parts import (
     Part,
     check_pattern,
-    frame_file,
-    is_film,
     missing,
     ranges,
     shown_ranges,
 )
 from clfractal.commands.kept import Kept
-from clfractal.commands.order import PARTIAL, naming_options
+from clfractal.commands.order import naming_options
 from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
@@ -30,6 +28,7 @@ from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
 from clfractal.files.film_kinds import Recipe
+from clfractal.files.frame_names import PARTIAL, frame_file, is_film
 from clfractal.files.whole import is_foreign, is_whole
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of

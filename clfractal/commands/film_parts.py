@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from clfractal.errors import FileError, SceneError, Where
-from clfractal.files.film_kinds import CONTAINERS
+from clfractal.files.frame_names import is_film, split_pattern
 from clfractal.files.whole import is_whole
 
 _MOST_DIGITS = 12
@@ -44,17 +44,6 @@ class Part:
         return range(first, last + 1, step)
 
 
-def is_film(path: Path) -> bool:
-    """Whether a file is a film, by its name."""
-    return path.suffix.lower() in CONTAINERS
-
-
-def frame_file(pattern: Path, number: int) -> Path:
-    """The file of a frame: its number stands for the last row of `#` in the pattern's name, with as many digits or more."""
-    head, signs, tail = _split(pattern.name)
-    return pattern.with_name(f"{head}{number:0{len(signs)}d}{tail}")
-
-
 def check_pattern(path: Path) -> None:
     """Raises FileError if a file that is no film has no place for the frame's number."""
     where = Where(str(path))
@@ -63,7 +52,7 @@ def check_pattern(path: Path) -> None:
     if "#" not in path.name:
         example = f"{path.stem}_####{path.suffix}"
         raise FileError(f"must have # where the frame's number goes, such as {example}", where)
-    if len(_split(path.name)[1]) > _MOST_DIGITS:
+    if len(split_pattern(path.name)[1]) > _MOST_DIGITS:
         raise FileError(f"must have at most {_MOST_DIGITS} # in a row", where)
 
 
@@ -99,9 +88,3 @@ def shown_ranges(numbers: Sequence[int]) -> str:
     found = list(ranges(numbers))
     left = f" and {len(found) - _MOST_RANGES} more" if len(found) > _MOST_RANGES else ""
     return ", ".join(found[:_MOST_RANGES]) + left
-
-
-def _split(name: str) -> tuple[str, str, str]:
-    found = re.fullmatch(r"(.*?)(#+)([^#]*)", name, re.DOTALL)
-    assert found is not None
-    return found[1], found[2], found[3]

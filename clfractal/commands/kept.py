@@ -8,12 +8,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from clfractal.commands.film_parts import frame_file
-from clfractal.commands.order import PARTIAL
 from clfractal.commands.shell import Shell
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.files.atomic import file_error
+from clfractal.files.frame_names import frame_file, kept_folder, kept_patterns
 
 if TYPE_CHECKING:
     from clfractal.files.moving import Plan
@@ -39,8 +38,7 @@ class Kept:
         self._films, self._shell, self._resume = tuple(films), shell, resume
         self._folder: Path | None = None
         if films:
-            first = films[0].path
-            self._folder = first.with_name(first.name + PARTIAL)
+            self._folder = kept_folder(films[0].path)
 
     @property
     def patterns(self) -> Mapping[int, Path]:
@@ -51,8 +49,7 @@ class Kept:
         if self._folder is None:
             return {}
         kinds = sorted({16 if film.bits > 8 else 8 for film in self._films}, reverse=True)
-        names = ("######.png", "######.8.png")
-        return {bits: self._folder / name for bits, name in zip(kinds, names, strict=False)}
+        return dict(zip(kinds, kept_patterns(self._films[0].path), strict=False))
 
     def at(self, number: int) -> dict[Path, int]:
         """The files of a kept frame, and the bits of each."""

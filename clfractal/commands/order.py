@@ -9,9 +9,6 @@ from pathlib import Path
 
 from clfractal.errors import SceneError, Where
 
-PARTIAL = ".partial"
-"""Suffix of the file for unfinished work, added to the first output's name."""
-
 
 @dataclass(frozen=True, slots=True)
 class Order:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clfractal.commands.engines import engine_of, shares_of
-from clfractal.commands.order import PARTIAL as PARTIAL
 from clfractal.commands.order import Order as Order
 from clfractal.commands.order import naming_options
 from clfractal.commands.pipes import STREAM, is_stream, piped

@@ -9,12 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clfractal.commands.order import PARTIAL, naming_options
+from clfractal.commands.order import naming_options
 from clfractal.commands.pipes import piped, refuse_stream
 from clfractal.commands.progress import shown_rate
 from clfractal.commands.render import Order, ordered_scene
 from clfractal.commands.shell import Shell
 from clfractal.errors import SceneError, Where
+from clfractal.files.frame_names import PARTIAL
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene

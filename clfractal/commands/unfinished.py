@@ -8,8 +8,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from clfractal.commands.order import PARTIAL
 from clfractal.commands.shell import Shell
+from clfractal.files.frame_names import PARTIAL
 from clfractal.pictures.compose import Side
 from clfractal.pictures.store import JournalFilm
 from clfractal.scene.model import Scene
