@@ -11,23 +11,27 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from clfractal.errors import FileError, Where
-from clfractal.files.film_kinds import CONTAINERS
+from clfractal.files.frame_names import frame_file, frames_there, is_film, kept_patterns
+from clfractal.pictures.outputs import output_files
+from clfractal.scene.stereo import Stereo
 
-PARTIAL = ".partial"
-"""What a film's name gets for the folder with its frames, until it is whole."""
-
+# Seconds that a process has to end by itself.
 _PATIENCE = 3.0
 # Seconds between two looks at how far a film is.
 _LOOK_SECONDS = 0.5
 # How much a film gives way to the window where both want the same processor.
 _NICE = 10
 _TOLD = 300
+
+Stamp = tuple[int, ...]
+"""When a frame's files were written, nanoseconds: it tells them from others of the same names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +47,7 @@ class FilmOrder:
         size: pixels; None: the scene's.
         samples: for a pixel; None: the scene's.
         options: more of `clfractal animate`, such as the codec.
+        stereo: how the scene shows two eyes: some ways have a picture of each.
     """
 
     text: str
@@ -54,28 +59,27 @@ class FilmOrder:
     size: tuple[int, int] | None = None
     samples: int | None = None
     options: tuple[str, ...] = ()
+    stereo: Stereo | None = None
 
     @property
     def count(self) -> int:
         """How many frames."""
         return self.last - self.first + 1
 
-    def frame(self, number: int) -> Path:
-        """The file of a frame: of a film the one that is kept until the film is whole."""
-        if self.output.suffix.lower() in CONTAINERS:
-            return self.output.with_name(self.output.name + PARTIAL) / f"{number:06d}.png"
-        head, _, tail = self.output.name.rpartition("#")
-        signs = len(head) - len(head.rstrip("#")) + 1
-        return self.output.with_name(f"{head.rstrip('#')}{number:0{signs}d}{tail}")
+    @property
+    def patterns(self) -> list[Path]:
+        """The files of a frame, with # for its number: of a film the one that is kept until the film is whole."""
+        if is_film(self.output):
+            return [kept_patterns(self.output)[0]]
+        return output_files(self.stereo, self.output)
 
-    def done(self) -> int:
-        """How many of its frames are there."""
-        # One look at the folder: a film may have tens of thousands.
-        try:
-            there = {entry.name for entry in os.scandir(self.frame(self.first).parent)}
-        except OSError:
-            return 0
-        return sum(self.frame(number).name in there for number in range(self.first, self.last + 1))
+    def there(self) -> dict[int, tuple[str, ...]]:
+        """The files of the frames that are there, by their numbers."""
+        return frames_there(self.patterns, range(self.first, self.last + 1))
+
+    def stamp(self, number: int) -> Stamp | None:
+        """When a frame's files were written; None: one of them is not there."""
+        return _stamp([str(frame_file(pattern, number)) for pattern in self.patterns])
 
     def command(self, *, resume: bool) -> list[str]:
         """The shell's command; the scene comes from standard input."""
@@ -88,12 +92,19 @@ class FilmOrder:
         return [*found, "--resume"] if resume else found
 
 
+def _stamp(files: Iterable[str]) -> Stamp | None:
+    try:
+        return tuple(os.stat(file).st_mtime_ns for file in files)
+    except OSError:
+        return None
+
+
 class RenderedFilm:
     """A film that is rendered, or waits for its turn.
 
     Attributes:
         order: what is wanted.
-        done: frames that are there.
+        done: frames of it that are there; of an earlier run only if that is continued.
         remaining: seconds that are left; None: it is not known yet.
         problem: why it failed, or empty.
         written: whether it is whole.
@@ -108,15 +119,22 @@ class RenderedFilm:
         self.written = self.cancelled = False
         self._process: subprocess.Popen[bytes] | None = None
         self._told: IO[bytes] | None = None
+        self._end_by: float | None = None  # when a process that is to end is killed
+        self._old: dict[int, Stamp | None] = {}  # frames of an earlier run, which are replaced
         self._looked = 0.0
         self._since: tuple[float, int] | None = (
             None  # when the first frame of this run was there, and how many then were
         )
 
     @property
+    def under_way(self) -> bool:
+        """Whether it waits or is rendered, and is to become whole."""
+        return not (self.written or self.cancelled or self.problem)
+
+    @property
     def finished(self) -> bool:
-        """Whether nothing more happens to it."""
-        return self.written or self.cancelled or bool(self.problem)
+        """Whether nothing more happens to it: a film that was cancelled still writes until its process has ended."""
+        return not (self.under_way or self.running)
 
     @property
     def running(self) -> bool:
@@ -125,21 +143,24 @@ class RenderedFilm:
 
     def start(self) -> None:
         """Starts its process."""
-        self._told = tempfile.TemporaryFile()  # noqa: SIM115 (until the process has ended)
-        low = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+        if not self._resume:
+            self._old = {number: _stamp(files) for number, files in self.order.there().items()}
         try:
-            self._process = subprocess.Popen(
-                self.order.command(resume=self._resume),
-                cwd=self.order.folder,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL,
-                stderr=self._told,
-                creationflags=low,
-            )
-            assert self._process.stdin is not None
-            with suppress(BrokenPipeError):
-                self._process.stdin.write(self.order.text.encode())
-                self._process.stdin.close()
+            self._told = tempfile.TemporaryFile()  # noqa: SIM115 (until the process has ended)
+            # A file: a pipe would be full after some pages of text, and the window would wait for the process to read.
+            with tempfile.TemporaryFile() as text:
+                text.write(self.order.text.encode())
+                text.seek(0)
+                self._process = subprocess.Popen(
+                    self.order.command(resume=self._resume),
+                    cwd=self.order.folder,
+                    stdin=text,
+                    stdout=subprocess.DEVNULL,
+                    stderr=self._told,
+                    # On Windows it would open a console.
+                    creationflags=getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+                    | getattr(subprocess, "CREATE_NO_WINDOW", 0),
+                )
         except OSError as error:
             self._end(str(FileError(f"cannot be rendered: {error.strerror}", Where(str(self.order.output)))))
             return
@@ -153,23 +174,19 @@ class RenderedFilm:
         if process is None:
             return
         status = process.poll()
-        if status is None and now - self._looked < _LOOK_SECONDS:
-            return
-        self._looked = now
-        if status is None:
+        if status is not None:
+            self._ended(status)
+        elif now - self._looked >= _LOOK_SECONDS:
+            self._looked = now
             self._count(now)
-        elif status == 0:
-            self.done, self.written = self.order.count, True
-            self._end("")
-        else:
-            self.done = self.order.done()
-            self._end(
-                "" if self.cancelled else self._last_line() or f"the process ended with status {status}"
-            )
+            if self.cancelled:
+                self._end_by = now + _PATIENCE if self._end_by is None else self._end_by
+                if now > self._end_by:
+                    process.kill()
 
     def cancel(self) -> None:
-        """Ends it; frames that are done are kept."""
-        if self.finished:
+        """Ends it; frames that are done are kept. It is finished when its process has ended."""
+        if not self.under_way:
             return
         self.cancelled = True
         if self._process is not None:
@@ -177,25 +194,48 @@ class RenderedFilm:
 
     def close(self) -> str:
         """Ends it because the window ends; what to say of that."""
-        if self.finished and self._process is None:
+        process = self._process
+        if process is None:
+            self.cancel()
             return ""
-        self.cancel()
-        if self._process is not None:
-            with suppress(subprocess.TimeoutExpired):
-                self._process.wait(_PATIENCE)
-            if self._process.poll() is None:
-                self._process.kill()
-                self._process.wait()
-        if self.written:
-            return ""
-        done = self.order.done()
-        self._end("")
-        return (
-            f"{self.order.output}: interrupted with {done} of {self.order.count} frames done; they are kept"
-        )
+        if process.poll() is None:
+            self.cancel()
+            try:
+                process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+        self._ended(process.wait())
+        if self.written or self.problem:
+            return self.problem
+        done, count = self.done, self.order.count
+        return f"{self.order.output}: interrupted with {done} of {count} frames done; they are kept"
+
+    def _ended(self, status: int) -> None:
+        """Takes the exit status of its process."""
+        if status == 0:
+            self.done, self.written = self.order.count, True
+            self._end("")
+        else:
+            self.done = self._frames_done()
+            self._end(
+                "" if self.cancelled else self._last_line() or f"the process ended with status {status}"
+            )
+
+    def _frames_done(self) -> int:
+        if self._resume:
+            return len(self.order.there())
+        # Frames are made in order: only the new ones need a look.
+        done = self.done
+        while done < self.order.count:
+            number = self.order.first + done
+            stamp = self.order.stamp(number)
+            if stamp is None or stamp == self._old.get(number):
+                break
+            done += 1
+        return done
 
     def _count(self, now: float) -> None:
-        done = self.order.done()
+        done = self._frames_done()
         if self._since is None and done > self.done:
             self._since = (now, done)
         self.done = done
@@ -228,17 +268,30 @@ class FilmQueue:
 
     def __init__(self) -> None:
         self.films: list[RenderedFilm] = []
+        self._leaving: list[RenderedFilm] = []  # no longer shown, but their processes have not ended yet
 
     @property
     def busy(self) -> bool:
         """Whether any is rendered, or waits."""
-        return any(not film.finished for film in self.films)
+        return any(not film.finished for film in self._all)
+
+    def under_way(self, output: Path) -> bool:
+        """Whether a film of that name waits or is rendered."""
+        return any(film.under_way and film.order.output == output for film in self.films)
+
+    def clear(self, output: Path | None = None) -> None:
+        """Forgets films that are no longer under way, or those of a name; the files stay."""
+        old = [
+            film
+            for film in self.films
+            if not film.under_way and (output is None or film.order.output == output)
+        ]
+        self.films = [film for film in self.films if film not in old]
+        self._leaving += [film for film in old if film.running]
 
     def order(self, order: FilmOrder, *, resume: bool = False) -> RenderedFilm:
-        """Adds a film; one of the same name that had ended gives way to it."""
-        self.films[:] = [
-            film for film in self.films if not (film.finished and film.order.output == order.output)
-        ]
+        """Adds a film; one of the same name that had ended gives way to it, and its process ends before this begins."""
+        self.clear(order.output)
         film = RenderedFilm(order, resume=resume)
         self.films.append(film)
         self.look(time.perf_counter())
@@ -246,23 +299,25 @@ class FilmQueue:
 
     def look(self, now: float) -> None:
         """Looks how far they are, and starts the next."""
-        for film in self.films:
+        for film in self._all:
             film.look(now)
-        if not any(film.running for film in self.films):
-            waiting = next((film for film in self.films if not film.finished), None)
+        self._leaving = [film for film in self._leaving if film.running]
+        if not any(film.running for film in self._all):
+            waiting = next((film for film in self.films if film.under_way), None)
             if waiting is not None:
                 waiting.start()
 
     def cancel(self) -> bool:
-        """Ends all; whether there was any."""
-        busy = self.busy
-        for film in self.films:
+        """Ends all; whether there was any to end."""
+        under_way = [film for film in self.films if film.under_way]
+        for film in under_way:
             film.cancel()
-        return busy
+        return bool(under_way)
 
     def close(self) -> list[str]:
         """Ends all because the window ends; lines for the user."""
-        waiting = [film for film in self.films if not film.running]
-        for film in waiting:
-            film.cancel()
-        return [line for film in self.films if (line := film.close()) and film not in waiting]
+        return [line for film in self._all if (line := film.close())]
+
+    @property
+    def _all(self) -> list[RenderedFilm]:
+        return [*self._leaving, *self.films]

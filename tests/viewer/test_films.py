@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +21,10 @@ from PIL import Image
 
 from clfractal.device.select import Device
 from clfractal.errors import FileError
+from clfractal.files.frame_names import frame_file, frames_there
+from clfractal.pictures.outputs import output_files
 from clfractal.scene.load import load_scene
+from clfractal.scene.stereo import Mode, Stereo
 from clfractal.viewer.films import FilmOrder, FilmQueue, RenderedFilm
 from clfractal.viewer.panels import films
 from clfractal.viewer.panels.ui import Ui
@@ -135,14 +141,192 @@ def test_a_film_gives_way_to_the_window(tmp_path: Path, device: Device, queue: F
 
 def test_the_files_of_frames_are_known() -> None:
     order = FilmOrder(SCENE, Path("/a"), Path("/b/x_##_####.exr"), 3, 5, "0:0")
-    assert order.frame(4) == Path("/b/x_##_0004.exr")
-    assert FilmOrder(SCENE, Path("/a"), Path("/b/x.mp4"), 3, 5, "0:0").frame(4) == Path(
-        "/b/x.mp4.partial/000004.png"
-    )
+    assert order.patterns == [Path("/b/x_##_####.exr")]
+    of_film = FilmOrder(SCENE, Path("/a"), Path("/b/x.mp4"), 3, 5, "0:0")
+    assert of_film.patterns == [Path("/b/x.mp4.partial/######.png")]
     command = order.command(resume=True)
     assert command[0] == sys.executable
     assert command[command.index("--frames") + 1] == "3-5"
     assert command[-1] == "--resume"
+
+
+# Processes that stand in for the shell's
+
+
+@dataclass(frozen=True)
+class StandIn(FilmOrder):
+    """A film that a small program makes instead of the shell.
+
+    Attributes:
+        program: Python, with `go(name)`, which writes a file, and `await_(name)`, which waits for one for some seconds.
+    """
+
+    program: str = ""
+
+    def command(self, *, resume: bool) -> list[str]:
+        """The program; `resume` is a name in it."""
+        return [sys.executable, "-c", f"resume = {resume}\n{_TOOLS}\n{self.program}"]
+
+
+_TOOLS = """
+import pathlib, signal, sys, time
+def go(name): pathlib.Path(name).write_text(str(time.time_ns()))
+def await_(name):
+    end = time.monotonic() + 20
+    while not pathlib.Path(name).exists() and time.monotonic() < end: time.sleep(0.01)
+"""
+_STUBBORN = """
+signal.signal(signal.SIGTERM, lambda *_: None)
+go(f"began-{resume}"); await_("end"); go("ended"); sys.exit(0 if resume else 1)
+"""
+
+
+def _stand_in(folder: Path, program: str, name: str = "f_####.png", **more: Any) -> StandIn:
+    return StandIn(more.pop("text", ""), folder, folder / name, 0, 5, "0:0", program=program, **more)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot refuse to end there")
+@pytest.mark.parametrize("cleared", [False, True])
+def test_a_film_begins_again_only_when_its_process_has_ended(
+    tmp_path: Path, queue: FilmQueue, cleared: bool
+) -> None:
+    order = _stand_in(tmp_path, _STUBBORN)
+    film = queue.order(order)
+    _until((tmp_path / "began-False").exists, queue)
+    assert queue.cancel()
+    assert not queue.cancel()
+    assert (film.running, film.finished, film.under_way, queue.busy) == (True, False, False, True)
+    assert films.state_text(film) == "being cancelled, 0 of 6 frames"
+    if cleared:
+        queue.clear()
+        assert queue.films == []
+        assert queue.busy
+    again = queue.order(order, resume=True)
+    assert queue.films == [again]
+    for _ in range(20):
+        queue.look(time.perf_counter())
+        assert not again.running
+        time.sleep(0.01)
+    (tmp_path / "end").touch()
+    _until(lambda: again.finished, queue)
+    assert film.finished
+    assert int((tmp_path / "ended").read_text()) > int((tmp_path / "began-True").read_text())
+    assert again.written
+    assert not queue.busy
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot refuse to end there")
+def test_a_cancelled_process_that_does_not_end_is_killed(tmp_path: Path, queue: FilmQueue) -> None:
+    film = queue.order(_stand_in(tmp_path, _STUBBORN))
+    _until((tmp_path / "began-False").exists, queue)
+    film.cancel()
+    now = time.perf_counter()
+    queue.look(now + 1)
+    queue.look(now + 3)
+    assert film.running
+    queue.look(now + 6)
+    _until(lambda: film.finished, queue, 5)
+    assert not (tmp_path / "ended").exists()
+
+
+def test_a_film_that_became_whole_just_before_the_window_ends_is_whole(tmp_path: Path) -> None:
+    queue = FilmQueue()
+    film = queue.order(_stand_in(tmp_path, "go('film')"))
+    assert film._process is not None
+    film._process.wait()
+    assert queue.close() == []
+    assert (film.written, film.cancelled, film.done) == (True, False, 6)
+
+
+def test_a_film_that_failed_just_before_the_window_ends_tells_why(tmp_path: Path) -> None:
+    queue = FilmQueue()
+    film = queue.order(_stand_in(tmp_path, "sys.exit('out of memory')"))
+    assert film._process is not None
+    film._process.wait()
+    assert queue.close() == ["out of memory"]
+
+
+@pytest.mark.parametrize(
+    ("mode", "name", "files"),
+    [
+        ("pair", "f_####.png", ["f_0002_L.png", "f_0002_R.png"]),
+        ("multi_view", "f_####.jpg", ["f_0002_L.jpg", "f_0002_R.jpg"]),
+        ("multi_view", "f_####.exr", ["f_0002.exr"]),
+        ("split", "f_####.png", ["f_0002.png"]),
+    ],
+)
+def test_frames_with_a_file_of_each_eye_are_counted(
+    tmp_path: Path, mode: Mode, name: str, files: list[str]
+) -> None:
+    order = _stand_in(tmp_path, "", name, stereo=Stereo(mode=mode))
+    assert [path.name for path in output_files(order.stereo, frame_file(order.output, 2))] == files
+    for file in files:
+        assert order.there() == {}
+        (tmp_path / file).touch()
+    assert order.there() == {2: tuple(str(tmp_path / file) for file in files)}
+
+
+def test_only_names_that_are_frames_count(tmp_path: Path) -> None:
+    for name in ("f_0001.png", "f_00002.png", "f_03.png", "f_12345.png", "f_0004.png.tmp", "xf_0005.png"):
+        (tmp_path / name).touch()
+    assert list(frames_there([tmp_path / "f_####.png"], range(20_000))) == [1, 12345]
+    assert frames_there([tmp_path / "none" / "f_####.png"], range(9)) == {}
+
+
+def test_many_frames_are_counted_in_a_moment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"{number:06d}.png" for number in range(36_000)]
+    monkeypatch.setattr(os, "listdir", lambda _: names)
+    order = FilmOrder("", tmp_path, tmp_path / "f.mp4", 0, 35_999, "0:0")
+    begun = time.process_time()
+    assert len(order.there()) == 36_000
+    assert time.process_time() - begun < 0.2
+
+
+def test_frames_of_an_earlier_run_do_not_count_unless_it_is_continued(
+    tmp_path: Path, queue: FilmQueue
+) -> None:
+    for number in range(6):
+        (tmp_path / f"f_{number:04}.png").write_text("old")
+    program = "go('f_0000.png'); go('f_0001.png'); go('two'); await_('end')"
+    film = queue.order(_stand_in(tmp_path, program))
+    _until((tmp_path / "two").exists, queue)
+    _until(lambda: film.done, queue, 5)
+    assert film.done == 2
+    (tmp_path / "end").touch()
+    _until(lambda: film.finished, queue)
+    (tmp_path / "f_0003.png").unlink()
+    (tmp_path / "end").unlink()
+    continued = queue.order(_stand_in(tmp_path, "await_('end')"), resume=True)
+    _until(lambda: continued.done, queue, 5)
+    assert continued.done == 5
+    (tmp_path / "end").touch()
+
+
+def test_a_long_scene_does_not_hold_up_the_window(tmp_path: Path, queue: FilmQueue) -> None:
+    text = "# long\n" * 100_000
+    begun = time.monotonic()
+    film = queue.order(_stand_in(tmp_path, "await_('read'); go(f'{len(sys.stdin.read())}')", text=text))
+    assert time.monotonic() - begun < 2  # it waits for none to read
+    (tmp_path / "read").touch()
+    _until(lambda: film.finished, queue)
+    assert film.written, film.problem
+    assert (tmp_path / f"{len(text)}").exists()
+
+
+def test_on_windows_a_film_opens_no_console(
+    tmp_path: Path, queue: FilmQueue, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flags: list[int] = []
+
+    def started(*_: object, creationflags: int, **__: object) -> None:
+        flags.append(creationflags)
+        raise OSError(2, "not there")
+
+    monkeypatch.setattr(subprocess, "CREATE_NO_WINDOW", 0x8000000, raising=False)
+    monkeypatch.setattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0x4000, raising=False)
+    monkeypatch.setattr(subprocess, "Popen", started)
+    assert "not there" in queue.order(_stand_in(tmp_path, "")).problem
+    assert flags == [0x8004000]
 
 
 # The panel
@@ -195,6 +379,21 @@ def test_what_is_there_is_continued_and_a_film_is_not_replaced(
     assert animation is not None
     with pytest.raises(FileError, match="is there already"):
         films.order_of(ui, films.Wanted(), animation)
+
+
+def test_the_list_is_cleared_by_the_queue(panel: tuple[Ui, Stage, Seen, list[FilmOrder]]) -> None:
+    ui, stage, seen, _ = panel
+    queue = ui.studio.films
+    ending = queue.order(FilmOrder("", Path(), Path("/b/x.mp4"), 0, 9, "0:0"))
+    ending._process = process = SimpleNamespace(poll=lambda: None, terminate=lambda: None)  # type: ignore[assignment]
+    ending.cancel()
+    stage.frame(1.0)
+    seen.click(stage, "Clear the list")
+    assert queue.films == []
+    assert queue.busy
+    process.poll = lambda: -15
+    queue.look(time.perf_counter())
+    assert not queue.busy
 
 
 @pytest.mark.parametrize(("kind", "name"), [("EXR pictures", "a_####.exr"), ("MOV, ProRes", "a.mov")])

@@ -99,7 +99,7 @@ def order_of(ui: Ui, state: Wanted, animation: Animation) -> FilmOrder:
         raise FileError("needs a name, not a folder alone", Where(str(output.parent)))
     if output.exists():
         raise FileError("is there already; choose another name", Where(output.name))
-    if any(not film.finished and film.order.output == output for film in ui.studio.films.films):
+    if ui.studio.films.under_way(output):
         raise FileError("is under way already", Where(output.name))
     files: Any = ui.memory["files"]
     first, last = _part(state, animation)
@@ -113,6 +113,7 @@ def order_of(ui: Ui, state: Wanted, animation: Animation) -> FilmOrder:
         state.size,
         state.samples,
         KINDS[state.kind][1],
+        ui.studio.scene.stereo,
     )
 
 
@@ -180,9 +181,9 @@ def _there(ui: Ui, state: Wanted, animation: Animation) -> int:
     known = ui.memory.get("films.there")
     if known is None or known[0] != key or now - known[1] > 1.0:
         output, (first, last) = key[0], key[1]
-        under_way = any(not film.finished and film.order.output == output for film in ui.studio.films.films)
-        order = FilmOrder("", Path(), output, first, last, "")
-        known = ui.memory["films.there"] = (key, now, 0 if under_way else order.done())
+        order = FilmOrder("", Path(), output, first, last, "", stereo=ui.studio.scene.stereo)
+        there = 0 if ui.studio.films.under_way(output) else len(order.there())
+        known = ui.memory["films.there"] = (key, now, there)
     return int(known[2])
 
 
@@ -202,15 +203,15 @@ def start(ui: Ui, state: Wanted, animation: Animation, *, resume: bool = False) 
 
 
 def _list(ui: Ui) -> None:
-    films = ui.studio.films.films
+    films = list(ui.studio.films.films)
     imgui.dummy(imgui.ImVec2(0, 2))
     for film in reversed(films):
         imgui.push_id(str(id(film)))
         _film(ui, film)
         imgui.pop_id()
-    ended = any(film.finished for film in films)
+    ended = not all(film.under_way for film in films)
     if ended and w.button("Clear the list", about="Forgets what has ended; the files stay"):
-        films[:] = [film for film in films if not film.finished]
+        ui.studio.films.clear()
 
 
 def _film(ui: Ui, film: RenderedFilm) -> None:
@@ -224,12 +225,12 @@ def _film(ui: Ui, film: RenderedFilm) -> None:
     w.tip(str(film.order.output))
     if not film.written:
         imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - side)
-        if not film.finished:
+        if film.under_way:
             if w.icon_button(theme.CROSS, "Cancel it: what is done is kept", name="cancel"):
                 film.cancel()
         elif w.icon_button(theme.REFRESH, "Continue it", name="continue"):
             ui.studio.films.order(film.order, resume=True)
-    if not film.finished:
+    if film.under_way:
         form.bar(film.done / film.order.count, wide)
     with theme.font(size=12.5), theme.colors(text=theme.WARNING if film.problem else theme.FAINT):
         imgui.push_text_wrap_pos(0.0)
@@ -253,6 +254,8 @@ def state_text(film: RenderedFilm) -> str:
     frames = f"{film.done} of {counted(film.order.count, 'frame')}"
     if film.written:
         return f"{counted(film.order.count, 'frame')}, written"
+    if film.cancelled and film.running:
+        return f"being cancelled, {frames}"
     if film.cancelled:
         return f"cancelled, {frames} are kept"
     if not film.running:
