@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from clfractal.files.film_kinds import CONTAINERS
@@ -27,8 +27,14 @@ def split_pattern(name: str) -> tuple[str, str, str]:
 
 def frame_file(pattern: Path, number: int) -> Path:
     """The file of a frame: its number stands for the last row of `#` in the pattern's name, with as many digits or more."""
-    head, signs, tail = split_pattern(pattern.name)
-    return pattern.with_name(f"{head}{number:0{len(signs)}d}{tail}")
+    return Path(namer(pattern)(number))
+
+
+def namer(pattern: Path) -> Callable[[int], str]:
+    """Tells the file of each frame as text: of tens of thousands, paths take long to build."""
+    name, signs, tail = split_pattern(pattern.name)
+    head, digits = os.path.join(pattern.parent, name), len(signs)
+    return lambda number: f"{head}{number:0{digits}d}{tail}"
 
 
 def kept_folder(film: Path) -> Path:
@@ -42,24 +48,21 @@ def kept_patterns(film: Path) -> tuple[Path, Path]:
     return folder / "######.png", folder / "######.8.png"
 
 
-def frames_there(patterns: Sequence[Path], numbers: range) -> dict[int, tuple[str, ...]]:
-    """The paths of the numbered frames that have all their files, by their names; the patterns are of one folder.
+def frames_there(patterns: Sequence[Path], numbers: range) -> set[int]:
+    """Which of the numbered frames have all their files, by their names; the patterns are of one folder.
 
-    The folder is read once and no path is built but as text: it may hold tens of thousands.
+    The folder is read once, and no name is built: it may hold tens of thousands.
     """
-    folder = str(patterns[0].parent)
     try:
-        names = os.listdir(folder)
+        names = os.listdir(patterns[0].parent)
     except OSError:
-        return {}
-    found: list[dict[int, str]] = []
+        return set()
+    found = set(numbers)
     for pattern in patterns:
         head, signs, tail = split_pattern(pattern.name)
         least = len(signs)
         # More digits than signs only where the number needs them.
         digits = rf"\d{{{least}}}|[1-9]\d{{{least},}}"
         name = re.compile(f"{re.escape(head)}({digits}){re.escape(tail)}", re.ASCII)
-        matches = filter(None, map(name.fullmatch, names))
-        found.append({int(match[1]): os.path.join(folder, match[0]) for match in matches})
-    whole = set.intersection(*map(set, found)).intersection(numbers)
-    return {number: tuple(files[number] for files in found) for number in sorted(whole)}
+        found &= {int(match[1]) for match in map(name.fullmatch, names) if match}
+    return found

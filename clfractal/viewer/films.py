@@ -11,14 +11,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from clfractal.errors import FileError, Where
-from clfractal.files.frame_names import frame_file, frames_there, is_film, kept_patterns
+from clfractal.files.frame_names import frames_there, is_film, kept_patterns, namer
 from clfractal.pictures.outputs import output_files
 from clfractal.scene.stereo import Stereo
 
@@ -73,13 +73,23 @@ class FilmOrder:
             return [kept_patterns(self.output)[0]]
         return output_files(self.stereo, self.output)
 
-    def there(self) -> dict[int, tuple[str, ...]]:
-        """The files of the frames that are there, by their numbers."""
-        return frames_there(self.patterns, range(self.first, self.last + 1))
+    @property
+    def numbers(self) -> range:
+        """The numbers of its frames."""
+        return range(self.first, self.last + 1)
 
-    def stamp(self, number: int) -> Stamp | None:
-        """When a frame's files were written; None: one of them is not there."""
-        return _stamp([str(frame_file(pattern, number)) for pattern in self.patterns])
+    def there(self) -> set[int]:
+        """The numbers of the frames that are there."""
+        return frames_there(self.patterns, self.numbers)
+
+    def stamps(self, numbers: Iterable[int]) -> Iterator[Stamp | None]:
+        """When the files of each frame were written; None: one of them is not there."""
+        namers = [namer(pattern) for pattern in self.patterns]
+        for number in numbers:
+            try:
+                yield tuple(os.stat(name(number)).st_mtime_ns for name in namers)
+            except OSError:
+                yield None
 
     def command(self, *, resume: bool) -> list[str]:
         """The shell's command; the scene comes from standard input."""
@@ -90,13 +100,6 @@ class FilmOrder:
         if self.samples is not None:
             found += ["--samples", str(self.samples)]
         return [*found, "--resume"] if resume else found
-
-
-def _stamp(files: Iterable[str]) -> Stamp | None:
-    try:
-        return tuple(os.stat(file).st_mtime_ns for file in files)
-    except OSError:
-        return None
 
 
 class RenderedFilm:
@@ -120,7 +123,10 @@ class RenderedFilm:
         self._process: subprocess.Popen[bytes] | None = None
         self._told: IO[bytes] | None = None
         self._end_by: float | None = None  # when a process that is to end is killed
-        self._old: dict[int, Stamp | None] = {}  # frames of an earlier run, which are replaced
+        # What this run makes, in order: the frames; how they were before; how many are made.
+        self._numbers: Sequence[int] = order.numbers
+        self._old: dict[int, Stamp | None] = {}
+        self._made = 0
         self._looked = 0.0
         self._since: tuple[float, int] | None = (
             None  # when the first frame of this run was there, and how many then were
@@ -143,8 +149,12 @@ class RenderedFilm:
 
     def start(self) -> None:
         """Starts its process."""
-        if not self._resume:
-            self._old = {number: _stamp(files) for number, files in self.order.there().items()}
+        there = self.order.there()
+        if self._resume:
+            self._numbers = [number for number in self.order.numbers if number not in there]
+            self.done = self._frames_done()
+        else:
+            self._old = dict(zip(there, self.order.stamps(there), strict=True))
         try:
             self._told = tempfile.TemporaryFile()  # noqa: SIM115 (until the process has ended)
             # A file: a pipe would be full after some pages of text, and the window would wait for the process to read.
@@ -222,17 +232,13 @@ class RenderedFilm:
             )
 
     def _frames_done(self) -> int:
-        if self._resume:
-            return len(self.order.there())
-        # Frames are made in order: only the new ones need a look.
-        done = self.done
-        while done < self.order.count:
-            number = self.order.first + done
-            stamp = self.order.stamp(number)
+        # Frames are made in order: only the next ones need a look, however many there are.
+        coming = self._numbers[self._made :]
+        for number, stamp in zip(coming, self.order.stamps(coming), strict=True):
             if stamp is None or stamp == self._old.get(number):
                 break
-            done += 1
-        return done
+            self._made += 1
+        return self.order.count - len(self._numbers) + self._made
 
     def _count(self, now: float) -> None:
         done = self._frames_done()

@@ -261,16 +261,18 @@ def test_frames_with_a_file_of_each_eye_are_counted(
     order = _stand_in(tmp_path, "", name, stereo=Stereo(mode=mode))
     assert [path.name for path in output_files(order.stereo, frame_file(order.output, 2))] == files
     for file in files:
-        assert order.there() == {}
+        assert order.there() == set()
+        assert [*order.stamps([2])] == [None]
         (tmp_path / file).touch()
-    assert order.there() == {2: tuple(str(tmp_path / file) for file in files)}
+    assert order.there() == {2}
+    assert [*order.stamps([1, 2])] == [None, tuple((tmp_path / file).stat().st_mtime_ns for file in files)]
 
 
 def test_only_names_that_are_frames_count(tmp_path: Path) -> None:
     for name in ("f_0001.png", "f_00002.png", "f_03.png", "f_12345.png", "f_0004.png.tmp", "xf_0005.png"):
         (tmp_path / name).touch()
-    assert list(frames_there([tmp_path / "f_####.png"], range(20_000))) == [1, 12345]
-    assert frames_there([tmp_path / "none" / "f_####.png"], range(9)) == {}
+    assert frames_there([tmp_path / "f_####.png"], range(20_000)) == {1, 12345}
+    assert frames_there([tmp_path / "none" / "f_####.png"], range(9)) == set()
 
 
 def test_many_frames_are_counted_in_a_moment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
