@@ -6,14 +6,13 @@ import errno
 import os
 import subprocess
 import sys
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from clfractal.commands import progress
-from clfractal.device import program, select
+from clfractal.device import drivers_folder, program, select
 from clfractal.renderers import surface
 from clfractal.renderers.kernel import ProgramText
 from tests.files.limits import file_size_limit
@@ -281,7 +280,9 @@ def test_no_room_for_temporary_files(
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_text", full)
         ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
-    assert ended.is_one_line(2, f"{tempfile.gettempdir()}: has no room for temporary files: No space left")
+    assert ended.is_one_line(
+        2, f"{drivers_folder.path().parent}: has no room for temporary files: No space left"
+    )
     (here / "old.png.partial").unlink(missing_ok=True)
     assert untouched(here)
 
