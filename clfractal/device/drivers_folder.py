@@ -276,7 +276,9 @@ def _lock_of(folder: Path) -> Path:
 
 def _machine() -> str:
     """Locks are not seen from other machines, where a folder is shared."""
-    name = os.uname().nodename if sys.platform != "win32" else os.environ.get("COMPUTERNAME", "")
+    name = os.environ.get("COMPUTERNAME", "")
+    if sys.platform != "win32":
+        name = os.uname().nodename
     return "".join(letter if letter.isalnum() else "_" for letter in name[:40]) or "here"
 
 

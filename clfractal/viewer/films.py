@@ -174,7 +174,7 @@ class RenderedFilm:
         except OSError as error:
             self._end(str(FileError(f"cannot be rendered: {error.strerror}", Where(str(self.order.output)))))
             return
-        if hasattr(os, "setpriority"):
+        if sys.platform != "win32":  # where the flag above does it
             with suppress(OSError):
                 os.setpriority(os.PRIO_PROCESS, self._process.pid, _NICE)
 
