@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 STATUS_BAD_INPUT = 2
 STATUS_DEVICE_FAILED = 3
 STATUS_INTERRUPTED = 130
-STATUS_SIGNALLED = (
-    128  # and the number of the signal, as shells have it; STATUS_INTERRUPTED is that of Ctrl-C
-)
+# And the number of the signal, as shells have it; STATUS_INTERRUPTED is that of Ctrl-C.
+STATUS_SIGNALLED = 128
 
 
 @dataclass(frozen=True, slots=True)

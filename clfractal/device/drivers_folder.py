@@ -225,9 +225,8 @@ def _locked_in(base: Path) -> _Folder:
             except system.HeldError:
                 os.close(lock)
                 continue
-        if not _lock_of(
-            path
-        ).exists():  # another process took the new file for a left one before it was locked
+        # Another process may have taken the new file for a left one before it was locked.
+        if not _lock_of(path).exists():
             os.close(lock)
             continue
         try:

@@ -111,9 +111,8 @@ def job_folder() -> Iterator[Path]:
     """
     root = drivers_folder.path()
     try:
-        root.mkdir(
-            parents=True, exist_ok=True
-        )  # what is old in a temporary folder may have been cleared away
+        # What is old in a temporary folder may have been cleared away.
+        root.mkdir(parents=True, exist_ok=True)
         temporary = tempfile.mkdtemp(prefix="job-", dir=root)
     except OSError as error:
         raise drivers_folder.no_room(error) from error
