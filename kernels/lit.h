@@ -80,6 +80,7 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->point = vec_pick(met, vec_along(origin, far, direction), found->point);
     found->seen = vec_pick(met, found->point, found->seen);
     found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
+    found->smooth = pick(met, R(0.0), found->smooth);   // no march has written one
 #if HAS_MATTES || HAS_FACES
     found->object = pick(met, object, found->object);
 #if JOINS_SMOOTHLY

@@ -75,11 +75,12 @@ INLINE encounter queue_met(queue q, int turn, int first) {
     RECALL(e, q.met + turn * q.wave + first, q.stride);
     const ray r = queue_ray(q, turn, first);
     const mask sent = less(r.near, r.far);
-    e.hit = pick(sent, e.hit, R(0.0));
-    e.t = pick(sent, e.t, R(0.0));
-    e.steps = pick(sent, e.steps, R(0.0));
-    e.count = pick(sent, e.count, R(0.0));
-    e.bad = pick(sent, e.bad, R(0.0));
+    // What nobody has written may be any bits, and lanes are not quite alone: some functions of the libraries take another way for
+    // all of them where one has a large argument.
+    const mask lands = sent & mask_of(e.hit);
+    real *numbers = (real *)&e;
+#define WRITTEN_NUMBER(i) numbers[i] = pick(i < ENCOUNTER_NORMAL ? sent : lands, numbers[i], R(0.0));
+    WRITTEN_OUT(NUMBERS_OF(encounter), WRITTEN_NUMBER)
 #if HAS_OBJECTS
     const real object = lanes_load(q.rays + RAY_OBJECT * q.stride + turn * q.wave + first);
     const mask nearer = less(object, pick(mask_of(e.hit), e.t, (real)(REAL_LARGEST)));
