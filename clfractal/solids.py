@@ -58,17 +58,20 @@ class Body:
     Attributes:
         scene: None for a formula by itself.
         bailout: in the place of the formula's own; for a formula by itself.
+        potential: whether normals are those of the potential, not of the surface.
     """
 
     chain: Chain
     iterations: int
     scene: Scene | None = None
     bailout: float | None = None
+    potential: bool = False
 
     @classmethod
     def of(cls, scene: Scene) -> Body:
         """A scene's."""
-        return cls(scene.chain, scene.formula.iterations, scene if scene.joined else None)
+        joined = scene if scene.joined else None
+        return cls(scene.chain, scene.formula.iterations, joined, potential=_by_potential(scene))
 
     @property
     def defines(self) -> dict[str, object]:
@@ -98,7 +101,8 @@ class Body:
         """The `Orbit` records, shape (solids,)."""
         if self.scene is not None:
             return np.stack(_joined_records(self.scene, precision))
-        return orbit_record(self.chain, self.iterations, precision, self.bailout).reshape(1)
+        record = orbit_record(self.chain, self.iterations, precision, self.bailout, potential=self.potential)
+        return record.reshape(1)
 
     def constants(self, precision: Precision) -> Record:
         """The constants of all formulas, one after the other."""
@@ -158,7 +162,7 @@ def numbered(text: str, after: tuple[str, ...], number: int) -> str:
 
 def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
     """The scene's own formula, and what is joined to it."""
-    iterations = scene.formula.iterations
+    iterations, potential = scene.formula.iterations, _by_potential(scene)
     widest = max(
         (each.smoothness for each in scene.joined.values() if each.join == "smooth_union"), default=0.0
     )
@@ -182,7 +186,8 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             "potential_share": min(ball[1], scale * chain.radius) / radius,
         }
 
-    found = [orbit_record(scene.chain, iterations, precision, joined=formula(scene.chain, 1.0, _ball(scene)))]
+    first = formula(scene.chain, 1.0, _ball(scene))
+    found = [orbit_record(scene.chain, iterations, precision, potential=potential, joined=first)]
     objects = list(scene.objects)
     for name, each in scene.joined.items():
         part: dict[str, object] = {
@@ -197,8 +202,12 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             part |= formula(chain, each.scale, each.ball(chain.center, chain.radius))
         else:
             part |= {"kind": SOLID_KINDS[each.tag], "step_scale": 1.0}
-        found.append(orbit_record(chain, limit, precision, joined=part))
+        found.append(orbit_record(chain, limit, precision, potential=potential, joined=part))
     return found
+
+
+def _by_potential(scene: Scene) -> bool:
+    return isinstance(scene.renderer, SurfaceRenderer) and scene.renderer.normal == "potential"
 
 
 def _ball(scene: Scene) -> Ball:

@@ -13,7 +13,7 @@ INLINE real mean_curvature(vec point, vec normal, mask active, __constant const 
     for (int i = 0; i < TURNS(4); ++i) {
         const vec way = vec_scale(i < 2 ? side : up, i & 1 ? R(-0.5) : R(0.5));
         surface_point found;
-        const clearance there = orbit_dual_distance(vec_along(above, step, way), active, orbit, k, &found);
+        const clearance there = orbit_dual_distance(vec_along(above, step, way), active, OF_SURFACE, orbit, k, &found);
         const vec gradient = vec_normalize(found.gradient);
         // Where there is none, as it is in the middle.
         const mask flat = less(vec_dot(gradient, gradient), R(0.5)) | there.end.inside;

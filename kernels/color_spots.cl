@@ -42,7 +42,7 @@ INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask 
 #if BUMP_SURFACE
     if (place == AT_SPOT) return;
     surface_point surface;
-    const clearance here = orbit_dual_distance(there->point, of_set, orbit, k, &surface);
+    const clearance here = orbit_dual_distance(there->point, of_set, OF_SURFACE, orbit, k, &surface);
     const vec normal = vec_normalize(surface.gradient);
     // Where there is none, as at the spot.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | here.end.inside;

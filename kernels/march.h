@@ -190,11 +190,17 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     mask inside = marching & ~overshot & s.here.end.inside;
     mask early = inside & ~inside;
 #if POINTS > 1
-    // A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time.
+    // A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time, but not
+    // out of the bounds.
     early = inside & less_equal((real)(REAL_LARGEST), m->radius_before) & less(m->r.known, RAY_NOTHING_KNOWN) &
             less(m->found.steps, BACK_STEPS);
     inside &= ~early;
-    m->low = pick(early, fmax(m->t - cone * m->found.steps, R(0.0)), m->low);
+    if (any_lane(early)) {
+        ray whole = m->r;
+        whole.near = R(0.0);
+        ray_clip(&whole, settings->bounds_center, (real)(settings->bounds_radius));
+        m->low = pick(early, fmax(m->t - cone * m->found.steps, whole.near), m->low);
+    }
 #endif
     const mask outside = marching & ~overshot & ~s.here.end.inside;
     // (Not where it has only just begun.)
@@ -254,7 +260,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
 #if HAS_DERIVATIVE
     s.here = orbit_scalar_distance(s.point, m->active, orbit, k);
 #else
-    s.here = orbit_dual_distance(s.point, m->active, orbit, k, &s.surface);
+    s.here = orbit_dual_distance(s.point, m->active, OF_DISTANCE, orbit, k, &s.surface);
 #endif
     march_act(m, s, goal, settings, orbit);
 }

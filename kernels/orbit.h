@@ -186,17 +186,28 @@ INLINE void orbit_scalar_distances(const vec *points, const mask *active, cleara
 #endif
 
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
-INLINE clearance orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
-                                     surface_point *surface) {
+//
+// The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
+// a place beside it may be some applications farther. By them space is stretched once more, and where it is stretched unevenly their level
+// sets face elsewhere. So no gradient `of` the surface is that of a z after `gradient_limit`.
+INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
+                                     __constant const scalar *k, surface_point *surface) {
     dual_state c, z;
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
     real square_before = square;
     real count = (real)((scalar)FIRST_COUNT);
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
-    mask inside = alive & ~alive;
+    mask inside = alive & ~alive, left = inside;
+    vec at_limit = vec_of(R(0.0), R(0.0), R(0.0));
     for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look && orbit_look(n, &look, square, &alive, &inside, orbit)) break;
+        if (n == look) {
+            if (orbit_look(n, &look, square, &alive, &inside, orbit)) break;
+            if (of == OF_SURFACE && n == orbit->gradient_limit) {
+                left = alive;
+                at_limit = dual_state_gradient(z, R(1.0) / square);
+            }
+        }
         if (!any_lane(alive)) break;
         const dual_state next = dual_apply(n, z, c, k);
         z = dual_state_pick(alive, next, z);
@@ -217,7 +228,7 @@ INLINE clearance orbit_dual_distance(vec point, mask active, __constant const st
     // J^T z / |z|^2: dividing by |z|^2 first keeps the squares within range.
     const vec relative = dual_state_gradient(z, R(1.0) / square);
     const real relative_square = vec_dot(relative, relative);
-    surface->gradient = relative;
+    surface->gradient = vec_pick(left, at_limit, relative);
     const real distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
 #endif
     surface->square = square;
@@ -255,6 +266,6 @@ INLINE clearance orbit_distance(vec point, mask active, __constant const struct 
     return orbit_scalar_distance(point, active, orbit, k);
 #else
     surface_point ignored;
-    return orbit_dual_distance(point, active, orbit, k, &ignored);
+    return orbit_dual_distance(point, active, OF_DISTANCE, orbit, k, &ignored);
 #endif
 }

@@ -42,7 +42,7 @@ INLINE mask is_blind(clearance here) {
 
 // What is known of a point on the surface, from one orbit over dual numbers.
 typedef struct {
-    vec gradient;        // of the distance, not normalised: points away from the solid
+    vec gradient;        // of the distance or the surface, not normalised: points away from the solid
     real square;         // the last |z|^2 ...
     real square_before;  // ... and the one before it
 #if SOLIDS > 1
@@ -55,6 +55,10 @@ typedef struct {
     real other_square, other_square_before, other_count, other_of, other_solid;  // ... and the same of that one
 #endif
 } surface_point;
+
+// Whose gradient is asked for: the distance's, of the last z; or that of the surface which is shown.
+#define OF_DISTANCE 0
+#define OF_SURFACE 1
 
 // Whether the work was cancelled. Long orbits test this now and then, or a launch could take arbitrarily long. The host writes
 // the record while kernels run; they see it if both share their memory. The results of a cancelled launch are discarded.

@@ -57,7 +57,7 @@ __kernel void distances(__global const scalar *points, __global scalar *result, 
     const mask all_lanes = equal(R(0.0), R(0.0));
     surface_point surface;
     const clearance near = orbit_distance(point, all_lanes, orbit, k);
-    const clearance full = orbit_dual_distance(point, all_lanes, orbit, k, &surface);
+    const clearance full = orbit_dual_distance(point, all_lanes, OF_SURFACE, orbit, k, &surface);
     const vec normal = vec_normalize(surface.gradient);
     store_plane(result, first, near.step);
     store_plane(result, stride + first, full.step);

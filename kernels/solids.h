@@ -10,13 +10,15 @@
 // made for its inside.
 #define SOLID_NEAR R(0.01)
 
-// What is asked of solids: how far rays may go; the gradient, too; the estimate of the distance, however far out; or behind the wall of a
-// hollow that wall's gradient.
+// What is asked of solids: how far rays may go; the gradient, too, of the distance or the surface; the estimate of the distance, however
+// far out; or behind the wall of a hollow that wall's gradient.
 #define ASK_STEP 0
 #define ASK_GRADIENT 1
-#define ASK_ESTIMATE 2
-#define ASK_BEHIND 3
-#define ASKS_GRADIENT(asks) (asks == ASK_GRADIENT || (HOLLOWS && asks == ASK_BEHIND))
+#define ASK_SURFACE 2
+#define ASK_ESTIMATE 3
+#define ASK_BEHIND 4
+#define ASKS_SURFACE(asks) (asks == ASK_SURFACE || (HOLLOWS && asks == ASK_BEHIND))
+#define ASKS_GRADIENT(asks) (asks == ASK_GRADIENT || ASKS_SURFACE(asks))
 #define ASKS_FAR(asks) (asks == ASK_ESTIMATE || JOINS_SMOOTHLY)  // what flows together must not flow to the ball
 
 #include "memory.h"
@@ -53,16 +55,17 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     if (!any_lane(near)) return found;
     clearance here = {R(0.0), {R(0.0), near}, R(0.0)};
     surface_point there = found.surface;
+    const int of = ASKS_SURFACE(asks) ? OF_SURFACE : OF_DISTANCE;
     k += o->first;
 #if HAS_DERIVATIVE
 #define ASK_TEXT(i)                                                                                        \
     case i:                                                                                                \
-        if (ASKS_GRADIENT(asks)) here = orbit_dual_distance_##i(own, near, o, k, &there);                 \
+        if (ASKS_GRADIENT(asks)) here = orbit_dual_distance_##i(own, near, of, o, k, &there);              \
         else here = orbit_scalar_distance_##i(own, near, o, k);                                            \
         break;
 #else
 #define ASK_TEXT(i)                                                                                        \
-    case i: here = orbit_dual_distance_##i(own, near, o, k, &there); break;
+    case i: here = orbit_dual_distance_##i(own, near, of, o, k, &there); break;
 #endif
     switch (o->text) { EACH_TEXT(ASK_TEXT) }
     // (Outside the ball an estimate may be much too large.)
@@ -75,7 +78,9 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     found.surface.count = here.end.count;
     *cost += pick(near, here.end.count, none);
     if (HAS_DERIVATIVE && !ASKS_GRADIENT(asks)) return found;
-    found.surface.gradient = vec_pick(near, solid_turned(o, there.gradient), found.surface.gradient);
+    // Where the ball cuts the set, the surface is the ball's.
+    const mask cut = here.end.inside & ~within;
+    found.surface.gradient = vec_pick(near & ~cut, solid_turned(o, there.gradient), found.surface.gradient);
 #if HOLLOWS
     if (asks == ASK_BEHIND) {
         // No wall is as deep in a set as this, and no gradient counts there.
@@ -116,9 +121,9 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, __cons
     return result;
 }
 
-INLINE clearance orbit_dual_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
-                                     surface_point *surface) {
-    return solids_distance(&point, active, ASK_GRADIENT, orbit, k, surface);
+INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
+                                     __constant const scalar *k, surface_point *surface) {
+    return solids_distance(&point, active, of == OF_SURFACE ? ASK_SURFACE : ASK_GRADIENT, orbit, k, surface);
 }
 
 // The estimate, which rays may go within the balls of formulas only; the most that it may be in hollows.

@@ -5,6 +5,7 @@
 #define UNLIKE R(0.08)    // ... and from here on they are not
 #define PLACED R(0.01)    // below this, shadows begin at the hit too ...
 #define UNPLACED R(0.02)  // ... and from here on at the place before it: rough surfaces shadow themselves
+#define ON_BOUNDS R(0.001) // of their radius: so near to them, a ray that begins inside the set is cut by the bounds
 #define BESIDE R(0.375)   // radians between the hit's gradient and that before it, up to which they may be of one body ...
 #define ASTRAY R(0.5)     // ... and from here on they are not
 
@@ -52,7 +53,7 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant 
     mask asked = active;
     for (int i = 0; i < TURNS(3); ++i) {
         if (!any_lane(asked)) break;
-        const clearance here = orbit_dual_distance(place, asked, orbit, k, &found);
+        const clearance here = orbit_dual_distance(place, asked, OF_SURFACE, orbit, k, &found);
         met->more_count += pick(asked, here.end.count, R(0.0));
         const vec gradient = vec_normalize(found.gradient);
         if (i == 0) {
@@ -90,19 +91,21 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
     const real wanted = POLISH_HEIGHT * cone;
     real t = met->touch, before = t, height_before = R(0.0);
+    mask moves = active;
     for (int i = 0; i < TURNS(POLISH); ++i) {
-        *there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, orbit, k, &surface);
+        *there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, OF_SURFACE, orbit, k, &surface);
         met->more_count += pick(active, there->end.count, R(0.0));
         met->more_steps += pick(active, R(1.0), R(0.0));
         if (i == POLISH - 1) break;
-        // A wall of a hollow is where its bracket is.
+        // What the bounds have cut is where the ray begins, and a wall of a hollow where its bracket is.
+        if (i == 0) moves &= ~there->end.inside;
         const real height = pick(is_blind(*there), R(0.0), there->step * step_scale_of(*there, settings) - wanted);
         const real slope = (height - height_before) / (t - before);
         const mask usable = less(slope, R(0.0)) & less(R(-1e6), slope);
         const real move = i == 0 ? height : pick(usable, -height / slope, height);
         before = t;
         height_before = height;
-        t += clamp(move, -cone, cone);
+        t += pick(moves, clamp(move, -cone, cone), R(0.0));
     }
     met->touch = pick(active, t, met->touch);
     met->t = pick(active, t, met->t);
@@ -126,9 +129,13 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
 #if HOLLOWS
     surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
 #endif
-    // No gradient: inside the solid already at the eye, or an extremum. Face the viewer.
+    // No gradient: inside the solid already where the ray begins, or an extremum. What the bounds cut has their normal; else face
+    // the viewer.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.end.inside;
-    normal = vec_pick(flat, vec_scale(r.direction, R(-1.0)), normal);
+    const vec arm = vec_sub(vec_along(r.origin, met->touch, r.direction), vec_splat(settings->bounds_center));
+    const real radius = (real)(settings->bounds_radius), least = (R(1.0) - ON_BOUNDS) * radius;
+    const mask cut = there.end.inside & less(least * least, vec_dot(arm, arm)) & less(vec_dot(arm, r.direction), R(0.0));
+    normal = vec_pick(flat, vec_pick(cut, vec_scale(arm, R(1.0) / radius), vec_scale(r.direction, R(-1.0))), normal);
     // What is seen does not face away, but for a pixel's width past a rim. A hit on the far side of a sheet thinner than a pixel
     // does: mirrored, it stands for the near side.
     const real away = vec_dot(normal, r.direction);

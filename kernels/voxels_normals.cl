@@ -42,6 +42,30 @@ INLINE bool wanted_sample(__global const uint *normals, int sample) {
     return differ >> 31 != 0;
 }
 
+// A direction in three bytes, by the length from SHORTEST to 1 whose rounded components keep it best (Kaplanyan 2010, "CryENGINE 3:
+// Reaching the speed of light"). With length 1 they are off by 0.17 degrees in the median, so by 0.06. What is blended with others of its
+// cell must not be much shorter than these.
+#define SHORTEST 0.9f
+#define LENGTHS 16
+
+INLINE uint packed(float x, float y, float z) {
+    uint best = 0;
+    float least = MAXFLOAT;
+    for (int i = 0; i < TURNS(LENGTHS); ++i) {
+        const float length = 127.5f * (1.0f - (1.0f - SHORTEST) / LENGTHS * (float)i);
+        const uint red = convert_uchar_sat(x * length + 128.0f), green = convert_uchar_sat(y * length + 128.0f);
+        const uint blue = convert_uchar_sat(z * length + 128.0f);
+        const float u = (float)red - 127.5f, v = (float)green - 127.5f, w = (float)blue - 127.5f;
+        const float a = y * w - z * v, b = z * u - x * w, c = x * v - y * u;
+        const float off = (a * a + b * b + c * c) / (u * u + v * v + w * w);
+        if (off < least) {
+            least = off;
+            best = red | green << 8 | blue << 16;
+        }
+    }
+    return best;
+}
+
 // Lines of PACKETS packets, one a lane: through `from`, along `out`, which points out of the solid.
 typedef struct {
     vec from[PACKETS], out[PACKETS];
@@ -97,7 +121,7 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
     find_surface(l, side, place, usable, orbit, k);
     for (int p = 0; p < TURNS(PACKETS); ++p) {
         surface_point surface;
-        orbit_dual_distance(vec_along(l->from[p], place[p], l->out[p]), usable[p], orbit, k, &surface);
+        orbit_dual_distance(vec_along(l->from[p], place[p], l->out[p]), usable[p], OF_SURFACE, orbit, k, &surface);
         normal[p] = vec_normalize(surface.gradient);
         usable[p] &= less(R(0.5), vec_dot(normal[p], normal[p]));
     }
@@ -187,11 +211,8 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
             for (int lane = 0; lane < LANES; ++lane) {
                 const int at = p * LANES + lane;
                 if (at >= wanted || good[lane] == 0) continue;
-                const uint red = convert_uchar_sat((float)nx[lane] * 127.5f + 128.0f);
-                const uint green = convert_uchar_sat((float)ny[lane] * 127.5f + 128.0f);
-                const uint blue = convert_uchar_sat((float)nz[lane] * 127.5f + 128.0f);
                 const int sample = list[at];
-                normal[sample] = red | green << 8 | blue << 16 | (normal[sample] & 0xff000000u);
+                normal[sample] = packed((float)nx[lane], (float)ny[lane], (float)nz[lane]) | (normal[sample] & 0xff000000u);
             }
         }
     }

@@ -18,6 +18,12 @@ ORBIT = Struct(
     "Orbit",
     [
         Field("iterations", "int", 0, "most applications of the formula"),
+        Field(
+            "gradient_limit",
+            "int",
+            0,
+            "applications after which the surface's gradient is that of no later z",
+        ),
         Field("longest", "int", 0, "applications allowed to get from the bailout to the distance bailout"),
         Field("bailout_square", "real", 0, "|z|^2 beyond which a point has escaped"),
         Field("distance_square", "real", 0, "|z|^2 beyond which distances are exact enough"),
@@ -74,12 +80,14 @@ def orbit_record(
     precision: Precision,
     bailout: float | None = None,
     *,
+    potential: bool = False,
     joined: Mapping[str, object] | None = None,
 ) -> Record:
     """The limits of an orbit.
 
     Args:
         bailout: in the place of the formula's own.
+        potential: whether normals are those of the potential, which is of any number of applications.
         joined: values of the fields that say which of several solids this is; see `clfractal/solids.py`.
     """
     inner = bailout if bailout is not None else chain.bailout
@@ -88,6 +96,7 @@ def orbit_record(
     linear = chain.degree <= 1
     values = {
         "iterations": iterations,
+        "gradient_limit": -1 if potential else iterations,
         "longest": iterations if linear or outer == inner else iterations + EXTRA_APPLICATIONS,
         "bailout_square": inner**2,
         "distance_square": outer**2,

@@ -110,12 +110,14 @@ def escape(
 
 
 def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float]:
-    """Estimated distance to the solid (0 inside), in scene units, and the gradient of the last potential.
+    """Estimated distance to the solid (0 inside), in scene units, and the gradient of the surface.
 
     The solid is the set of points with |z| <= bailout after `iterations` applications. With J the Jacobian of
     the last z and g = |J^T z/|z||: for a degree above 1 |z| log|z| / (2 g) times two factors (docs/formulas.md, Distances),
     for degree 1 (|z| - R) / g with R the chain's `solid_radius`, or the last lasting formula's `shape` over its
     own gradient. Iteration stops beyond the distance bailout. No step scale is applied.
+
+    The gradient is J^T z, too, but of no z after `iterations` applications: the solid's surface is a level set of that one.
 
     Returns:
         Distances of shape (n,); gradients of shape (n, 3), which point out of the solid and are not
@@ -123,9 +125,10 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
     """
     backend = DualBackend(NumpyBackend())
     with np.errstate(all="ignore"):
-        state, count, inside = _dual_orbit(chain, points, iterations, backend)
+        state, shown, count, inside = _dual_orbit(chain, points, iterations, backend)
         radius = _norm([z.value for z in state])
-        gradient = _gradient(state, radius)
+        growth = np.linalg.norm(_gradient(state, radius), axis=1)
+        gradient = _gradient(shown, _norm([z.value for z in shown]))
         if chain.shape_index is not None:
             bound = chain.links[chain.shape_index].bound
             names = {**bound.values, **dict(zip(bound.formula.variables, state, strict=True))}
@@ -144,9 +147,9 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
             level = math.log(chain.bailout) * chain.degree**-left / height
             far = height * chain.degree ** (-count / chain.cycle_length)
             share = (1 - level**2) / (1 + far / 2 + far**2 / 12)
-            result = 0.5 * radius * height * share / np.linalg.norm(gradient, axis=1)
+            result = 0.5 * radius * height * share / growth
         else:
-            result = (radius - chain.solid_radius) / np.linalg.norm(gradient, axis=1)
+            result = (radius - chain.solid_radius) / growth
         result = np.where(inside | ~(result > 0), 0.0, result)
     return result, gradient
 
@@ -172,8 +175,8 @@ def _gradient(state: Sequence[Any], radius: Float) -> Float:
 
 def _dual_orbit(
     chain: Chain, points: Float, iterations: int, backend: DualBackend
-) -> tuple[list[Any], NDArray[np.int64], NDArray[np.bool_]]:
-    """Orbits over duals until |z| > distance bailout: last states, counts, and which are inside."""
+) -> tuple[list[Any], list[Any], NDArray[np.int64], NDArray[np.bool_]]:
+    """Orbits over duals until |z| > distance bailout: last states, those at the limit, counts, and which are inside."""
     columns = np.array(points, dtype=float).reshape(-1, 3).T
     shape = columns[0].shape
     point = [_full(p, shape) for p in space_to_state(chain, seeded(list(columns)), backend)]
@@ -184,6 +187,7 @@ def _dual_orbit(
     alive = _norm([z.value for z in state]) <= chain.distance_bailout
     # For degree 1 the distance is good at any |z|; going on would measure a smaller solid.
     extra = EXTRA_APPLICATIONS if chain.degree > 1 else 1
+    shown = state
     for application in range(iterations + extra):
         if application >= iterations:
             # Only points that have left the bailout go on.
@@ -191,6 +195,8 @@ def _dual_orbit(
             if application == iterations:
                 inside = settled
             alive &= ~settled & (chain.degree > 1)
+        if application <= iterations:
+            shown = state
         if not alive.any():
             break
         bound = chain.link_at(application).bound
@@ -198,7 +204,7 @@ def _dual_orbit(
         state = [_select(alive, _full(n, shape), z) for n, z in zip(new, state, strict=True)]
         count += alive
         alive = alive & (_norm([z.value for z in state]) <= chain.distance_bailout)
-    return state, count, inside
+    return state, shown, count, inside
 
 
 def _full(value: Any, shape: tuple[int, ...]) -> Dual:

@@ -139,9 +139,7 @@ def several_points(scene: Scene) -> int:
 def uses_positions(scene: Scene) -> bool:
     """Whether normals or colours are made from the places of a pixel's points."""
     renderer = scene.surface
-    return renderer.used_points.count > 1 and (
-        renderer.normal != "gradient" or scene.coloring.by == "residual"
-    )
+    return renderer.used_points.count > 1 and (renderer.normal_of_points or scene.coloring.by == "residual")
 
 
 def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
@@ -157,7 +155,7 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "POINT_PATTERN": int(points.pattern == "stochastic"),
         "POINT_SIDE": math.isqrt(points.count),
         **{f"NORMAL_{name.upper()}": number for number, name in enumerate(NORMALS)},
-        "NORMAL": NORMALS.index(renderer.normal),
+        "NORMAL": NORMALS.index(renderer.normal if renderer.normal_of_points else "gradient"),
         "GEOMETRIC": int(uses_positions(scene)),
         "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
         "HAS_ENVIRONMENT": int(scene.environment is not None),
@@ -216,8 +214,9 @@ def glow_defines(scene: Scene, plan: Plan, glow: Glow) -> dict[str, object]:
 def normal_count(scene: Scene) -> int:
     """Normals over which a pixel's shading is averaged."""
     renderer = scene.surface
-    counts = {"gradient": renderer.used_points.count, "eight_triangles_shading": 8}
-    return counts.get(renderer.normal, 1)
+    if not renderer.normal_of_points:
+        return renderer.used_points.count
+    return 8 if renderer.normal == "eight_triangles_shading" else 1
 
 
 def state_numbers(scene: Scene, plan: Plan) -> int:

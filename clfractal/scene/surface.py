@@ -63,8 +63,16 @@ class SurfaceRenderer(Sampled):
         None, description="points of a pixel; null: one in its middle, or 3 x 3 where `normal` needs them"
     )
     normal: Literal[
-        "gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares"
-    ] = Field("gradient", description="where normals come from: the Jacobian, or the pixel's points")
+        "gradient",
+        "potential",
+        "one_triangle",
+        "eight_triangles_shading",
+        "eight_triangles_normal",
+        "least_squares",
+    ] = Field(
+        "gradient",
+        description="where normals come from: the surface's Jacobian, the smoother potential's, or the pixel's points",
+    )
     detail: float = Field(
         1.0, ge=0.01, le=100, description="distance that counts as a hit, in pixel footprints"
     )
@@ -94,7 +102,7 @@ class SurfaceRenderer(Sampled):
 
     @model_validator(mode="after")
     def _enough_points(self) -> Self:
-        if self.normal == "gradient" or self.points is None:
+        if not self.normal_of_points or self.points is None:
             return self
         pattern, count = self.points.pattern, self.points.count
         if self.normal in GRID_NORMALS and (pattern != "grid" or count not in (9, 25, 49)):
@@ -106,8 +114,13 @@ class SurfaceRenderer(Sampled):
         return self
 
     @property
+    def normal_of_points(self) -> bool:
+        """Whether normals are made from the places of a pixel's points."""
+        return self.normal not in ("gradient", "potential")
+
+    @property
     def used_points(self) -> Points:
         """The points that are used; if `points` is null, `normal` decides."""
         if self.points is not None:
             return self.points
-        return Points(pattern="grid", count=1 if self.normal == "gradient" else 9)
+        return Points(pattern="grid", count=9 if self.normal_of_points else 1)

@@ -72,8 +72,9 @@ class Grid:
         table: the same on the device, x fastest.
         values: samples, uint8 or float32, in up to four buffers (`parts.ranges()`).
         normals: four bytes a sample: round(127.5 (n + 1)) of the outward normal's x, y and z (128 where there is
-            none), and 255 inside, 0 outside. `least_squares` and `exact` ones are those of samples of a brick's cells
-            that the surface goes through: of a sample that bricks share, a copy may still be by differences.
+            none; its length is 0.9 to 1), and 255 inside, 0 outside. `least_squares` and `exact` ones are those of
+            samples of a brick's cells that the surface goes through: of a sample that bricks share, a copy may still be
+            by differences.
         solid_slot: the slot that all bricks share which are inside as a whole; None where each has its own.
         outside_slot: the slot that bricks share which are outside as a whole, where that can be seen; None where they are
             not stored, or each has its own.

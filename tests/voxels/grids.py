@@ -89,6 +89,7 @@ def inside(chain: Chain, points: Floats, iterations: int) -> npt.NDArray[np.bool
 
 
 def decoded(normals: npt.NDArray[np.uint8]) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Normals of bytes of shape (..., 4), and where there is one."""
+    """Normals of bytes of shape (..., 4), of length 1, and where there is one."""
     vectors = normals[..., :3] / 127.5 - 1
-    return vectors, (normals[..., :3] != 128).any(axis=-1)
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / length, (normals[..., :3] != 128).any(axis=-1)

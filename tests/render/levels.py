@@ -1,0 +1,61 @@
+"""Level sets of |z| after some applications, and where they face: finite differences of the formula alone, in float64."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.formulas.backends import NumpyBackend
+from clfractal.formulas.chain import Chain
+from clfractal.formulas.reference import apply, constant_of, space_to_state
+
+Floats = npt.NDArray[np.float64]
+
+STEP = 1e-7
+
+
+def sizes(chain: Chain, points: Floats, applications: int) -> Floats:
+    """|z| after 1, 2, ... applications, shape (applications, n), of points of shape (n, 3)."""
+    backend = NumpyBackend()
+    columns: list[Any] = [np.array(column, float) for column in points.T]
+    with np.errstate(all="ignore"):
+        point = [np.broadcast_to(p, columns[0].shape) for p in space_to_state(chain, columns, backend)]
+        state: list[Any] = [np.zeros_like(p) for p in point] if chain.add == "point" else list(point)
+        found = []
+        for application in range(applications):
+            bound = chain.link_at(application).bound
+            mapped = apply(bound, state, constant_of(bound, point), backend)
+            state = [np.broadcast_to(np.asarray(z, float), columns[0].shape).copy() for z in mapped]
+            found.append(np.sqrt(sum(z * z for z in state)))
+    return np.array(found)
+
+
+def slopes(chain: Chain, points: Floats, applications: int) -> Floats:
+    """How |z| after so many applications changes along x, y and z, shape (n, 3)."""
+
+    def size(at: Floats) -> Floats:
+        last: Floats = sizes(chain, at, applications)[-1]
+        return last
+
+    with np.errstate(all="ignore"):
+        ways = [(size(points + STEP * e) - size(points - STEP * e)) / (2 * STEP) for e in np.eye(3)]
+    return np.stack(ways, axis=-1)
+
+
+def onto_level(chain: Chain, points: Floats, applications: int, level: float) -> Floats:
+    """The points moved down or up the slope to where |z| is the level, by Newton's method over its logarithm."""
+    for _ in range(12):
+        size, slope = sizes(chain, points, applications)[-1], slopes(chain, points, applications)
+        with np.errstate(all="ignore"):
+            points = points - (np.log(size / level) * size / (slope**2).sum(-1))[:, None] * slope
+    return points
+
+
+def degrees(normals: Floats, expected: Floats) -> Floats:
+    """Angles between normals and directions of any length."""
+    with np.errstate(all="ignore"):
+        unit = expected / np.linalg.norm(expected, axis=-1, keepdims=True)
+    found: Floats = np.degrees(np.arccos(np.clip((normals * unit).sum(-1), -1, 1)))
+    return found

@@ -1,0 +1,170 @@
+"""Gradient normals are those of the surface that is shown: the level set of |z| at the limit of applications."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.device.select import Device, has_float64
+from clfractal.device.structs import Precision
+from clfractal.pictures.film import Film
+from clfractal.scene.model import Scene
+from clfractal.scene.objects import FormulaObject, turned_axes
+from tests.render.levels import Floats, degrees, sizes, slopes
+from tests.render.shots import normals_of, points_of, scene_of, shoot
+from tests.variants import one_of
+
+# Formulas that stretch space unevenly: an application more turns the normal by degrees.
+UNEVEN = ("hast", "aexion", "makin_brot", "tetrabrot", "riemann_sphere")
+CAMERA = {"position": [1.7, -2.9, 1.4], "target": [0, 0, 0], "frame": "all"}
+FINE: dict[str, Any] = {"type": "surface", "detail": 0.02}
+SEARCHES: dict[str, dict[str, Any]] = {"distance": {}, "steps": {"search": "steps", "step": 0.004}}
+
+
+def finest(device: Device) -> Precision:
+    return "float64" if has_float64(device.info) else "float32"
+
+
+def hits(film: Film) -> tuple[Floats, Floats]:
+    """Places and normals of pixels that are covered as a whole."""
+    whole = np.isfinite(film["Z"]) & (film["A"] > 0.999)
+    assert whole.sum() > 60
+    return points_of(film)[whole], normals_of(film)[whole]
+
+
+def off(scene: Scene, places: Floats, normals: Floats, nearly: float = 1.002) -> Floats:
+    """Angles to the slope of |z| at the limit, of hits on the surface itself: others have met a thread beside them."""
+    limit, bailout = scene.formula.iterations, scene.chain.bailout
+    size = sizes(scene.chain, places, limit)
+    on_it = (size <= scene.chain.distance_bailout).all(axis=0)
+    on_it &= (size[-1] > bailout) & (size[-1] < nearly * bailout)
+    assert on_it.sum() > 20
+    return degrees(normals[on_it], slopes(scene.chain, places[on_it], limit))
+
+
+@pytest.mark.parametrize("iterations", [3, 5, 8])
+@pytest.mark.parametrize("name", UNEVEN)
+def test_normals_are_the_slope_of_the_last_z(device: Device, name: str, iterations: int) -> None:
+    scene = scene_of({"name": name, "iterations": iterations}, CAMERA, (144, 108), renderer=FINE)
+    places, normals = hits(shoot(scene, device, finest(device), lanes=4))
+    angles = off(scene, places, normals)
+    assert np.median(angles) < 0.1
+    if iterations == 3:
+        assert np.percentile(angles, 90) < 0.1
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+@pytest.mark.parametrize(("points", "lanes"), one_of((9, 4), (1, 1), (1, 8), (9, 1)))
+def test_each_search_lanes_and_points(device: Device, search: str, points: int, lanes: int) -> None:
+    renderer = {**FINE, **SEARCHES[search], "points": {"count": points, "pattern": "grid"}}
+    scene = scene_of({"name": "hast", "iterations": 4}, CAMERA, (64, 48), renderer=renderer)
+    places, normals = hits(shoot(scene, device, lanes=lanes))
+    assert np.median(off(scene, places, normals)) < 0.1
+
+
+@pytest.mark.parametrize(
+    "formula",
+    one_of(
+        {"name": "mandelbulb", "iterations": 3},
+        {"chain": [{"name": "hast"}, {"name": "makin_brot"}], "iterations": 4},
+        {"name": "cosine_mandelbulb", "iterations": 3},
+    ),
+    ids=["rule", "chain", "cosine"],
+)
+def test_formulas_with_a_rule_of_their_own_and_chains(device: Device, formula: dict[str, Any]) -> None:
+    scene = scene_of(formula, CAMERA, (64, 48), renderer=FINE)
+    places, normals = hits(shoot(scene, device, finest(device), lanes=4))
+    assert np.median(off(scene, places, normals)) < 0.1
+
+
+def test_the_potential_has_the_slope_of_a_later_z(device: Device) -> None:
+    """The smoother normals: of the z that has left the larger radius."""
+    renderer = {**FINE, "normal": "potential"}
+    scene = scene_of({"name": "hast", "iterations": 5}, CAMERA, (96, 72), renderer=renderer)
+    places, normals = hits(shoot(scene, device, finest(device), lanes=4))
+    assert np.median(off(scene, places, normals)) > 3
+    size = sizes(scene.chain, places, 9)
+    last = 1 + (size > scene.chain.distance_bailout).argmax(axis=0)
+    assert (last > 5).mean() > 0.9
+    for applications in np.unique(last):
+        some = last == applications
+        angles = degrees(normals[some], slopes(scene.chain, places[some], applications))
+        assert np.median(angles) < 0.1
+
+
+@lru_cache
+def joined_film(device: Device, normal: str) -> tuple[Scene, Film]:
+    other = {
+        "type": "formula",
+        "formula": {"name": "makin_brot", "iterations": 4},
+        "position": [1.6, 0.4, 0.3],
+        "rotation": [20, 10, 40],
+        "scale": 0.6,
+    }
+    ball = {"type": "sphere", "position": [-1.1, -0.5, 0], "radius": 0.5, "join": "cut"}
+    renderer = {**FINE, "normal": normal}
+    objects = {"ball": ball, "other": other}
+    scene = scene_of({"name": "hast", "iterations": 4}, CAMERA, (96, 72), objects=objects, renderer=renderer)
+    return scene, shoot(scene, device, finest(device), lanes=4)
+
+
+def test_each_of_several_solids_has_its_own_level(device: Device) -> None:
+    scene, film = joined_film(device, "gradient")
+    other = scene.objects["other"]
+    places, normals = hits(film)
+    assert isinstance(other, FormulaObject)
+    axes = np.array(turned_axes(other.rotation))
+    own = (places - np.array(other.position)) @ axes.T / other.scale
+    chain = scene.joined_chains["other"]
+    with np.errstate(all="ignore"):
+        of_other = np.abs(sizes(chain, own, 4)[-1] / chain.bailout - 1) < 0.01
+        of_first = np.abs(sizes(scene.chain, places, 4)[-1] / scene.chain.bailout - 1) < 0.01
+    of_first &= ~of_other
+    assert of_other.sum() > 100
+    assert of_first.sum() > 100
+    assert np.median(off(scene, places[of_first], normals[of_first])) < 0.1
+    assert np.median(degrees(normals[of_other], slopes(chain, own[of_other], 4) @ axes)) < 0.1
+
+
+# --- where the bounds cut the set ---
+
+CUT = {"center": [-0.3, -0.1, 0.05], "radius": 0.45}
+
+
+@pytest.mark.parametrize("search", SEARCHES)
+@pytest.mark.parametrize(("points", "normal"), one_of((1, "gradient"), (9, "gradient"), (9, "least_squares")))
+def test_what_the_bounds_cut_has_their_normal(device: Device, search: str, points: int, normal: str) -> None:
+    renderer = {
+        "type": "surface",
+        "bounds": CUT,
+        "points": {"count": points, "pattern": "grid"},
+        "normal": normal,
+        **SEARCHES[search],
+    }
+    camera = {"position": [1.7, -2.9, 1.4], "target": CUT["center"], "fov": 17}
+    scene = scene_of({"name": "hast", "iterations": 40}, camera, (96, 96), renderer=renderer)
+    places, normals = hits(shoot(scene, device, finest(device), lanes=4))
+    arm = (places - np.array(CUT["center"])) / CUT["radius"]
+    away = np.linalg.norm(arm, axis=-1)
+    inside = sizes(scene.chain, places, 40)
+    cut = (away > 1 - 1e-5) & (inside <= scene.chain.bailout).all(axis=0)
+    assert cut.sum() > 500
+    angles = degrees(normals[cut], arm[cut])
+    assert np.median(angles) < 0.05
+    if normal == "gradient":
+        assert np.percentile(away, 99) < 1 + 1e-4
+        assert np.percentile(angles, 95) < 0.1
+
+
+def test_what_a_formulas_own_ball_cuts_has_its_normal(device: Device) -> None:
+    """After one application |z| is below the bailout in a ball far larger than its own, alone or joined to another."""
+    for objects in ({}, {"ball": {"type": "sphere", "position": [9, 0, 0], "radius": 0.5, "join": "union"}}):
+        scene = scene_of({"name": "hast", "iterations": 1}, CAMERA, (48, 48), objects=objects, renderer=FINE)
+        places, normals = hits(shoot(scene, device, finest(device), lanes=4))
+        arm = places - np.array(scene.chain.center)
+        of_it = np.linalg.norm(arm, axis=-1) < 1.1 * scene.chain.radius
+        assert of_it.sum() > 100
+        assert degrees(normals[of_it], arm[of_it]).max() < 0.1
