@@ -45,6 +45,7 @@ def render(
     *,
     precision: str | None = None,
     samples: int | None = None,
+    size: tuple[int, int] | None = None,
     region: tuple[int, int, int, int] | None = None,
     channels: Sequence[str] | None = None,
     quality: str | None = None,
@@ -60,9 +61,10 @@ def render(
             the render.
         precision: `auto`, `float32` or `float64`; None: the scene's.
         samples: rays per pixel; None: the scene's.
+        size: width and height of the picture, pixels; it shows what the scene's own size shows. None: the scene's.
         region: x, y, width, height of the part to render, pixels from the top left; None: all of it.
         channels: names of the channels; None: the scene's `output.channels`.
-        quality: `draft`, `good`, `final` or `print`: samples, noise and detail together, in the place of the scene's;
+        quality: `draft`, `good`, `final` or `print`: samples and noise together, in the place of the scene's;
             `samples` wins.
         executor: a `clfractal.Cluster` that renders in the place of a device of this process.
 
@@ -83,6 +85,7 @@ def render(
             progress,
             precision=precision,
             samples=samples,
+            size=size,
             region=region,
             channels=channels,
             quality=quality,
@@ -96,6 +99,7 @@ def render_pair(
     *,
     precision: str | None = None,
     samples: int | None = None,
+    size: tuple[int, int] | None = None,
     channels: Sequence[str] | None = None,
     quality: str | None = None,
     executor: Elsewhere | None = None,
@@ -111,7 +115,13 @@ def render_pair(
 
     with engine_on(device, executor) as engine:
         return engine.render_pair(
-            scene, progress, precision=precision, samples=samples, channels=channels, quality=quality
+            scene,
+            progress,
+            precision=precision,
+            samples=samples,
+            size=size,
+            channels=channels,
+            quality=quality,
         )
 
 

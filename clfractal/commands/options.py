@@ -87,7 +87,7 @@ Quality = Annotated[
     typer.Option(
         "--quality",
         metavar="PRESET",
-        help="draft, good, final or print: samples, noise and detail together; other options win.",
+        help="draft, good, final or print: samples and noise together; other options win.",
         autocompletion=completion.quality_presets,
     ),
 ]

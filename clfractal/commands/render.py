@@ -17,7 +17,7 @@ from clfractal.commands.shell import OUTPUT, Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
-from clfractal.scene.load import load_scene
+from clfractal.scene.load import SceneText, load_scene, read_scene, sized
 from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
@@ -135,9 +135,12 @@ def _render(
 def ordered_scene(order: Order) -> Scene:
     """The scene with the options folded in; errors name the option that was given."""
     given: dict[str, tuple[str, str]] = {}  # key -> option, value
+    source: Path | SceneText = Path(order.scene)
     if order.size is not None:
         width, height = numbers_of("--size", order.size, "x", 2, "WIDTHxHEIGHT, such as 1920x1080")
-        given |= {"image.width": ("--size", str(width)), "image.height": ("--size", str(height))}
+        source = read_scene(Path(order.scene))
+        values = sized(source, order.overrides, (width, height))
+        given |= {key: ("--size", value) for key, value in values.items()}
     if order.samples is not None:
         given["renderer.samples"] = ("--samples", str(order.samples))
     if order.precision is not None:
@@ -146,7 +149,7 @@ def ordered_scene(order: Order) -> Scene:
         given["output.denoise"] = ("--denoise", "true")
     overrides = [*order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
-        scene = load_scene(Path(order.scene), overrides=overrides, folder=order.folder)
+        scene = load_scene(source, overrides=overrides, folder=order.folder)
     except ClfractalError as error:
         where = error.where
         key = (where.file or "").removeprefix("--set ")

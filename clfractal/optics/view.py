@@ -13,7 +13,7 @@ import numpy.typing as npt
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
+from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Placed
 from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo
 
@@ -46,7 +46,7 @@ class View:
     lens_radius: float = 0.0
     focus_distance: float = 1.0
 
-    def pixel_size(self, image_height: int) -> float:
+    def pixel_size(self, image_height: float) -> float:
         """Height of a pixel on the plane, scene units."""
         return self.height / image_height
 
@@ -235,7 +235,8 @@ def seen_by(scene: Scene, name: EyeName) -> tuple[Scene, Eye]:
     eye = Eye(name, wide, high)
     if (wide, high) == (1, 1):
         return scene, eye
-    image = Image(width=scene.image.width // wide, height=scene.image.height // high)
+    # Squeezed pixels are taller: the eye's whole picture has the reference of the scene's, in its own pixels.
+    image = scene.image.part(scene.image.width // wide, scene.image.height // high)
     return scene.model_copy(update={"image": image}), eye
 
 

@@ -113,16 +113,9 @@ class TileKernel(ABC):
 
     def arguments(self) -> list[KernelArgument]:
         """All arguments that stay the same from one launch to the next, in the kernel's order."""
-        image, transparent = self.scene.image, self.scene.background == "transparent"
+        transparent = self.scene.background == "transparent"
         return [
-            view_records(
-                self.view.poses or (self.view.camera,),
-                image.width,
-                image.height,
-                self.plan,
-                self.precision,
-                footprint=self.footprint,
-            ),
+            view_records(self.view.poses or (self.view.camera,), self.scene.image, self.plan, self.precision),
             sampling_record(
                 self.scene.renderer,
                 self.plan.samples,
@@ -132,11 +125,6 @@ class TileKernel(ABC):
             *self.own_arguments(),
             slots(self.plan, self.scene.renderer),
         ]
-
-    @property
-    def footprint(self) -> int:
-        """How many of the picture's pixels a ray's cone is wide."""
-        return 1
 
     @property
     def has_alpha(self) -> bool:

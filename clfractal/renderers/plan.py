@@ -42,8 +42,6 @@ class Plan:
         channels: what the film holds, in order.
         divider: n for a coarse picture, which has every nth pixel of the picture in each direction; the region is counted
             in these.
-        finished_samples: rays per pixel of the finished picture, where that is not `samples`; 0: it is. A coarse picture
-            looks like the finished one.
         moving: whether the view moves while the picture is taken.
     """
 
@@ -53,13 +51,7 @@ class Plan:
     region: Region
     channels: tuple[str, ...]
     divider: int = 1
-    finished_samples: int = 0
     moving: bool = False
-
-    @property
-    def averaged(self) -> int:
-        """Samples that a pixel of the finished picture averages."""
-        return self.finished_samples or self.samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,19 +120,14 @@ class PlannedView:
         region = self.plan.region
         left, top = region.x // divider, region.y // divider
         small = Region(left, top, -(-region.right // divider) - left, -(-region.bottom // divider) - top)
-        return replace(
-            self,
-            plan=replace(
-                self.plan, samples=1, region=small, divider=divider, finished_samples=self.plan.averaged
-            ),
-        )
+        return replace(self, plan=replace(self.plan, samples=1, region=small, divider=divider))
 
 
 def finest_steps(scene: Scene, view: View) -> float:
     """Width of the narrowest pixel footprint that the picture may show, in float32 steps of the coordinates there."""
     found, radius = scene.bounds
     center = np.array(found)
-    footprint = view.pixel_size(scene.image.height)
+    footprint = view.pixel_size(max(scene.image.height, scene.image.reference))
     if view.eye is not None:
         plane = float((view.center - view.eye) @ view.axis)
         # Inside the bounds the surface may be anywhere; what the camera is aimed at sets the scale.

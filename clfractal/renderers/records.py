@@ -34,7 +34,7 @@ from clfractal.scene.lighting import (
 )
 from clfractal.scene.maps import QUANTITIES, Map
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import Gradient
+from clfractal.scene.parts import Gradient, Image
 
 VIEW = Struct(
     "View",
@@ -50,7 +50,7 @@ VIEW = Struct(
         Field("up", "real", 3, "the picture's up, length 1"),
         Field("lens_radius", "real", 0, "half the lens's diameter, scene units; 0 for a pinhole"),
         Field("focus_distance", "real", 0, "of the plane that is sharp, along the axis, scene units"),
-        Field("pixel_size", "real", 0, "height of a pixel on the plane, scene units"),
+        Field("pixel_size", "real", 0, "height of a pixel of the reference on the plane, scene units"),
         Field("perspective", "int", 0, "1: rays leave the eye; 0: rays are parallel to the axis"),
         Field("height", "int", 0, "height of the picture, pixels"),
         Field("spans", "int", 0, "between the poses of a view that moves; else 0"),
@@ -71,7 +71,7 @@ MARCH = Struct(
         Field("ball_radius", "real", 0, "its radius, scene units"),
         Field("step_scale", "real", 0, "part of a distance that is safe to step"),
         Field("relaxation", "real", 0, "factor on steps, taken back where spheres do not touch"),
-        Field("detail", "real", 0, "distance that counts as a hit, in pixel footprints"),
+        Field("detail", "real", 0, "distance that counts as a hit, in footprints of the reference"),
         Field("near", "real", 0, "scaled distance at which light is computed, in cones"),
         Field("shadow_lift", "real", 0, "where shadow rays start, in footprints above the surface"),
         Field("shadow_detail", "real", 0, "hit distance of shadow rays, in footprints over detail"),
@@ -202,8 +202,9 @@ SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
 # And the part of a scaled distance that the cone takes for free.
 CONE_MARGIN, CONE_SHARE = 1.5, 0.8
-# In cones: the distance at which light is computed for a pixel of one sample, and at the least.
-NEAR, NEAR_LEAST = 2.2, 0.6
+# In cones of the reference's pixels: the distance at which light is computed. Nearer, rough surfaces are noise; farther
+# off, the picture would no longer be that of the set.
+NEAR = 0.6
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
 TOUCH = 0.75
 # In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
@@ -219,18 +220,14 @@ def struct_text() -> str:
     return "".join(struct.c_text() for struct in STRUCTS)
 
 
-def view_records(
-    poses: Sequence[View], width: int, height: int, plan: Plan, precision: Precision, *, footprint: int = 1
-) -> Record:
-    """The poses of a view for a picture of `width` x `height` pixels, of which the plan's region is rendered.
+def view_records(poses: Sequence[View], image: Image, plan: Plan, precision: Precision) -> Record:
+    """The poses of a view for a picture, of which the plan's region is rendered.
 
     With a divider d pixel (x, y) of the plan is the picture's pixel (d x + d / 2, d y + d / 2), with the very same ray: a
-    coarse picture shows what the finished one will show there.
-
-    Args:
-        footprint: how many of the picture's pixels the cone of a ray is wide.
+    coarse picture shows what the finished one will show there. A ray is as wide as a pixel of the image's reference.
     """
     coarse, region = plan.divider, plan.region
+    width, height = image.width, image.height
 
     def values(view: View) -> dict[str, object]:
         return {
@@ -245,7 +242,7 @@ def view_records(
             "focus_distance": view.focus_distance,
             "center_x": (width - (coarse > 1)) / 2 / coarse,
             "center_y": (height - (coarse > 1)) / 2 / coarse,
-            "pixel_size": view.pixel_size(height) * footprint,
+            "pixel_size": view.pixel_size(image.reference),
             "perspective": int(view.eye is not None),
             "height": -(-height // coarse),
             "spans": len(poses) - 1,
@@ -264,24 +261,43 @@ def step_scale(scene: Scene) -> float:
     return given if given is not None else scene.chain.step_scale
 
 
-def near_height(scene: Scene, samples: int) -> float:
-    """The scaled distance at which light is computed, in cones.
+@dataclass(frozen=True, slots=True)
+class Fineness:
+    """How finely rays look for the set, and how the light on it is computed, in footprints of the image's reference.
 
-    The only sample of a pixel is smoothed over several footprints, or a rough surface would be noise. Many samples, or
-    points, are averaged, and show the surface as it is.
+    A picture shows what its reference shows, however many pixels it has. Where these are smaller than the reference's,
+    rays hit more exactly, and light stays as it is; where they are larger, rays hit as the reference's do, since light is
+    computed near there.
+
+    Attributes:
+        pixel: width of a pixel of the picture; of a coarse one that of the block it stands for.
+        detail: the distance that counts as a hit.
+        near: the distance at which light is computed, as a part of `detail`.
     """
-    parts = samples * scene.surface.used_points.count
-    return step_scale(scene) * max(NEAR / parts, NEAR_LEAST)
+
+    pixel: float
+    detail: float
+    near: float
+
+    @classmethod
+    def of(cls, scene: Scene, divider: int = 1) -> Fineness:
+        """That of a scene's picture; one of `divider` x `divider` of its pixels."""
+        own, detail = scene.image.reference / scene.image.height, scene.surface.detail
+        exact = detail * min(own, 1.0)
+        return cls(own * divider, exact, NEAR * detail / exact)
 
 
 def march_record(
     scene: Scene,
     precision: Precision,
-    samples: int = 1,
+    divider: int = 1,
     environment: PackedEnvironment | None = None,
     on_set: SetLights | None = None,
 ) -> Record:
-    """The settings of the march, and of the rays that a shot sends; a pixel averages `samples` shots."""
+    """The settings of the march, and of the rays that a shot sends.
+
+    A pixel stands for `divider` x `divider` of the picture's.
+    """
     renderer = scene.surface
     center, radius = scene.bounds
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
@@ -290,7 +306,11 @@ def march_record(
     largest = float(np.finfo(np.float32).max) / 16
     limit = firefly_limit(scene)
     points = renderer.used_points.count
-    touch = max(TOUCH / renderer.detail, 1 / math.sqrt(points)) if points > 1 else 1.0
+    fineness = Fineness.of(scene, divider)
+    # Points lie all over their pixel, and the march that they share has to be as wide.
+    spread = fineness.pixel if points > 1 else 1.0
+    touch = max(TOUCH * spread / fineness.detail, 1 / math.sqrt(points)) if points > 1 else 1.0
+    near = step_scale(scene) * fineness.near
     values = {
         "bounds_center": center,
         "bounds_radius": radius,
@@ -299,18 +319,18 @@ def march_record(
         "ball_radius": scene.chain.radius,
         "step_scale": step_scale(scene),
         "relaxation": renderer.over_relaxation,
-        "detail": renderer.detail,
-        "near": near_height(scene, samples),
+        "detail": fineness.detail,
+        "near": near,
         "shadow_lift": SHADOW_LIFT * renderer.detail,
-        "shadow_detail": SHADOW_DETAIL,
-        "cone_margin": max(CONE_MARGIN * near_height(scene, samples) / step_scale(scene), 1.5 * touch),
+        "shadow_detail": SHADOW_DETAIL * renderer.detail / fineness.detail,
+        "cone_margin": max(CONE_MARGIN * fineness.near, 1.5 * touch),
         "cone_share": CONE_SHARE,
         "max_steps": renderer.max_steps,
         "step": renderer.step if renderer.step is not None else radius / 100,
         "touch_share": touch,
         # The search by steps begins at the eye, and goes both ways from the touch.
-        "point_start": POINT_START if renderer.search == "distance" else largest,
-        "known_reach": KNOWN_REACH / renderer.detail,
+        "point_start": POINT_START * spread if renderer.search == "distance" else largest,
+        "known_reach": KNOWN_REACH * spread / fineness.detail,
         "seed": renderer.seed,
         "bounces": bounces(scene),
         "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,

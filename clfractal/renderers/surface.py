@@ -261,12 +261,6 @@ class SurfaceKernel(TileKernel):
         met = MET_NUMBERS + bool(self.scene.joined) + 2 * joins_smoothly(self.scene)
         return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray, met)
 
-    @property
-    def footprint(self) -> int:
-        # The points of a pixel lie all over the block that a coarse picture's pixel stands for, and their shared march has
-        # to be as wide.
-        return self.plan.divider if self.scene.surface.used_points.count > 1 else 1
-
     def own_arguments(self) -> list[KernelArgument]:
         scene, precision, once = self.scene, self.precision, self.resources.once
         surroundings = scene.surroundings
@@ -276,7 +270,7 @@ class SurfaceKernel(TileKernel):
         on_set, body = set_lights_of(scene), Body.of(scene)
         of_maps, tables = self._tables()
         return [
-            records.march_record(scene, precision, self.plan.averaged, packed, on_set),
+            records.march_record(scene, precision, self.plan.divider, packed, on_set),
             body.records(precision),
             body.constants(precision),
             records.material_record(scene, precision, packed),

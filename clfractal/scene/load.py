@@ -84,6 +84,28 @@ def load_scene(
     return scene
 
 
+def sized(text: SceneText, overrides: Sequence[str], size: tuple[int, int]) -> dict[str, str]:
+    """The overrides that render a scene at another size, by their keys: it stays the same picture, see `Image.resized`.
+
+    Args:
+        overrides: what else is replaced; `image.height` among them is the picture's own size, and so its reference.
+
+    Raises:
+        SceneError: one of the overrides is no KEY=VALUE, or its value no YAML.
+    """
+    width, height = size
+    found = {"image.width": str(width), "image.height": str(height)}
+    document = text.document
+    for override in overrides:
+        document = _overridden(document, override)
+    image = SceneText(document, text.folder).value("image")
+    given = image if isinstance(image, dict) else {}
+    own = given.get("height", _default(("image", "height")))
+    if given.get("reference_height") is None and isinstance(own, int) and own != height:
+        found["image.reference_height"] = str(own)
+    return found
+
+
 def as_scene(source: Scene | str | Path | Mapping[str, Any]) -> Scene:
     """A scene as it is, or loaded: see `load_scene`."""
     return source if isinstance(source, Scene) else load_scene(source)

@@ -385,7 +385,7 @@ class Scene(Section):
                     f"does not fit into a picture of {self.image.width} x {self.image.height} pixels",
                     Where(path=f"layout.views.{number}"),
                 )
-            own: dict[str, object] = {"image": Image(width=place.width, height=place.height), "layout": None}
+            own: dict[str, object] = {"image": self.image.part(place.width, place.height), "layout": None}
             if isinstance(view.renderer, CutPlaneRenderer):
                 # The scene's planes belong to pictures of its set; a cut_plane renderer shows none. Nor has it water.
                 objects = {name: each for name, each in self.objects.items() if isinstance(each, Joined)}

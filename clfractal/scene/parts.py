@@ -32,16 +32,39 @@ MAX_PIXELS = 2**30
 
 
 class Image(Section):
-    """Size of the picture in pixels."""
+    """Size of the picture in pixels, and the size that what it shows is made for."""
 
     width: int = Field(1024, ge=1, le=MAX_SIDE, description="pixels")
     height: int = Field(1024, ge=1, le=MAX_SIDE, description="pixels")
+    reference_height: Annotated[float, Field(strict=True, gt=0, le=MAX_SIDE)] | None = Field(
+        None,
+        description="height of the picture in whose pixels the fineness of colours, normals and light is measured, whatever"
+        " size is rendered; null: `height`",
+    )
 
     @model_validator(mode="after")
     def _bounded(self) -> Self:
         if self.width * self.height > MAX_PIXELS:
             raise problem(f"must be at most {MAX_PIXELS:,} pixels, got {self.width} x {self.height}")
         return self
+
+    @property
+    def reference(self) -> float:
+        """The height in whose pixels the fineness of colours, normals and light is measured."""
+        return float(self.height) if self.reference_height is None else self.reference_height
+
+    def resized(self, width: int, height: int) -> Self:
+        """The same picture with another number of pixels: what it shows stays as it is."""
+        return self._with(width, height, self.reference)
+
+    def part(self, width: int, height: int) -> Self:
+        """A part of the picture with the size of this one's pixels, such as a view of a layout."""
+        return self._with(width, height, self.reference * height / self.height)
+
+    def _with(self, width: int, height: int, reference: float) -> Self:
+        # (Sizes of windows and screens are not the user's mistakes.)
+        own = None if reference == height else reference
+        return self.model_copy(update={"width": width, "height": height, "reference_height": own})
 
 
 class PerspectiveCamera(CameraBase):

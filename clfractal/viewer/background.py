@@ -147,12 +147,10 @@ class Thumbnail:
 
     def _scene(self) -> Scene:
         scene = self._load()
-        from clfractal.scene.parts import Image
-
         renderer = scene.renderer.model_copy(
             update={"samples": self.samples, "noise": None, "min_samples": None}
         )
-        image = Image(width=self.size[0], height=self.size[1])
+        image = scene.image.resized(*self.size)
         return scene.model_copy(update={"image": image, "renderer": renderer, "stereo": None})
 
 

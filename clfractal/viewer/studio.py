@@ -17,7 +17,7 @@ from clfractal.device.select import Device
 from clfractal.errors import ClfractalError
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import Image, OrthographicCamera, PerspectiveCamera
+from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
 from clfractal.viewer.editing import edited, value_at
@@ -242,7 +242,7 @@ class Studio(InFilm):
         """The scene as the window renders it: with an image of the viewport's size."""
         stereo = self.screens(self.scene.stereo)
         width, height = image_of(stereo, self.viewport)
-        shown = {"image": Image(width=width, height=height), "stereo": stereo}
+        shown = {"image": self.scene.image.resized(width, height), "stereo": stereo}
         return self.as_rendered(self.scene).model_copy(update=shown)
 
     def resize(self, width: int, height: int) -> None:
@@ -341,7 +341,9 @@ class Studio(InFilm):
             samples: None: the scene's.
         """
         width, height = size if size is not None else image_of(self.scene.stereo, self.viewport)
-        scene = self.as_rendered(self.scene).model_copy(update={"image": Image(width=width, height=height)})
+        scene = self.as_rendered(self.scene).model_copy(
+            update={"image": self.scene.image.resized(width, height)}
+        )
         if samples is not None:
             scene = edited(scene, {"renderer.samples": samples})
         still = Still(scene, paths, exposed_in=self.exposed_in)

@@ -73,6 +73,7 @@ class AnyEngine(ABC):
         *,
         precision: str | None = None,
         samples: int | None = None,
+        size: tuple[int, int] | None = None,
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
         quality: str | None = None,
@@ -85,6 +86,10 @@ class AnyEngine(ABC):
             FileError: the picture is to be denoised, and the package for it is not installed.
         """
         asked = {"precision": precision, "samples": samples, "region": region, "channels": channels}
+        if size is not None:
+            from clfractal.work.sized import with_size
+
+            scene = with_size(as_scene(scene), size)
         job = self._prepared(scene, asked, quality)
         if job.denoises:
             check_installed()
@@ -118,6 +123,7 @@ class AnyEngine(ABC):
         *,
         precision: str | None = None,
         samples: int | None = None,
+        size: tuple[int, int] | None = None,
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
         quality: str | None = None,
@@ -136,6 +142,7 @@ class AnyEngine(ABC):
                 scene,
                 precision=precision,
                 samples=samples,
+                size=size,
                 region=region,
                 channels=channels,
                 quality=quality,
@@ -181,6 +188,7 @@ class AnyEngine(ABC):
         *,
         precision: str | None = None,
         samples: int | None = None,
+        size: tuple[int, int] | None = None,
         channels: Sequence[str] | None = None,
         quality: str | None = None,
         token: CancelToken | None = None,
@@ -200,7 +208,7 @@ class AnyEngine(ABC):
                 stereo = loaded.stereo.model_copy(update={"mode": "pair"})
                 loaded = loaded.model_copy(update={"stereo": stereo})
             job = self.prepare(
-                loaded, precision=precision, samples=samples, channels=channels, quality=quality
+                loaded, precision=precision, samples=samples, size=size, channels=channels, quality=quality
             )
             films = JobFilms(job)
             state = run(job, films.films, self.executor, progress=progress, token=token)

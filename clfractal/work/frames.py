@@ -84,6 +84,7 @@ def frames(
     numbers: Iterable[int] | None = None,
     precision: str | None = None,
     samples: int | None = None,
+    size: tuple[int, int] | None = None,
     channels: Sequence[str] | None = None,
     quality: str | None = None,
     executor: Elsewhere | None = None,
@@ -98,7 +99,7 @@ def frames(
     Args:
         scene: a Scene, or what `load_scene` takes; it needs an `animation`.
         numbers: the wanted frames, in any order, counted from 0; None: all.
-        device, progress, precision, samples, channels, quality, executor: as for `clfractal.render`, for each frame.
+        device, progress, precision, samples, size, channels, quality, executor: as for `clfractal.render`, for each frame.
 
     Returns:
         An iterator of pairs: the frame's number, and its film.
@@ -118,6 +119,7 @@ def frames(
                 progress,
                 precision=precision,
                 samples=samples,
+                size=size,
                 channels=channels,
                 quality=quality,
             )

@@ -125,7 +125,7 @@ def points_of_depth(
 def _small(scene: Scene) -> Scene:
     scale = min(1.0, _SIDE / max(scene.image.width, scene.image.height))
     width, height = (max(round(side * scale), 1) for side in (scene.image.width, scene.image.height))
-    return scene.model_copy(update={"image": {"width": width, "height": height}})
+    return scene.model_copy(update={"image": scene.image.resized(width, height)})
 
 
 def _with_closed_lens(scene: Scene) -> Scene:

@@ -1,4 +1,4 @@
-"""Presets of quality: samples, noise and detail together."""
+"""Presets of quality: samples and noise together. What the picture shows stays as it is."""
 
 from __future__ import annotations
 
@@ -15,18 +15,17 @@ Quality: TypeAlias = Literal["draft", "good", "final", "print"]
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """Values of a renderer's settings: `renderer.samples`, `noise` and, for surfaces, `detail`."""
+    """Values of a renderer's settings: `renderer.samples` and `noise`."""
 
     samples: int
     noise: float | None
-    detail: float
 
 
 PRESETS: Mapping[Quality, Preset] = {
-    "draft": Preset(samples=1, noise=None, detail=2.0),
-    "good": Preset(samples=16, noise=0.02, detail=1.0),
-    "final": Preset(samples=128, noise=0.01, detail=1.0),
-    "print": Preset(samples=512, noise=0.004, detail=0.7),
+    "draft": Preset(samples=1, noise=None),
+    "good": Preset(samples=16, noise=0.02),
+    "final": Preset(samples=128, noise=0.01),
+    "print": Preset(samples=512, noise=0.004),
 }
 
 
@@ -61,13 +60,8 @@ def with_quality(scene: Scene, quality: str, *, kept: Collection[str] = ()) -> S
 
 
 def _preset(renderer: Any, preset: Preset, path: str, kept: Collection[str]) -> Any:
-    values = {"samples": preset.samples, "noise": preset.noise, "detail": preset.detail}
-    fields = type(renderer).model_fields
-    chosen = {
-        name: value
-        for name, value in values.items()
-        if name in fields and not _is_kept(f"{path}.{name}", kept)
-    }
+    values = {"samples": preset.samples, "noise": preset.noise}
+    chosen = {name: value for name, value in values.items() if not _is_kept(f"{path}.{name}", kept)}
     # (A least number of samples belongs to another number of them.)
     if "samples" in chosen and not _is_kept(f"{path}.min_samples", kept):
         chosen["min_samples"] = None

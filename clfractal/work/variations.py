@@ -18,7 +18,6 @@ from clfractal.errors import ClfractalError, SceneError, Where, unknown_name
 from clfractal.formulas import reference
 from clfractal.scene.load import as_scene, check_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import Image
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.work.any_engine import SceneLike
@@ -238,7 +237,7 @@ def small_scene(scene: Scene, width: int, height: int) -> Scene:
     """The scene as a small picture shows it: a still for one eye, with few samples, and a coarse grid."""
     # (Tracks may move what is no more there, such as the distance of the eyes.)
     updates: dict[str, Any] = {
-        "image": Image(width=width, height=height),
+        "image": scene.image.resized(width, height),
         "stereo": None,
         "animation": None,
     }
