@@ -18,7 +18,7 @@ Keys of the table:
       panels    one mapping of dotted keys to values for each panel. With `show: samples` a panel shows that channel
                 instead of the colours: from none, dark, to `renderer.samples`, light. With `show: left` or `right`
                 it shows what that eye sees of an anaglyph through its filter; with `albedo`, `direct` or
-                `indirect` that layer
+                `indirect` that layer. With `coarser: 4` its pixels are four times as wide, and as many fewer
       columns   panels in a row; all of them if not given
       size      width and height of a panel, pixels
       zoom      each pixel of a panel is shown as a square of so many; 1 if not given
@@ -73,13 +73,8 @@ class Picture:
     page: str
     panels: tuple[Panel, ...]
     columns: int
-    zoom: int
-
-    @property
-    def panel_size(self) -> tuple[int, int]:
-        """Width and height of a panel, pixels of the picture."""
-        image = self.panels[0].scene.image
-        return image.width * self.zoom, image.height * self.zoom
+    panel_size: tuple[int, int]
+    """Width and height of a panel, pixels of the picture."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -108,9 +103,13 @@ def _picture(name: str, row: Mapping[str, Any], scenes: Mapping[str, Any]) -> Pi
     width, height = row["size"]
     if width % zoom or height % zoom:
         raise ValueError(f"{TABLE.name}: {name}: size {width} x {height} is no multiple of zoom {zoom}")
-    for_all = {**row.get("set", {}), "image.width": width // zoom, "image.height": height // zoom}
-    panels = tuple(_panel(scenes[row["scene"]], {**for_all, **panel}) for panel in row["panels"])
-    return Picture(name, row["page"], panels, row.get("columns", len(panels)), zoom)
+    panels = []
+    for values in row["panels"]:
+        own = {**row.get("set", {}), **values}
+        wide = zoom * own.pop("coarser", 1)
+        size = {"image.width": width // wide, "image.height": height // wide}
+        panels.append(_panel(scenes[row["scene"]], {**size, **own}))
+    return Picture(name, row["page"], tuple(panels), row.get("columns", len(panels)), (width, height))
 
 
 def _panel(base: Mapping[str, Any], values: dict[str, Any]) -> Panel:

@@ -252,20 +252,16 @@ def test_what_watch_refuses_at_once(clf: InProcess) -> None:
 # --- quality ---
 
 
-def test_presets_set_samples_noise_and_detail_and_nothing_else() -> None:
+def test_presets_set_samples_and_noise_and_nothing_else() -> None:
     scene = load_scene(
         SCENE + "renderer: {samples: 5, noise: 0.1, min_samples: 4, detail: 3, max_steps: 70}\n"
     )
     for name, preset in PRESETS.items():
         found = with_quality(scene, name)
         renderer = found.surface
-        assert (renderer.samples, renderer.noise, renderer.detail) == (
-            preset.samples,
-            preset.noise,
-            preset.detail,
-        )
+        assert (renderer.samples, renderer.noise) == (preset.samples, preset.noise)
         assert renderer.min_samples is None
-        assert renderer.max_steps == 70
+        assert (renderer.max_steps, renderer.detail) == (70, 3)
         assert found.model_copy(update={"renderer": scene.renderer}) == scene
     with pytest.raises(SceneError, match=r"^quality: unknown quality 'god'; did you mean 'good'\?$"):
         with_quality(scene, "god")
@@ -304,8 +300,8 @@ def test_explicit_options_win(clf: InProcess) -> None:
     )
     assert ended.status == 0, ended
     renderer = load_scene(Path("out.png")).surface
-    assert (renderer.samples, renderer.noise, renderer.detail) == (2, 0.3, 1.0)
-    film = clfractal.render(SCENE, samples=2, quality="draft", channels=["R", "G", "B"])
-    assert load_scene(str(film.header["scene"])).surface.detail == 2.0
+    assert (renderer.samples, renderer.noise) == (2, 0.3)
+    film = clfractal.render(SCENE, samples=2, quality="good", channels=["R", "G", "B"])
+    assert load_scene(str(film.header["scene"])).surface.noise == 0.02
     with pytest.raises(SceneError, match=r"^quality: unknown quality 'best'"):
         clfractal.render(SCENE, quality="best")

@@ -21,7 +21,7 @@ from clfractal.commands.film_parts import (
 from clfractal.commands.kept import Kept
 from clfractal.commands.order import naming_options
 from clfractal.commands.pipes import piped, refuse_stream
-from clfractal.commands.render import Order, ordered_scene
+from clfractal.commands.render import Order, ordered_scene, tell_reference
 from clfractal.commands.shell import Shell
 from clfractal.commands.slices import check_numbered
 from clfractal.device.activity import doing
@@ -67,6 +67,7 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     begun = time.perf_counter()
     shell.mute_drivers()
     scene = ordered_scene(order)
+    tell_reference(order, scene, shell)
     with speaking_of(order.scene):
         animation = movement_of(scene).animation
     numbers = part.numbers(animation.count)

@@ -19,6 +19,7 @@ from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import SceneText, load_scene, read_scene, sized
 from clfractal.scene.model import Scene
+from clfractal.scene.surface import SurfaceRenderer
 
 if TYPE_CHECKING:
     from clfractal.work.any_engine import AnyEngine
@@ -61,6 +62,7 @@ def render_files(order: Order, shell: Shell) -> None:
     region = _region(order.region)
     shell.mute_drivers()
     scene = ordered_scene(order)
+    tell_reference(order, scene, shell)
     outputs = checked_outputs(order, scene, region)
     with engine_of(order, shell) as engine:
         _render(replace(order, outputs=outputs), shell, engine, scene, region, start)
@@ -166,6 +168,18 @@ def ordered_scene(order: Order) -> Scene:
     kept = [text.partition("=")[0].strip() for text in overrides]
     with naming_options():
         return with_quality(scene, order.quality, kept=kept)
+
+
+def tell_reference(order: Order, scene: Scene, shell: Shell) -> None:
+    """Says that a height that was set is another picture's, where it is what colours and light are made for."""
+    keys = {text.partition("=")[0].strip() for text in order.overrides}
+    views = [scene] if scene.layout is None else [view for view, _ in scene.views]
+    shows = any(isinstance(view.renderer, SurfaceRenderer) for view in views)
+    if shows and scene.image.reference_height is None and keys & {"image", "image.height"}:
+        shell.say(
+            f"{order.scene}: image.height is also what the fineness of colours, normals and light is measured by;"
+            " --size renders the same picture at another size"
+        )
 
 
 def _beside(order: Order) -> Path:

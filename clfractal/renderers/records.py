@@ -13,6 +13,7 @@ from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
+from clfractal.renderers.fineness import Fineness
 from clfractal.renderers.maps import MAP, asked_maps
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.objects import OBJECT, mirrors
@@ -202,9 +203,6 @@ SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
 # And the part of a scaled distance that the cone takes for free.
 CONE_MARGIN, CONE_SHARE = 1.5, 0.8
-# In cones of the reference's pixels: the distance at which light is computed. Nearer, rough surfaces are noise; farther
-# off, the picture would no longer be that of the set.
-NEAR = 0.6
 # In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
 TOUCH = 0.75
 # In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
@@ -259,32 +257,6 @@ def step_scale(scene: Scene) -> float:
     """How much of a distance is safe to step."""
     given = scene.surface.step_scale
     return given if given is not None else scene.chain.step_scale
-
-
-@dataclass(frozen=True, slots=True)
-class Fineness:
-    """How finely rays look for the set, and how the light on it is computed, in footprints of the image's reference.
-
-    A picture shows what its reference shows, however many pixels it has. Where these are smaller than the reference's,
-    rays hit more exactly, and light stays as it is; where they are larger, rays hit as the reference's do, since light is
-    computed near there.
-
-    Attributes:
-        pixel: width of a pixel of the picture; of a coarse one that of the block it stands for.
-        detail: the distance that counts as a hit.
-        near: the distance at which light is computed, as a part of `detail`.
-    """
-
-    pixel: float
-    detail: float
-    near: float
-
-    @classmethod
-    def of(cls, scene: Scene, divider: int = 1) -> Fineness:
-        """That of a scene's picture; one of `divider` x `divider` of its pixels."""
-        own, detail = scene.image.reference / scene.image.height, scene.surface.detail
-        exact = detail * min(own, 1.0)
-        return cls(own * divider, exact, NEAR * detail / exact)
 
 
 def march_record(

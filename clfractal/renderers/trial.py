@@ -24,8 +24,9 @@ from clfractal.device.structs import Precision
 from clfractal.formulas.catalog import load_chain
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
+from clfractal.renderers.fineness import NEAR
 from clfractal.renderers.kernel import MET_NUMBERS, STATE_PADDING
-from clfractal.renderers.records import MARCH, NEAR, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
+from clfractal.renderers.records import MARCH, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
 from clfractal.renderers.waves import GOAL_SHADOW, GOAL_SURFACE, rays_group, rays_of_item
 from clfractal.scene.surface import SurfaceRenderer
 

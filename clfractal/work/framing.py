@@ -32,6 +32,8 @@ SIZE = (1280, 720)
 
 # Pixels of a look, which has the proportions of the picture.
 _LOOK = (192, 108)
+# The forms of a body tell how to frame it, not what is finer than a pixel of a look.
+_SOFTER = 3.67
 # From where the set is looked at: azimuth and elevation, degrees.
 _PLACES = ((35, 25), (-40, 20), (10, 35), (75, 15), (150, 30), (-100, 30), (25, 60))
 # A set fills its bounds if that much of what is seen within wider ones (parts of the radius) lies beyond them: there it was
@@ -176,7 +178,7 @@ class _Finder:
             "formula": {**self.formula, "iterations": iterations},
             "camera": dict(camera),
             **sections,
-            "image": {"width": _LOOK[0], "height": _LOOK[1]},
+            "image": {"width": _LOOK[0], "height": _LOOK[1], "reference_height": _LOOK[1] / _SOFTER},
         }
         return load_scene(data, folder=self.folder)
 
