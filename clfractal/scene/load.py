@@ -100,9 +100,11 @@ def sized(text: SceneText, overrides: Sequence[str], size: tuple[int, int]) -> d
         document = _overridden(document, override)
     image = SceneText(document, text.folder).value("image")
     given = image if isinstance(image, dict) else {}
-    own = given.get("height", _default(("image", "height")))
-    if given.get("reference_height") is None and isinstance(own, int) and own != height:
-        found["image.reference_height"] = str(own)
+    reference = given.get("reference_height")
+    if reference is None:
+        reference = given.get("height", _default(("image", "height")))
+    if isinstance(reference, int | float):  # else it is told what is wrong with it
+        found["image.reference_height"] = "null" if reference == height else str(reference)
     return found
 
 
