@@ -26,7 +26,7 @@ from clfractal.scene.renderer import Renderer
 from clfractal.scene.volume import VolumeRenderer
 
 WIDTH, HEIGHT = 96, 54
-PATHS = 16  # samples
+SAMPLES, PATHS = 4, 16
 RESOLUTION = 96  # voxels along the longest side of a volume
 GOLDEN = Path(__file__).parent / "golden"
 FAILURES = Path(__file__).resolve().parents[1] / "test-failures"
@@ -40,9 +40,9 @@ def scene_paths() -> list[Path]:
 
 
 def small_scene(path: Path) -> Scene:
-    """The scene at the size of the golden pictures, with one sample per pixel, and grids no finer than that needs.
+    """The scene at the size of the golden pictures, which is their reference too, with few samples and grids no finer than needed.
 
-    Along paths it is PATHS of them: one alone is noise.
+    One sample alone is noise, and along paths SAMPLES are.
     """
     scene = load_scene(path)
     renderers: dict[str, Renderer] = {"renderer": scene.renderer}
@@ -51,7 +51,7 @@ def small_scene(path: Path) -> Scene:
             renderers[f"layout.views.{number}.renderer"] = view.renderer
     sizes = [f"image.width={WIDTH}", f"image.height={HEIGHT}"]
     for key, renderer in renderers.items():
-        sizes.append(f"{key}.samples={PATHS if scene.lighting.mode == 'path' else 1}")
+        sizes.append(f"{key}.samples={PATHS if scene.lighting.mode == 'path' else SAMPLES}")
         if isinstance(renderer, VolumeRenderer):
             sizes.append(f"{key}.resolution={RESOLUTION}")
     return load_scene(path, overrides=sizes)

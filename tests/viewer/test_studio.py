@@ -64,6 +64,24 @@ def test_edits_are_shown(studio: Studio) -> None:
     assert not studio.redo()
 
 
+def test_the_window_shows_the_scenes_own_picture_at_its_own_size(studio: Studio, tmp_path: Path) -> None:
+    """What it shows is measured in pixels of the scene's size, at any size of the window, and in what it writes."""
+    own = studio.scene.image
+    for size in (VIEW, (60, 40), (200, 30)):
+        studio.resize(*size)
+        shown = studio.shown_scene.image
+        assert (shown.width, shown.height, shown.reference) == (*size, own.height)
+    frame = studio.frame
+    still = studio.render_still((tmp_path / "a.png",), (48, 32))
+    wait_for(lambda: still.finished)
+    assert not still.problem
+    assert clfractal.load_scene(tmp_path / "a.png").image == own.resized(48, 32)
+    assert studio.scene.image == own
+    assert studio.edit({"image.reference_height": 500})
+    assert studio.shown_scene.image.reference == 500
+    assert frame is None or frame.job.scene.image.reference == own.height
+
+
 def test_a_wrong_edit_changes_nothing_and_is_told(studio: Studio) -> None:
     rest(studio)
     scene, number = studio.scene, studio.session.newest

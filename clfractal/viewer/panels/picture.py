@@ -19,6 +19,8 @@ def draw(ui: Ui) -> None:
     w.field(ui, "output.tone", words={"agx": "AgX"})
     w.group(ui, "Files")
     w.fields(ui, "image", ("width", "height"), width={"unit": " px"}, height={"unit": " px"})
+    own = ui.studio.scene.image.height
+    w.field(ui, "image.reference_height", unit=" px", start=own, auto=f"height, {own} px")
     w.field(ui, "output.denoise")
     w.field(ui, "output.png_bits", segmented=True)
     w.field(ui, "output.quality")
