@@ -40,7 +40,7 @@ def scene_paths() -> list[Path]:
 
 
 def small_scene(path: Path) -> Scene:
-    """The scene at the size of the golden pictures, which is their reference too, with few samples and grids no finer than needed.
+    """The scene at the size of the golden pictures, which is their reference too, with few samples and small grids.
 
     One sample alone is noise, and along paths SAMPLES are.
     """
