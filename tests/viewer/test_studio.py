@@ -260,7 +260,7 @@ def test_a_still_is_the_shells_picture(studio: Studio, tmp_path: Path) -> None:
     still = studio.render_still((tmp_path / "still.exr",), (70, 50), 3)
     wait_for(lambda: still.finished)
     assert still.problem == ""
-    wanted = clfractal.render(scene_of(BULB, "image.width=70", "image.height=50", "renderer.samples=3"))
+    wanted = clfractal.render(scene_of(BULB, "renderer.samples=3"), size=(70, 50))
     wanted.save(tmp_path / "shell.exr")
     found, right = (read_exr(tmp_path / name)[0] for name in ("still.exr", "shell.exr"))
     for name in right:
