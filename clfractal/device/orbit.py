@@ -87,7 +87,7 @@ def orbit_record(
 
     Args:
         bailout: in the place of the formula's own.
-        potential: whether normals are those of the potential, which is of any number of applications.
+        potential: whether normals are of the last z, however many applications that takes.
         joined: values of the fields that say which of several solids this is; see `clfractal/solids.py`.
     """
     inner = bailout if bailout is not None else chain.bailout

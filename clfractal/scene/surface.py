@@ -71,7 +71,7 @@ class SurfaceRenderer(Sampled):
         "least_squares",
     ] = Field(
         "gradient",
-        description="where normals come from: the surface's Jacobian, the smoother potential's, or the pixel's points",
+        description="where normals come from: the Jacobian at the surface, or farther out, or the pixel's points",
     )
     detail: float = Field(
         1.0, ge=0.01, le=100, description="distance that counts as a hit, in pixel footprints"
