@@ -14,6 +14,8 @@
 
 // A mixing of colours limits numbers to this, as `anaglyph.mix` does.
 #define LIGHTEST 1e30f
+// Neighbours whose coverage differs by a quarter and more are not smoothed into each other.
+#define COVERAGE_APART 4.0f
 
 // Comparisons instead of built-in functions: on processors a built-in may be a call (see direct.h).
 float limited(float value) {
@@ -24,6 +26,53 @@ float limited(float value) {
 float smaller(float a, float b) { return b < a ? b : a; }
 int lower(int a, int b) { return b < a ? b : a; }
 float4 between(float4 a, float4 b, float share) { return a + (b - a) * share; }
+
+int is_light(float4 found) {
+    return found.x >= -LIGHTEST && found.x <= LIGHTEST && found.y >= -LIGHTEST && found.y <= LIGHTEST &&
+           found.z >= -LIGHTEST && found.z <= LIGHTEST;
+}
+
+// What a pixel gets from a neighbour: as much as the neighbour loses.
+float4 gained(float4 own, float4 other, float share) {
+    const float apart = own.w < other.w ? other.w - own.w : own.w - other.w;
+    const float alike = 1.0f - COVERAGE_APART * apart;
+    if (!(alike > 0.0f) || !is_light(other)) return (float4)(0.0f);
+    return (other - own) * (share * alike);
+}
+
+// One view of a canvas while its picture is under way: its noise is smoothed by one step of diffusion. Each pair of
+// neighbours exchanges a share of its difference, so the mean of the picture stays what it is. At most 3/8
+// come from neighbours, which is nearer to the picture of many samples than less or more, and nothing where coverage differs, so
+// that outlines stay as they are. What is infinite or no number is nobody's neighbour, and neither is what lies behind the
+// borders of the view.
+__kernel void diffuse(__global const float4 *colors, __constant const struct ShownView *views, int number,
+                      __global float4 *smoothed) {
+    __constant const struct ShownView *view = views + number;
+    const int x = (int)get_global_id(0), y = (int)get_global_id(1), width = view->width, height = view->height;
+    if (x >= width || y >= height) return;
+    __global const float4 *here = colors + view->offset + (size_t)y * width + x;
+    const float4 own = *here;
+    float4 sum = (float4)(0.0f);
+    if (is_light(own)) {
+        const float beside = 0.0625f * view->smoothing, corner = 0.03125f * view->smoothing;
+        const int left = x > 0, right = x < width - 1;
+        if (y > 0) {
+            __global const float4 *above = here - width;
+            if (left) sum += gained(own, above[-1], corner);
+            sum += gained(own, above[0], beside);
+            if (right) sum += gained(own, above[1], corner);
+        }
+        if (left) sum += gained(own, here[-1], beside);
+        if (right) sum += gained(own, here[1], beside);
+        if (y < height - 1) {
+            __global const float4 *below = here + width;
+            if (left) sum += gained(own, below[-1], corner);
+            sum += gained(own, below[0], beside);
+            if (right) sum += gained(own, below[1], corner);
+        }
+    }
+    smoothed[here - colors] = (float4)(own.x + sum.x, own.y + sum.y, own.z + sum.z, own.w);
+}
 
 // One view of a picture, or where there is none (between the views of a layout) the background.
 float4 view_at(__global const float4 *colors, __constant const struct ShownView *view, __constant const struct Show *show,

@@ -215,13 +215,16 @@ def test_half_a_pixel_on_is_half_a_pixel(name: str) -> None:
 def test_figures_are_held_against_those_on_record() -> None:
     assert Steps("row", 7.4, 10.0, 0.0, 0.0).met
     assert not Steps("row", 7.6, 10.0, 0.0, 0.0).met
-    assert Noise("scene", 10.0, 20.0, 9.0, (10.0, 20.0, 8.0)).met
-    assert not Noise("scene", 10.2, 20.0, 9.0, (10.0, 20.0, 8.0)).met
-    assert not Noise("scene", 10.0, 20.5, 9.0, (10.0, 20.0, 8.0)).met
+    before = (10.0, 20.0, 8.0, 7.0)
+    assert Noise("scene", 10.0, 20.0, 9.0, 7.0, before).met
+    assert not Noise("scene", 10.2, 20.0, 9.0, 7.0, before).met
+    assert not Noise("scene", 10.0, 20.5, 9.0, 7.0, before).met
+    assert not Noise("scene", 10.0, 20.0, 9.0, 7.2, before).met
     record = steps.record()
     assert set(record["steps"]) == set(steps.rows()) <= set(bench.ROWS)
     assert set(record["formulas"]) <= set(subjects.names())
     assert set(record["noise"]) == set(noise.scenes())
+    assert all(len(figures) == len(before) for figures in record["noise"].values())
 
 
 def test_every_formula_of_the_library_is_measured() -> None:

@@ -123,18 +123,17 @@ def rows(report: Report, engine: Engine, options: argparse.Namespace) -> None:
 
 def flicker(report: Report, engine: Engine, options: argparse.Namespace) -> None:
     """Noise and flicker of six scenes."""
-    titles = " ".join(f"{title:>8} {'before':>8}" for title in ("noise", "flicker", "within"))
+    titles = " ".join(f"{title:>8} {'before':>8}" for title in ("noise", "flicker", "within", "shown"))
     report.say(f"\n{'one sample, codes':22} {titles}")
     for one in noise.measure_noise(engine, steps.record().get("noise", {}), options.set):
         report.keep("noise", one)
-        before = ("-",) * 3 if one.before is None else tuple(f"{figure:.2f}" for figure in one.before)
-        now = (one.noise, one.flicker, one.within)
-        cells = " ".join(f"{a:8.2f} {b:>8}" for a, b in zip(now, before, strict=True))
+        before = ("-",) * 4 if one.before is None else tuple(f"{figure:.2f}" for figure in one.before)
+        cells = " ".join(f"{a:8.2f} {b:>8}" for a, b in zip(one.figures, before, strict=True))
         report.say(f"{one.scene:22} {cells}")
         if not one.met:
             report.missed.append(
-                f"noise: {one.scene}: noise {one.noise:.2f} and flicker {one.flicker:.2f},"
-                f" before {before[0]} and {before[1]}"
+                f"noise: {one.scene}: noise {one.noise:.2f}, flicker {one.flicker:.2f} and shown {one.shown:.2f},"
+                f" before {before[0]}, {before[1]} and {before[3]}"
             )
 
 

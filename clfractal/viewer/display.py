@@ -236,7 +236,12 @@ class Display:
         with self.device.failures("showing the picture"):
             order.target.begin(queue)
             self._shower.enqueue(
-                frame.canvas, frame.arrangement, order.look, order.target.shown, reduced=order.reduced
+                frame.canvas,
+                frame.arrangement,
+                order.look,
+                order.target.shown,
+                reduced=order.reduced,
+                smoothing=frame.smoothing,
             )
             if self._depths[0] == frame.number:
                 order.target.end(queue)

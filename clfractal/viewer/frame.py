@@ -10,7 +10,7 @@ from clfractal.renderers.plan import PlannedView
 from clfractal.scene.model import Scene
 from clfractal.work.canvas import Canvas
 from clfractal.work.job import Job
-from clfractal.work.show import Arrangement
+from clfractal.work.show import Arrangement, smoothing_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +29,7 @@ class Frame:
         finished: whether it has the bits of the shell's picture.
         seconds: that rendering took so far, without compiling.
         frame_seconds: that the last pass took.
+        smoothing: how strongly the noise of each view is smoothed when it is shown, see `clfractal.work.show`.
         stamp: the canvas's, while it holds this frame.
     """
 
@@ -43,13 +44,14 @@ class Frame:
     finished: bool
     seconds: float
     frame_seconds: float
+    smoothing: tuple[float, ...]
     stamp: int = 0
 
     @classmethod
     def of(cls, number: int, request: int, scene: Scene, job: Job, canvas: Canvas, growth: Growth) -> Frame:
         """The frame of what is on a canvas now."""
         grown = (growth.divider, growth.samples, growth.finished, growth.seconds, growth.frame_seconds)
-        return cls(number, request, scene, job, growth.views, canvas, *grown, canvas.stamp)
+        return cls(number, request, scene, job, growth.views, canvas, *grown, growth.smoothing, canvas.stamp)
 
     @property
     def is_draft(self) -> bool:
@@ -72,6 +74,14 @@ class Growth:
     finished: bool
     seconds: float
     frame_seconds: float
+    smoothing: tuple[float, ...]
+
+    @classmethod
+    def coarse(
+        cls, views: tuple[PlannedView, ...], divider: int, seconds: float, frame_seconds: float
+    ) -> Growth:
+        """That of a coarse picture, which has one sample for each of its own pixels."""
+        return cls(views, divider, 1, False, seconds, frame_seconds, (smoothing_of(1),) * len(views))
 
 
 class CanvasPool:

@@ -13,7 +13,7 @@ from clfractal.viewer.preparing import Wanted
 from clfractal.work.canvas import Canvas
 from clfractal.work.job import Job
 from clfractal.work.refine import pass_ranges
-from clfractal.work.show import Arrangement
+from clfractal.work.show import Arrangement, smoothing_of
 
 
 class Gathering:
@@ -40,7 +40,20 @@ class Gathering:
 
     def growth(self, frame_seconds: float = 0.0, *, more: float = 0.0, finished: bool = False) -> Growth:
         """How far it is; `more`: seconds of a pass that is under way."""
-        return Growth(self.job.views, 1, self.samples, finished, self.seconds + more, frame_seconds)
+        seconds = self.seconds + more
+        smoothed = self._smoothing(finished)
+        return Growth(self.job.views, 1, self.samples, finished, seconds, frame_seconds, smoothed)
+
+    def _smoothing(self, finished: bool) -> tuple[float, ...]:
+        """How strongly each view is smoothed: views that have all their samples are shown as files have them.
+
+        So is a picture of which only a part is refined: the rest of it has samples of its own.
+        """
+        made = self.samples or self.ranges[0][1]  # before a pass is whole: those of the pixels that have any
+        return tuple(
+            0.0 if finished or self.wanted.region or made >= view.plan.samples else smoothing_of(made)
+            for view in self.job.views
+        )
 
     def again(self) -> Gathering:
         """The same, to be gone on with after something else was tried; anew if it has no sample yet."""

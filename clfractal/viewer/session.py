@@ -408,7 +408,7 @@ class Session:
         state = self._painter.run(coarse, canvas, token)
         seconds = state.seconds
         pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, seconds)
-        self._publish(wanted, job, canvas, Growth(coarse.views, divider, 1, False, before + seconds, seconds))
+        self._publish(wanted, job, canvas, Growth.coarse(coarse.views, divider, before + seconds, seconds))
         return seconds
 
     def _gather(self, work: Gathering, token: CancelToken) -> None:

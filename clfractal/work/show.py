@@ -27,6 +27,8 @@ from clfractal.scene.stereo import APART, Mode, Stereo
 from clfractal.work.canvas import Canvas, whole_groups
 from clfractal.work.job import Identity, Job, StereoPair
 
+SHARP = 4
+"""Samples of each pixel from which on nothing is smoothed."""
 MOST_VIEWS = 64
 GROUP = (32, 8)
 MODES = ("ONE", "BESIDE", "BELOW", "ROWS", "COLUMNS", "CHECKERBOARD", "CHESSBOARD", "ANAGLYPH")
@@ -67,6 +69,7 @@ SHOWN_VIEW = Struct(
         Field("right", "int", 0, "the first column and row behind it"),
         Field("bottom", "int"),
         Field("eye", "int", 0, "0: left, or no eye's in particular; 1: right"),
+        Field("smoothing", "float", 0, "share of one step of diffusion that its pixels take, 0 to 1"),
     ],
 )
 
@@ -78,7 +81,7 @@ class Look:
     Attributes:
         exposure: stops.
         stereo: the scene's section; None without stereo.
-        smooth: whether coarse pictures are interpolated.
+        smooth: whether coarse pictures are interpolated, and the noise of those under way is smoothed.
         transparent: whether the background is, and a board is shown there.
         tone: the curve from light to what is shown.
     """
@@ -154,6 +157,15 @@ class Arrangement:
         return self.image if stereo is None else picture_size(_joined(stereo), self.image)
 
 
+def smoothing_of(samples: int) -> float:
+    """How strongly a picture under way is smoothed whose pixels have so many samples: 1 with one, nothing from four on.
+
+    It is the share that is taken of a step of diffusion (`diffuse` in `show.cl`). A whole step leaves 0.64 of the deviation
+    of noise whose pixels are independent, and all of the picture's mean.
+    """
+    return max(0.0, (SHARP - samples) / (SHARP - 1))
+
+
 def can_reduce(canvas: Canvas, arrangement: Arrangement, look: Look) -> bool:
     """Whether a coarse picture may be shown by as many pixels as it has, and enlarged afterwards.
 
@@ -185,7 +197,7 @@ def program_text(*, to_image: bool) -> FlatText:
 
 
 class Shower:
-    """The kernel that shows canvases, on one device, with a queue of its own: it does not wait for a picture's launches.
+    """The kernels that show canvases, on one device, with a queue of its own: it does not wait for a picture's launches.
 
     Args:
         to_image: whether it writes to an image (a texture that is shared) instead of a buffer.
@@ -197,15 +209,21 @@ class Shower:
     def __init__(self, device: Device, *, to_image: bool = False) -> None:
         self.device, self.to_image = device, to_image
         text = program_text(to_image=to_image)
-        warm = Warm("show", GROUP, GROUP, (Argument("buffer", 4096),) * 6)
+        buffer = Argument("buffer", 4096)
+        warm = [
+            Warm("show", GROUP, GROUP, (buffer,) * 6),
+            Warm("diffuse", GROUP, GROUP, (buffer, buffer, Argument("scalar", dtype="int32"), buffer)),
+        ]
         built = program.build(
             device,
             text.text,
             flags=("-cl-std=CL1.2", "-cl-denorms-are-zero"),
             sources=text.sources,
-            warm=[] if to_image else [warm],
+            warm=[] if to_image else warm,
         )
-        self._kernel = built.kernel("show")
+        self._kernel, self._diffuse = built.kernel("show"), built.kernel("diffuse")
+        self._smoothed: Any = None
+        self._room = 0
         with device.failures("opening the device"):
             self.queue = cl.CommandQueue(device.context)
         self._table, self._tones = self._sent(srgb.table8()), self._sent(tone.tables())
@@ -214,36 +232,64 @@ class Shower:
         self._show = Watched(device, np.zeros(1, SHOW.dtype("float32")))
 
     def enqueue(
-        self, canvas: Canvas, arrangement: Arrangement, look: Look, shown: Any, *, reduced: bool = False
+        self,
+        canvas: Canvas,
+        arrangement: Arrangement,
+        look: Look,
+        shown: Any,
+        *,
+        reduced: bool = False,
+        smoothing: Sequence[float] = (),
     ) -> cl.Event:
         """Starts the kernel on a canvas whose picture is complete; `shown` is where pixels go, row by row from the top.
 
         Args:
             reduced: show only the pixels that the canvas has, see `can_reduce`.
+            smoothing: of each view, see `smoothing_of`; empty: nothing is smoothed.
 
         Raises:
             DeviceError: the device failed.
         """
-        record, views = self.records(canvas, arrangement, look, reduced=reduced)
+        record, views = self.records(canvas, arrangement, look, reduced=reduced, smoothing=smoothing)
         width, height = int(record["width"][0]), int(record["height"][0])
         size = whole_groups((width, height), GROUP)
         with self.device.failures("showing the picture"):
             self._views.put(self.queue, views)
             self._show.put(self.queue, record)
+            colors = self._smooth(canvas, views) if views["smoothing"].any() else canvas.colors
             self._kernel.set_args(
-                canvas.colors, self._views.buffer, self._show.buffer, self._table, self._tones, shown
+                colors, self._views.buffer, self._show.buffer, self._table, self._tones, shown
             )
             group = fitting(self.device, self._kernel, GROUP)
             event = cl.enqueue_nd_range_kernel(self.queue, self._kernel, size, group)
             self.queue.flush()
         return event
 
+    def _smooth(self, canvas: Canvas, views: npt.NDArray[np.void]) -> Any:
+        """The buffer of the canvas's colours with less noise; `views` have been sent."""
+        if canvas.pixels > self._room:
+            self._smoothed, self._room = None, 0
+            self._smoothed = self.device.buffer(16 * canvas.pixels, "a picture on the screen")
+            self._room = canvas.pixels
+        group = fitting(self.device, self._diffuse, GROUP)
+        for number, part in enumerate(canvas.parts):
+            self._diffuse.set_args(canvas.colors, self._views.buffer, np.int32(number), self._smoothed)
+            size = whole_groups((part.region.width, part.region.height), GROUP)
+            cl.enqueue_nd_range_kernel(self.queue, self._diffuse, size, group)
+        return self._smoothed
+
     @staticmethod
     def records(
-        canvas: Canvas, arrangement: Arrangement, look: Look, *, reduced: bool = False
+        canvas: Canvas,
+        arrangement: Arrangement,
+        look: Look,
+        *,
+        reduced: bool = False,
+        smoothing: Sequence[float] = (),
     ) -> tuple[npt.NDArray[np.void], npt.NDArray[np.void]]:
         """The kernel's structs, of the whole and of the views."""
         look = arrangement.fitting(look)
+        strengths = smoothing if smoothing and look.smooth else (0.0,) * len(canvas.parts)
         first_part = canvas.parts[0].region
         width, height = (first_part.width, first_part.height) if reduced else arrangement.size(look)
         eye = arrangement.image if look.stereo is None else eye_size(_joined(look.stereo), arrangement.image)
@@ -264,7 +310,8 @@ class Shower:
             "matrix": matrix,
         }
         rows = []
-        for part, place, side in zip(canvas.parts, arrangement.places, arrangement.eyes, strict=True):
+        views = zip(canvas.parts, arrangement.places, arrangement.eyes, strengths, strict=True)
+        for part, place, side, strength in views:
             region, divider = part.region, 1 if reduced else part.divider
             if reduced:
                 place = Place(-region.x, -region.y, region.right, region.bottom)
@@ -282,6 +329,7 @@ class Shower:
                     "right": right,
                     "bottom": bottom,
                     "eye": side,
+                    "smoothing": strength,
                 }
             )
         return SHOW.array("float32", [values]), SHOWN_VIEW.array("float32", rows)

@@ -79,7 +79,13 @@ def painted(job: Job, device: Device, pictures: Sequence[Mapping[str, Floats]]) 
 
 
 def shown(
-    canvas: Canvas, arrangement: Arrangement, look: Look, shower: Shower, *, reduced: bool = False
+    canvas: Canvas,
+    arrangement: Arrangement,
+    look: Look,
+    shower: Shower,
+    *,
+    reduced: bool = False,
+    smoothing: Sequence[float] = (),
 ) -> npt.NDArray[np.uint8]:
     """The kernel's pixels, shape (height, width, 3); alpha has been checked."""
     record, _ = shower.records(canvas, arrangement, look, reduced=reduced)
@@ -88,7 +94,7 @@ def shown(
     # A guard behind the last pixel.
     out = np.full(width * height * 4 + 64, 77, np.uint8)
     buffer = cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=out)
-    shower.enqueue(canvas, arrangement, look, buffer, reduced=reduced).wait()
+    shower.enqueue(canvas, arrangement, look, buffer, reduced=reduced, smoothing=smoothing).wait()
     cl.enqueue_copy(shower.queue, out, buffer)
     assert (out[-64:] == 77).all()
     pixels = out[:-64].reshape(height, width, 4)
