@@ -21,17 +21,19 @@ class Fineness:
 
     Attributes:
         pixel: width of a pixel of the picture; of a coarse one that of the block it stands for.
+        level: what is told in cones where light is computed: `detail` of the scene, of which paths take a part.
         detail: the distance that counts as a hit.
         near: the distance at which light is computed, as a part of `detail`.
     """
 
     pixel: float
+    level: float
     detail: float
     near: float
 
     @classmethod
     def of(cls, scene: Scene, divider: int = 1) -> Fineness:
         """That of a scene's picture; one of `divider` x `divider` of its pixels."""
-        own, detail = scene.image.reference / scene.image.height, scene.surface.detail
-        exact = detail * min(own, 1.0)
-        return cls(own * divider, exact, NEAR * detail / exact)
+        own, level = scene.image.reference / scene.image.height, scene.hit_detail
+        exact = min(level, scene.surface.detail * own)
+        return cls(own * divider, level, exact, NEAR * level / exact)

@@ -13,6 +13,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.files.channels import check_channels
 from clfractal.optics.view import View, scene_view
 from clfractal.pictures.tiles import Region
+from clfractal.renderers.fineness import Fineness
 from clfractal.renderers.shutter import Shutter
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
@@ -147,7 +148,8 @@ def finest_steps(scene: Scene, view: View) -> float:
     footprint /= math.sqrt(renderer.used_points.count)
     if renderer.normal_of_points or scene.coloring.by == "residual":
         footprint /= PLACES_PER_POINT
-    return renderer.detail * footprint / unit
+    finer = max(scene.image.height / scene.image.reference, 1.0)
+    return Fineness.of(scene).detail * finer * footprint / unit
 
 
 def _finest_voxels(scene: Scene, renderer: VolumeRenderer, footprint: float) -> float:

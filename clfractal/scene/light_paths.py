@@ -30,6 +30,13 @@ class PathLighting(Section):
         le=MAX_BOUNCES,
         description="bounces after which paths that carry little light end by chance; the mean stays the same",
     )
+    detail: float = Field(
+        0.02,
+        ge=0.01,
+        le=1,
+        description="part of `renderer.detail` to which all rays of a surface's paths find it; 1: faster, and"
+        " too bright in hollows finer than some pixels",
+    )
     clamp: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
         None,
         description="most light that one bounce of a sample may add; less noise, but too dark; null: no limit",

@@ -20,7 +20,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.glow import Glow
 from clfractal.scene.layout import Layout, Place
-from clfractal.scene.light_paths import Lighting
+from clfractal.scene.light_paths import Lighting, PathLighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
 from clfractal.scene.objects import FormulaObject, Joined, Objects, Solid, ball_of_both
@@ -398,6 +398,12 @@ class Scene(Section):
         """The surface renderer's settings; the scene must have this renderer."""
         assert isinstance(self.renderer, SurfaceRenderer)
         return self.renderer
+
+    @property
+    def hit_detail(self) -> float:
+        """The distance that counts as a hit, in footprints of the reference; the scene must have the surface renderer."""
+        along_paths = self.lighting.detail if isinstance(self.lighting, PathLighting) else 1.0
+        return self.surface.detail * along_paths
 
     def resolved(self) -> dict[str, Any]:
         """Plain data (as for YAML or JSON) with every default filled in; it loads back to an equal scene."""

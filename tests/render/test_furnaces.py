@@ -33,7 +33,11 @@ def test_a_white_set_is_as_bright_as_its_furnace(
         formula=formula,
         image={"width": 48, "height": 48},
         renderer={"samples": 24, "firefly_limit": None},
-        lighting={"mode": "path", "bounces": bounces},
+        lighting={
+            "mode": "path",
+            "bounces": bounces,
+            "detail": 1,
+        },  # (Finer, more light is caught for longer.)
         lights=[],
         background=WHITE,
         camera={"position": position, "fov": 40},

@@ -51,7 +51,7 @@ def _lighting(ui: Ui) -> None:
     w.problem(ui, "lighting.mode")
     if not paths:
         return
-    w.fields(ui, "lighting", ("bounces", "roulette", "clamp"), clamp={"auto": "no limit"})
+    w.fields(ui, "lighting", ("bounces", "roulette", "detail", "clamp"), clamp={"auto": "no limit"})
     _choice(ui)
 
 

@@ -73,6 +73,7 @@ _USUAL: dict[str, tuple[float, float]] = {
     "PointLight.rays": (1, 64),
     "PathLighting.bounces": (0, 16),
     "PathLighting.roulette": (0, 16),
+    "PathLighting.detail": (0.01, 1),
     "PathLighting.clamp": (0.5, 100),
     "Specular.ior": (1, 3),
     "Coat.ior": (1, 3),
