@@ -12,6 +12,7 @@
 #include "march_steps.h"
 #else
 #include "march_state.h"
+#include "passed.h"
 #include "proof.h"
 #include "march.h"
 #endif

@@ -6,17 +6,20 @@
 #define SLOPE_GAIN R(0.3)        // part of a newly measured slope
 #define LANDING R(1.0)           // of the cone: from this distance on the march lands
 #define LANDING_AIM R(0.05)      // of the cone: the distance that a landing step aims at
-#define LANDING_STEP R(1.0)      // of the cone: the longest landing step
+#define LANDING_STEP R(1.0)      // of the cone: the longest landing step ...
+#define LANDING_SHORT R(0.5)     // ... and that of rays that may meet sheets
 #define LANDED R(0.6)            // of the cone: the solid expected so near ahead is hit ...
 #define LANDED_MOST R(0.25)      // ... at a distance of at most this part of the cone
 #define LANDED_LEAST R(0.03)     // a ray past the solid hits at this part of the cone: a smooth rim stays where it is
 #define POINT_REACH R(1.5)       // a pixel's points hit at that much more
-#define PASSED_SLOPE R(-0.1)     // what a sheet is approached with at the least
 #define BRACKETED (HOLLOWS && POLISH ? R(0.005) : R(0.1))  // of the cone: a bracket this narrow is the surface
 #define LEAST_SLOPE R(0.1)       // no landing step is longer than ten distances ...
 #define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
 #define GRAZING_MOST R(2.0)      // ... at most so much of the cone
 #define MOST_GROWTH R(0.5)       // of an unscaled distance for the way: where a surface is smooth it is half of the true one
+#define SURE_GROWTH R(0.25)      // what is sure of one that grows faster, near the solid
+#define CALM_GROWTH R(0.1)       // steps from distances that grow faster are no longer than these, near the solid
+#define CLOSE R(4.0)             // cones: near the solid
 #define BALL_NEAR R(1.005)       // of its radius: so near to the middle of a formula's ball its estimates count ...
 #define BALL_BEYOND R(1.01)      // ... and beyond this they may be too large
 #define CREEP R(0.25)            // of the cone: the least step by the Jacobian
@@ -36,15 +39,6 @@ INLINE sight march_place(const march *m) {
     s.point = vec_pick(m->proving, m->probe, s.on_ray);
 #endif
     return s;
-}
-
-// Part of a distance that is safe to go.
-INLINE real step_scale_of(clearance here, __constant const struct March *settings) {
-#if SOLIDS > 1
-    return here.scale;
-#else
-    return (real)(settings->step_scale);
-#endif
 }
 
 // The scaled distance at which light is computed, in cones.
@@ -84,18 +78,23 @@ INLINE real march_to_ball(const march *m, const sight *s, real *around, __consta
 #endif
 
 // What the distance found at that place means for the march.
-INLINE void march_measure(march *m, sight *s, __constant const struct March *settings) {
+INLINE void march_measure(march *m, sight *s, int goal, __constant const struct March *settings) {
     mask free = less_equal((real)(REAL_LARGEST), m->high);
 #if !HAS_DERIVATIVE
     free &= ~m->proving;
 #endif
     s->cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing.
     const real scale = step_scale_of(s->here, settings);
     s->radius = s->here.step * scale;
     // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
     s->radius = pick(less(s->radius, (real)(REAL_LARGEST)), s->radius, (real)(settings->step));
-    s->radius = pick(free, fmin(s->radius, m->radius_before + MOST_GROWTH * scale * m->step_before), s->radius);
+    // Where an estimate grows faster it has met a point at which the derivative vanishes, and means nothing: near the solid, where
+    // such points crowd, it may be more than the true distance to a sheet.
+    const real growth = scale * m->step_before;
+    const mask capped = free & less(m->radius_before + MOST_GROWTH * growth, s->radius);
+    const mask close = seeks_sheets(m, goal) & less(m->radius_before, CLOSE * s->cone);
+    s->radius = pick(capped, m->radius_before + pick(close, SURE_GROWTH, MOST_GROWTH) * growth, s->radius);
+    s->restless = free & close & less(m->radius_before + CALM_GROWTH * growth, s->radius);
 #if HOLLOWS
     march_blind(m, s, settings);
 #endif
@@ -105,27 +104,28 @@ INLINE void march_measure(march *m, sight *s, __constant const struct March *set
 }
 
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
-INLINE void march_keep(march *m, const sight *s, mask outside, mask inside, __constant const struct March *settings) {
+INLINE void march_keep(march *m, const sight *s, mask outside, mask passed, mask inside, __constant const struct March *settings) {
     const real height = s->cone * near_of(s->here, settings);
     const mask beside = outside & less(s->near, height) & ~BLIND(s);
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
     const mask between = beside & less(height, m->radius_before) & less(m->radius_before, (real)(REAL_LARGEST));
     const real back = pick(between, (height - s->near) / (m->radius_before - s->near), R(0.0));
     m->found.touch = pick(first, pick(beside, m->t - back * (m->t - m->low), (real)(REAL_LARGEST)), m->found.touch);
-    m->low = pick(outside, m->t, m->low);
+    m->low = pick(outside & ~passed, m->t, m->low);
     m->high = pick(inside, m->t, m->high);
 }
 
 // The next place of the lanes that march, which went `overshot` or not and have `slope` now.
-INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot, mask early, real slope, int goal,
+INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot, mask early, mask passed, real slope, int goal,
                          __constant const struct March *settings) {
     // Where the distance falls like that of a plane, the next sphere touches this one at 2 / (1 - slope) radii (Ban and
     // Valasek 2023, Automatic step size relaxation in sphere tracing).
     const mask landing = marching & ~overshot & ~at_ball(s) & less(s->radius, goal == GOAL_SURFACE ? LANDING * s->cone : R(0.0));
     const real expected = (s->radius - LANDING_AIM * s->cone) / fmax(-slope, LEAST_SLOPE);
-    const real longer = clamp(R(2.0) / (R(1.0) - m->slope), R(1.0), (real)(settings->relaxation));
-    const real relaxed = s->radius * pick(at_ball(s), R(1.0), longer);
-    real step = pick(landing, fmax(fmin(expected, LANDING_STEP * s->cone), s->radius), relaxed);
+    const real longer = clamp(R(2.0) / (R(1.0) - march_slope(m, s, goal, settings)), R(1.0), (real)(settings->relaxation));
+    const real relaxed = s->radius * pick(at_ball(s) | s->restless, R(1.0), longer);
+    const real longest = pick(seeks_sheets(m, goal), LANDING_SHORT, LANDING_STEP) * s->cone;
+    real step = pick(landing & ~s->restless, fmax(fmin(expected, longest), s->radius), relaxed);
 #if HAS_DERIVATIVE
     m->landing = (m->landing & ~marching) | landing;
 #else
@@ -145,11 +145,12 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
     const real known = pick(BLIND(s) | at_ball(s), (real)(REAL_LARGEST), s->radius);
-    m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside, known, m->radius_before);
+    m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside & ~passed, known, m->radius_before);
     const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
     const real free = pick(is_blind(s->here), R(0.0), s->radius);
     const real narrower = fmax(R(0.5) * (m->low + m->high), fmin(m->low + free, m->high - BRACKETED * s->cone));
     m->t = pick(bracketed, narrower, pick(early, m->low, pick(marching, onward, m->t)));
+    march_between(m, s, marching & ~bracketed);
 }
 
 // One step of cones: as far as the free sphere holds the cone's whole width. The lanes that go on remain active. A cone that
@@ -176,13 +177,13 @@ INLINE void march_cone(march *m, const sight *s, __constant const struct March *
 
 // What the active lanes do after a look; those that arrive, or leave their ray's part, are active no longer.
 INLINE void march_act(march *m, sight s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
-    march_measure(m, &s, settings);
+    march_measure(m, &s, goal, settings);
     if (goal == GOAL_CONE) {
         march_cone(m, &s, settings);
         return;
     }
     const real cone = s.cone, radius = s.radius;
-    const mask marching = proof_step(m, &s, settings, orbit);
+    const mask marching = proof_step(m, &s, goal, settings, orbit);
     // If this sphere does not touch the one before, something may lie between them, so go back to the end of the one
     // before (Keinert et al. 2014, sec. 3.1).
     const mask free = marching & less_equal((real)(REAL_LARGEST), m->high);
@@ -207,11 +208,11 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
     const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~BLIND(&s) & ~at_ball(&s);
-    const mask steep = less(m->slope, PASSED_SLOPE);
     const real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
     m->slope = pick(BLIND(&s), R(0.0), pick(at_ball(&s), SLOPE_AT_FIRST, m->slope));
-    march_keep(m, &s, outside, inside, settings);
+    const mask passed = march_passed(m, &s, outside, inside, goal);
+    march_keep(m, &s, outside, passed, inside, settings);
 
     // The cone touches the solid, or the surface is bracketed. A hit at first sight waits for a landing, unless it is as near as
     // one; a pixel's points begin near the solid, and stand for each other.
@@ -228,24 +229,16 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
 #endif
         touched &= landed;
     }
-    touched &= less(s.near, reach);
+    touched &= less(s.near, pick(passed_between(m), LANDED_LEAST * cone, reach));
     real ahead = goal == GOAL_SURFACE ? fmin(s.near / fmax(-slope, GRAZING_SLOPE), GRAZING_MOST * cone) : R(0.0);
-    mask passed = outside & ~outside;
-#if !HAS_DERIVATIVE
-    // A landing that led through a sheet thinner than all steps sees it from behind.
-    if (goal == GOAL_SURFACE) {
-        passed = outside & m->landing & steep & less(s.near, cone) & less(R(0.0), vec_dot(s.surface.gradient, m->r.direction));
-        touched |= passed;
-        ahead = pick(passed, -fmin(s.near, m->step_before), ahead);
-    }
-#endif
+    ahead = pick(passed_between(m), R(0.0), ahead);
     const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, BRACKETED * cone) : inside;
-    const mask done = narrow | proof_begin(m, &s, touched, passed, bracketed, m->t + ahead, goal, settings);
+    const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings);
     m->found.hit |= done;
     m->found.last = pick(done, m->low, m->found.last);
     m->found.t = pick(done, pick(bracketed, m->low, m->t + ahead), m->found.t);
     m->active &= ~done;
-    march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, slope, goal, settings);
+    march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, passed, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
 #if !HAS_DERIVATIVE
     // A lane that waits for others must not go on proving, or what it finds would depend on them.

@@ -9,6 +9,7 @@
 #include "orbit.h"
 #include "rays.h"
 #include "march_state.h"
+#include "passed.h"
 #include "proof.h"
 #include "march.h"
 #include "queue.h"

@@ -19,6 +19,8 @@ typedef struct {
     real radius_before, step_before;
     mask landing;     // the last step led to where the solid is expected
 #if !HAS_DERIVATIVE
+    real facing;      // the cosine between the gradient at the last point before a surface and the ray
+    real behind;      // a point at which the gradient follows the ray: the distance is least between `low` and this one
     mask proving;
     vec probe, probe_downhill;
     real probe_radius, probes, factor, proved_t;
@@ -31,6 +33,7 @@ typedef struct {
     vec point, on_ray;
     clearance here;
     real radius, near, cone;   // how far is free; how near the surface may be, see `clearance`
+    mask restless;             // the distance has just grown, near the solid: it may be too large
 #if HOLLOWS
     mask blind;   // nobody knows how far the solid is ...
     real sure;    // ... but for what is free at least; else the radius
@@ -39,6 +42,15 @@ typedef struct {
     surface_point surface;
 #endif
 } sight;
+
+// Part of a distance that is safe to go.
+INLINE real step_scale_of(clearance here, __constant const struct March *settings) {
+#if SOLIDS > 1
+    return here.scale;
+#else
+    return (real)(settings->step_scale);
+#endif
+}
 
 #if HOLLOWS
 #define SURE(s) ((s)->sure)
@@ -65,6 +77,8 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
     m->step_before = pick(fresh, R(0.0), m->step_before);
     m->landing &= ~fresh;
 #if !HAS_DERIVATIVE
+    m->facing = pick(fresh, R(0.0), m->facing);
+    m->behind = pick(fresh, (real)(REAL_LARGEST), m->behind);
     m->proving &= ~fresh;
     m->probe = vec_pick(fresh, r.origin, m->probe);
     m->probe_downhill = vec_pick(fresh, r.direction, m->probe_downhill);

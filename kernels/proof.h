@@ -8,9 +8,9 @@
 #define PROOF_STEPS 12
 #define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
 #define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there ...
-#define PROOF_LANDED R(0.004)    // ... and this near where the potential is high
+#define PROOF_LANDED R(0.002)    // ... and this near where the potential is high
 #define PROOF_LOW R(0.1)         // a low potential: below this part of the cone over the set's radius
-#define PROOF_REACH R(1.0)       // of the pixel's cone: how far from the ray the descent may lead
+#define PROOF_REACH R(0.75)      // of the pixel's cone: how far from the ray the descent may lead: a little more than half a diagonal
 #define PROOF_APART R(1.0)       // of the pixel's cone: how far apart two proofs are, unless ...
 #define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
@@ -18,26 +18,30 @@
 #if HAS_DERIVATIVE
 INLINE mask proof_under_way(const march *m) { return m->active & ~m->active; }
 
-INLINE mask proof_step(march *m, const sight *s, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+INLINE mask proof_step(march *m, const sight *s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
     return m->active;
 }
 
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask passed, mask bracketed, real hit_t, int goal,
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
                         __constant const struct March *settings) {
     return touched;
 }
 #else
 INLINE mask proof_under_way(const march *m) { return m->proving; }
 
+// The whole cone of a pixel is looked through for its points.
+INLINE real proof_reach(int goal) { return goal == GOAL_TOUCH ? R(1.0) : PROOF_REACH; }
+
 // Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
-INLINE mask proof_step(march *m, const sight *s, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+INLINE mask proof_step(march *m, const sight *s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
     if (!any_lane(m->proving)) return m->active;
     const real cone = s->cone;
     const vec offset = vec_sub(s->point, s->on_ray);
     const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->set_radius), PROOF_LOW * cone);
     const real arrival = pick(close, PROOF_ARRIVED * cone, PROOF_LANDED * cone);
     const real along = vec_dot(offset, m->r.direction);
-    const mask astray = less(PROOF_REACH * PROOF_REACH * cone * cone, vec_dot(offset, offset) - along * along);
+    const real reach = proof_reach(goal) * cone;
+    const mask astray = less(reach * reach, vec_dot(offset, offset) - along * along);
     const mask arrived = m->proving & (s->here.end.inside | less(s->near, arrival)) & ~astray;
     const mask failed = m->proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), m->probes));
     m->found.hit |= arrived;
@@ -46,10 +50,12 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
     m->active &= ~arrived;
     m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
     m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
-    m->t = pick(failed, fmin(m->t + PROOF_ONWARD * cone, m->limit), m->t);
-    m->step_before = pick(failed, PROOF_ONWARD * cone, m->step_before);
-    m->slope = pick(failed, R(-1.0), m->slope);
+    const mask onward = failed & ~passed_between(m);
+    m->t = pick(onward, fmin(m->t + PROOF_ONWARD * cone, m->limit), m->t);
+    m->step_before = pick(onward, PROOF_ONWARD * cone, m->step_before);
+    m->slope = pick(onward, R(-1.0), m->slope);
     m->landing |= failed;
+    march_between(m, s, failed);
     const mask marching = m->active & ~m->proving;
     m->proving &= ~(arrived | failed);
     return marching;
@@ -57,13 +63,13 @@ INLINE mask proof_step(march *m, const sight *s, __constant const struct March *
 
 // Lanes that touched the solid begin a proof, and those under way go further down. The result are hits that need no proof: a
 // bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be proved again.
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask passed, mask bracketed, real hit_t, int goal,
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
                         __constant const struct March *settings) {
     mask done = touched & bracketed;
 #if POINTS > 1
     done |= touched & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone);
 #endif
-    const mask due = touched & ~done & (passed | less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
+    const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
     if (!any_lane(m->proving | due)) return done;
     const vec downhill = vec_scale(vec_normalize(s->surface.gradient), R(-1.0));
     // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
@@ -76,7 +82,7 @@ INLINE mask proof_begin(march *m, const sight *s, mask touched, mask passed, mas
     real down = m->factor * fmax(s->radius, PROOF_LANDED * s->cone);
 #if POINTS > 1
     // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
-    if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * PROOF_REACH * s->cone);
+    if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * proof_reach(goal) * s->cone);
 #endif
     m->probe = vec_pick(m->proving, vec_along(s->point, down, downhill), m->probe);
     m->probe_downhill = downhill;

@@ -21,6 +21,9 @@ from tests.render.shots import Floats, points_of, scene_of, shoot
 ITERATIONS = 250
 FORMULA = {"name": "hast", "parameters": {"power": 2}, "iterations": ITERATIONS}
 CHANNELS = ("A", "P.X", "P.Y", "P.Z")
+# The share of pixels whose centre is in the set and which may be missed: one of a hundred thousand is. Which ones follows
+# from last bits.
+LOST = 2.5e-5
 
 Bools = npt.NDArray[np.bool_]
 
@@ -103,8 +106,7 @@ def test_the_issue_of_the_thesis(device: Device) -> None:
     film, columns, rows, chain = from_above(device, -0.6, 0, height, side)
     covered, inside = film["A"] > 0, mandelbrot(columns, rows)
     assert 0.16 < inside.mean() < 0.18  # its area, 1.5066, over the picture's, and 250 iterations' excess
-    # Sheets without thickness that a landing leads through are seen from behind; 21 pixels of 169,192 are not.
-    assert (inside & ~covered).sum() <= 1.3e-4 * inside.sum()
+    assert (inside & ~covered).sum() <= LOST * inside.sum()
     labels, sizes = components(covered)
     assert sizes[0] >= 0.999 * covered.sum()
     points = points_of(film)
@@ -116,6 +118,15 @@ def test_the_issue_of_the_thesis(device: Device) -> None:
     # Which pixels are hit falsely follows from the last bits of a distance, and so from the processor's estimate of
     # 1/sqrt: Intel's leaves no such island here, AMD's four, of seven pixels of 270,000.
     assert sum(empty.values()) <= 5e-5 * covered.sum(), empty
+
+
+@pytest.mark.parametrize(("x", "side"), [(-0.6, 900), (-0.75, 900), (-0.6, 333)])
+def test_a_ray_whose_own_line_meets_the_set_hits(device: Device, x: float, side: int) -> None:
+    """The set is a sheet without thickness there. Over its left globe lie layers in which distances are much too large;
+    ten pixels of 128,000 were lost in them."""
+    film, columns, rows, _ = from_above(device, x, 0, 3.1, side)
+    inside = mandelbrot(columns, rows)
+    assert (inside & (film["A"] == 0)).sum() <= LOST * inside.sum()
 
 
 @pytest.mark.parametrize(
