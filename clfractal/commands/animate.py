@@ -67,7 +67,6 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     begun = time.perf_counter()
     shell.mute_drivers()
     scene = ordered_scene(order)
-    tell_reference(order, scene, shell)
     with speaking_of(order.scene):
         animation = movement_of(scene).animation
     numbers = part.numbers(animation.count)
@@ -84,6 +83,7 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
             check_output(order.stats, (order.stats.suffix.lower(),))
             others.append(order.stats)
         check_numbered(scene, [*files.values()], others)
+        tell_reference(order, scene, shell)
         for film in films:
             if not film.tells_stereo:
                 shell.say(f"{film.path}: players are not told how it holds two pictures; choose it there")

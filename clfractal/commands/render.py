@@ -62,8 +62,8 @@ def render_files(order: Order, shell: Shell) -> None:
     region = _region(order.region)
     shell.mute_drivers()
     scene = ordered_scene(order)
-    tell_reference(order, scene, shell)
     outputs = checked_outputs(order, scene, region)
+    tell_reference(order, scene, shell)
     with engine_of(order, shell) as engine:
         _render(replace(order, outputs=outputs), shell, engine, scene, region, start)
 

@@ -170,4 +170,6 @@ def test_points_of_a_coarse_pixel_lie_all_over_its_block(device: Device) -> None
     assert np.abs(film["A"] - blocks).mean() < 0.08
     rim = (blocks > 0.2) & (blocks < 0.8)
     assert rim.sum() > 5
-    assert ((film["A"][rim] > 0) & (film["A"][rim] <= 1)).all()
+    # (Nine rays may all miss what some of the block's pixels meet.)
+    assert (film["A"][rim] > 0).mean() > 0.9
+    assert (film["A"] <= 1).all()

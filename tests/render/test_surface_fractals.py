@@ -57,9 +57,9 @@ DETAIL = 0.02
 
 @pytest.mark.parametrize("name", CASES)
 def test_normals_and_counts(device: Device, name: str) -> None:
-    """The normal is the direction in which |z| of the last application grows fastest; the smooth count is
-    n - log(log|z| / log R) / log d at the first n where |z| exceeds R, 1000 or less for high degrees d. Each is that of
-    a place on the pixel's ray, at the hit or before it, where the cone came near the solid."""
+    """The normal is the direction in which |z| of the last application grows fastest, at most of the scene's last one; the
+    smooth count is n - log(log|z| / log R) / log d at the first n where |z| exceeds R, 1000 or less for high degrees d.
+    Each is that of a place on the pixel's ray, at the hit or before it, where the cone came near the solid."""
     formula, step, degree = CASES[name]
     scene = scene_of(
         formula, CAMERA, (96, 72), lights=[], coloring={"by": COLORING[name]}, renderer={"detail": DETAIL}
@@ -77,7 +77,8 @@ def test_normals_and_counts(device: Device, name: str) -> None:
     angle, difference = np.full(len(points), np.inf), np.full(len(points), np.inf)
     for way in np.linspace(0, FARTHEST, PLACES):
         limit = scene.chain.distance_bailout
-        expected, smooth = normal_and_count(step, points + way * cone * to_eye, name, limit, degree)
+        places = points + way * cone * to_eye
+        expected, smooth = normal_and_count(step, places, name, limit, degree, formula["iterations"])
         # A hit on the far side of something thinner than a pixel shows the near side: mirrored towards the eye.
         away = -(expected * to_eye).sum(-1)
         expected += np.where(away > 0.1, 2 * away, 0)[:, None] * to_eye
@@ -91,16 +92,17 @@ def test_normals_and_counts(device: Device, name: str) -> None:
 
 
 def normal_and_count(
-    step: Map, points: Floats, name: str, limit: float, degree: int
+    step: Map, points: Floats, name: str, limit: float, degree: int, iterations: int
 ) -> tuple[Floats, Floats]:
-    """Normals and smooth counts at points; not numbers where |z| stays below the limit."""
+    """Normals, of no z after the surface's, and smooth counts at points; not numbers where |z| stays below the limit."""
     with np.errstate(all="ignore"):
         count, radius = last(step, points, name, limit)
+        of = np.minimum(count, iterations)
         h = 1e-6
         gradient = np.stack(
             [
-                np.log(last(step, points + h * axis, name, limit, count)[1])
-                - np.log(last(step, points - h * axis, name, limit, count)[1])
+                np.log(last(step, points + h * axis, name, limit, of)[1])
+                - np.log(last(step, points - h * axis, name, limit, of)[1])
                 for axis in np.eye(3)
             ],
             axis=-1,

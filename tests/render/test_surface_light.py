@@ -70,7 +70,7 @@ def test_equation_5(device: Device, formula: dict[str, Any], lights: str) -> Non
     normals = points / np.linalg.norm(points, axis=-1, keepdims=True).clip(1e-9)
     expected = eq5(scene, points, normals, rays(scene)[1])
     assert hit.sum() > 1000
-    np.testing.assert_allclose(colors(film)[hit], expected[hit], atol=3e-4)
+    np.testing.assert_allclose(colors(film)[hit], expected[hit], atol=1e-3)
     if lights == "none":
         assert not colors(film)[hit].any()
 

@@ -17,6 +17,7 @@ from clfractal.pictures.film import Film
 from clfractal.pictures.probe import CHANNELS, Probe
 from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
+from clfractal.work.sized import with_size
 from tests.render.shots import BALL, BALL_RADIUS, engine_of, scene_of
 from tests.shell import InProcess
 
@@ -165,7 +166,7 @@ def test_the_shell(shell: InProcess) -> None:
     assert ended.status == 0, ended
     told = json.loads(ended.out)
     assert told == clfractal.probe(
-        clfractal.load_scene("scene.yaml", overrides=["image.width=96", "image.height=64"]), 48, 32
+        with_size(clfractal.load_scene("scene.yaml"), (96, 64)), 48, 32
     ).plain() | {name: list(told[name]) for name in ("point", "normal")}
     text = shell("probe", "scene.yaml", "20,18").out.splitlines()
     assert text[0] == "pixel 20,18"
