@@ -122,9 +122,9 @@ def test_squeezed_pictures_show_all_of_the_screen(
     rendered(shell, "scene.yaml", "a.exr", "--set", f"stereo.mode={mode}")
     high = 2 * 3 * float(np.tan(np.radians(22.5)))  # the camera's default is 45 degrees
     plane = f"{{width: {high * SIZE[0] / SIZE[1]!r}, height: {high!r}}}"
-    options = ("--set", f"stereo.mode={whole}", "--set", f"stereo.plane={plane}")
+    options = ["--set", f"stereo.mode={whole}", "--set", f"stereo.plane={plane}"]
     for side, pixels_there in zip(("width", "height"), size.split("x"), strict=True):
-        options += ("--set", f"image.{side}={pixels_there}")
+        options += ["--set", f"image.{side}={pixels_there}"]
     rendered(shell, "scene.yaml", "b.exr", *options)
     assert pixels(here / "a.exr") == pixels(here / "b.exr")
 
