@@ -49,6 +49,19 @@ def test_the_size_keeps_the_reference(clf: InProcess, scene: str, options: list[
     assert (SAID in ended.err + ended.out) == (moved and image.reference_height is None)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "status"), [("height", "-5", 0), ("height", "true", 0), ("reference_height", "-5", 2)]
+)
+def test_what_is_wrong_in_the_file_is_not_told_of_the_size(
+    clf: InProcess, key: str, value: str, status: int
+) -> None:
+    """A height that the size replaces does not matter; a wrong reference is told where it stands."""
+    Path("wrong.yaml").write_text(f"{SCENE}image: {{width: 64, {key}: {value}}}\n", encoding="utf-8")
+    ended = clf("render", "wrong.yaml", "-o", "out.png", "--size", "16x9")
+    assert ended.status == status, ended
+    assert status == 0 or ended.err.startswith("wrong.yaml:7:"), ended.err
+
+
 def test_a_thumbnails_file_renders_the_print(clf: InProcess) -> None:
     for order in (
         ("bulb.yaml", "-o", "print.exr"),

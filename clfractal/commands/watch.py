@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from clfractal.commands.order import Order, naming_options
 from clfractal.commands.pipes import INPUT, STREAM, refuse_stream
-from clfractal.commands.render import checked_outputs, ordered_scene
+from clfractal.commands.render import checked_outputs, ordered_scene, tell_reference
 from clfractal.commands.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Stopped, Where, speaking_of
 from clfractal.files.atomic import check_output
@@ -50,8 +50,10 @@ def watch_scene(order: Order, shell: Shell) -> None:
     refuse_overwriting(order.outputs, [order.scene])
     shell.mute_drivers()
     watched = Watched([Path(order.scene)], interval=_INTERVAL)
+    scene: Scene | None
     try:
-        scene: Scene | None = _read(order, watched)
+        scene = _read(order, watched)
+        tell_reference(order, scene, shell)
     except ClfractalError as error:
         if not Path(order.scene).exists() or (error.where.file or "").startswith("--"):
             raise

@@ -29,6 +29,7 @@ from clfractal.scene.lighting import SetLight
 from clfractal.scene.maps import ColorMap, maps_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
+from clfractal.scene.parts import MAX_SIDE, Image
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +101,12 @@ def sized(text: SceneText, overrides: Sequence[str], size: tuple[int, int]) -> d
         document = _overridden(document, override)
     image = SceneText(document, text.folder).value("image")
     given = image if isinstance(image, dict) else {}
-    reference = given.get("reference_height")
-    if reference is None:
-        reference = given.get("height", _default(("image", "height")))
-    if isinstance(reference, int | float):  # else it is told what is wrong with it
-        found["image.reference_height"] = "null" if reference == height else str(reference)
+    own = given.get("height", Image().height)
+    if given.get("reference_height") is not None:  # which stays, and is checked at its own place
+        if given["reference_height"] == height:
+            found["image.reference_height"] = "null"
+    elif type(own) is int and 1 <= own <= MAX_SIDE and own != height:
+        found["image.reference_height"] = str(own)
     return found
 
 
