@@ -71,15 +71,17 @@ class Layout(Section):
     columns: Annotated[int, Field(strict=True, ge=1, le=MAX_VIEWS)] | None = Field(
         None, description="cells per row; null: all views in one row"
     )
-    gap: int = Field(0, ge=0, le=1024, description="space between cells, pixels")
+    gap: int = Field(0, ge=0, le=1024, description="space between cells, pixels of the reference")
     background: Color = Field((0.0, 0.0, 0.0), description="colour of the gaps, linear Rec. 709")
 
-    def places(self, width: int, height: int) -> list[Place]:
-        """Where each view lies in a picture of `width` x `height` pixels; a place may be empty."""
+    def places(self, width: int, height: int, reference: float) -> list[Place]:
+        """Where each view lies in a picture of `width` x `height` pixels whose reference height is `reference`; a place may be empty."""
         columns = self.columns or sum(1 for view in self.views if view.area is None) or 1
         cells = sum(1 for view in self.views if view.area is None)
         rows = max(-(-cells // columns), 1)
-        across, down = _cells(width, columns, self.gap), _cells(height, rows, self.gap)
+        # (One that is there stays visible in a thumbnail.)
+        gap = max(round(self.gap * height / reference), 1) if self.gap else 0
+        across, down = _cells(width, columns, gap), _cells(height, rows, gap)
         found, cell = [], 0
         for view in self.views:
             if view.area is None:

@@ -378,7 +378,7 @@ class Scene(Section):
 
         assert self.layout is not None
         found = []
-        places = self.layout.places(self.image.width, self.image.height)
+        places = self.layout.places(self.image.width, self.image.height, self.image.reference)
         for number, (view, place) in enumerate(zip(self.layout.views, places, strict=True)):
             if place.width < 1 or place.height < 1:
                 raise SceneError(

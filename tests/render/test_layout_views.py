@@ -131,8 +131,17 @@ def test_areas_cover_each_other_in_order(device: Device) -> None:
 def test_cells(
     layout: dict[str, Any], size: tuple[int, int], places: list[tuple[int, int, int, int]]
 ) -> None:
-    found = Layout.model_validate({"views": [{}, {}, {}], **layout}).places(*size)
+    found = Layout.model_validate({"views": [{}, {}, {}], **layout}).places(*size, reference=size[1])
     assert [(place.x, place.y, place.width, place.height) for place in found] == places
+
+
+@pytest.mark.parametrize(("times", "gap"), [(0.01, 1), (0.25, 2), (0.5, 3), (1, 6), (2, 12)])
+def test_gaps_grow_with_the_picture(times: float, gap: int) -> None:
+    """A picture at another size is the same picture: gaps are pixels of the reference, and never vanish."""
+    layout = Layout.model_validate({"views": [{}, {}], "gap": 6})
+    left, right = layout.places(round(800 * times), round(400 * times), reference=400)
+    assert right.x - left.x - left.width == gap
+    assert left.x + right.x + right.width == round(800 * times)
 
 
 def test_the_samples_asked_for(device: Device) -> None:
