@@ -75,7 +75,7 @@ class Layout(Section):
     background: Color = Field((0.0, 0.0, 0.0), description="colour of the gaps, linear Rec. 709")
 
     def places(self, width: int, height: int, reference: float) -> list[Place]:
-        """Where each view lies in a picture of `width` x `height` pixels whose reference height is `reference`; a place may be empty."""
+        """Where each view lies in a picture of `width` x `height` pixels with a reference height; one may be empty."""
         columns = self.columns or sum(1 for view in self.views if view.area is None) or 1
         cells = sum(1 for view in self.views if view.area is None)
         rows = max(-(-cells // columns), 1)
