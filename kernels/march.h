@@ -11,7 +11,8 @@
 #define LANDED R(0.6)            // of the cone: the solid expected so near ahead is hit ...
 #define LANDED_MOST R(0.25)      // ... at a distance of at most this part of the cone
 #define LANDED_LEAST R(0.03)     // a ray past the solid hits at this part of the cone: a smooth rim stays where it is
-#define POINT_REACH R(1.5)       // a pixel's points hit at that much more
+#define POINT_REACH R(1.35)      // a pixel's points hit at that much more ...
+#define POINT_LEAST R(0.0075)    // ... but at their own rims they are as exact as they are many
 #define BRACKETED (HOLLOWS && POLISH ? R(0.005) : R(0.1))  // of the cone: a bracket this narrow is the surface
 #define LEAST_SLOPE R(0.1)       // no landing step is longer than ten distances ...
 #define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
@@ -208,7 +209,12 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
     const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~BLIND(&s) & ~at_ball(&s);
-    const real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
+    real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
+#if POINTS > 1
+    // Points begin near the solid: their first look may be the last.
+    const mask is_point = less(m->r.known, RAY_NOTHING_KNOWN);
+    slope = pick(is_point & outside & ~knew, march_first_slope(m, &s, settings), slope);
+#endif
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
     m->slope = pick(BLIND(&s), R(0.0), pick(at_ball(&s), SLOPE_AT_FIRST, m->slope));
     const mask passed = march_passed(m, &s, outside, inside, goal);
@@ -223,9 +229,8 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
         reach *= clamp(-LANDED * slope, LANDED_LEAST, LANDED_MOST);
         mask landed = m->landing | less(s.near, LANDED_LEAST * cone);
 #if POINTS > 1
-        const mask is_point = less(m->r.known, RAY_NOTHING_KNOWN);
         landed |= is_point;
-        reach *= pick(is_point, POINT_REACH, R(1.0));
+        reach = pick(is_point, POINT_REACH * cone * clamp(-LANDED * slope, POINT_LEAST, LANDED_MOST), reach);
 #endif
         touched &= landed;
     }
@@ -236,7 +241,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings);
     m->found.hit |= done;
     m->found.last = pick(done, m->low, m->found.last);
-    m->found.t = pick(done, pick(bracketed, m->low, m->t + ahead), m->found.t);
+    m->found.t = pick(done, pick(touched, fmin(m->t + ahead, m->high), m->low), m->found.t);
     m->active &= ~done;
     march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, passed, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));

@@ -16,6 +16,8 @@ INLINE mask march_passed(march *m, const sight *s, mask outside, mask inside, in
 INLINE void march_between(march *m, const sight *s, mask marching) {}
 
 INLINE real march_slope(const march *m, const sight *s, int goal, __constant const struct March *settings) { return m->slope; }
+
+INLINE real march_first_slope(const march *m, const sight *s, __constant const struct March *settings) { return m->slope; }
 #else
 // Points of a pixel stand for each other, and begin near the solid.
 INLINE mask seeks_sheets(const march *m, int goal) {
@@ -53,5 +55,16 @@ INLINE void march_between(march *m, const sight *s, mask marching) {
 INLINE real march_slope(const march *m, const sight *s, int goal, __constant const struct March *settings) {
     const real facing = ray_facing(m, s), here = FACING_SLOPE * step_scale_of(s->here, settings) * facing;
     return pick(seeks_sheets(m, goal) & less(facing, R(0.0)), fmin(m->slope, here), m->slope);
+}
+
+// The slope where none has been measured yet; a distance of degree 1 is the true one.
+#if SOLIDS > 1 || LOGARITHMIC
+#define FIRST_SLOPE FACING_SLOPE
+#else
+#define FIRST_SLOPE R(1.0)
+#endif
+
+INLINE real march_first_slope(const march *m, const sight *s, __constant const struct March *settings) {
+    return FIRST_SLOPE * step_scale_of(s->here, settings) * ray_facing(m, s);
 }
 #endif

@@ -5,7 +5,7 @@
 // How near counts as arrived depends on the potential G: a low one means that the solid can only be near, though it may be
 // as thin as a sheet that no descent finds; where it is high a small estimate is suspect (a valley of G whose steep sides
 // pretend to a solid at its bottom), and the descent has to get much nearer.
-#define PROOF_STEPS 12
+#define PROOF_STEPS R(12.0)
 #define PROOF_FACTOR R(2.0)      // first step down, in estimated distances: conformal maps have their solid at one to four
 #define PROOF_ARRIVED R(0.0625)  // of the pixel's cone: this near to the solid counts as being there ...
 #define PROOF_LANDED R(0.002)    // ... and this near where the potential is high
@@ -14,6 +14,9 @@
 #define PROOF_APART R(1.0)       // of the pixel's cone: how far apart two proofs are, unless ...
 #define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
+// The march that a pixel's points share gives up sooner and goes on farther: they look more closely.
+#define TOUCH_STEPS R(8.0)
+#define TOUCH_ONWARD R(1.0)
 
 #if HAS_DERIVATIVE
 INLINE mask proof_under_way(const march *m) { return m->active & ~m->active; }
@@ -32,6 +35,10 @@ INLINE mask proof_under_way(const march *m) { return m->proving; }
 // The whole cone of a pixel is looked through for its points.
 INLINE real proof_reach(int goal) { return goal == GOAL_TOUCH ? R(1.0) : PROOF_REACH; }
 
+INLINE real proof_onward(int goal) { return goal == GOAL_TOUCH ? TOUCH_ONWARD : PROOF_ONWARD; }
+
+INLINE real proof_most(int goal) { return goal == GOAL_TOUCH ? TOUCH_STEPS : PROOF_STEPS; }
+
 // Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
 INLINE mask proof_step(march *m, const sight *s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
     if (!any_lane(m->proving)) return m->active;
@@ -43,7 +50,7 @@ INLINE mask proof_step(march *m, const sight *s, int goal, __constant const stru
     const real reach = proof_reach(goal) * cone;
     const mask astray = less(reach * reach, vec_dot(offset, offset) - along * along);
     const mask arrived = m->proving & (s->here.end.inside | less(s->near, arrival)) & ~astray;
-    const mask failed = m->proving & ~arrived & (astray | less_equal((real)(PROOF_STEPS), m->probes));
+    const mask failed = m->proving & ~arrived & (astray | less_equal(proof_most(goal), m->probes));
     m->found.hit |= arrived;
     m->found.last = pick(arrived, m->low, m->found.last);
     m->found.t = pick(arrived, m->proved_t, m->found.t);
@@ -51,8 +58,8 @@ INLINE mask proof_step(march *m, const sight *s, int goal, __constant const stru
     m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
     m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
     const mask onward = failed & ~passed_between(m);
-    m->t = pick(onward, fmin(m->t + PROOF_ONWARD * cone, m->limit), m->t);
-    m->step_before = pick(onward, PROOF_ONWARD * cone, m->step_before);
+    m->t = pick(onward, fmin(m->t + proof_onward(goal) * cone, m->limit), m->t);
+    m->step_before = pick(onward, proof_onward(goal) * cone, m->step_before);
     m->slope = pick(onward, R(-1.0), m->slope);
     m->landing |= failed;
     march_between(m, s, failed);

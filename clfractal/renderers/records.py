@@ -203,8 +203,8 @@ SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
 # And the part of a scaled distance that the cone takes for free.
 CONE_MARGIN, CONE_SHARE = 1.5, 0.8
-# In footprints: a pixel's shared march ends where the set may be this near, more than half a pixel's diagonal.
-TOUCH = 0.75
+# In footprints: a pixel's shared march ends where the set may be this near, half a pixel's diagonal.
+TOUCH = 0.7
 # In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
 KNOWN_REACH = 4.0
 # In footprints: how far before the end of their pixel's march the points begin.
