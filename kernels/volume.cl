@@ -3,19 +3,15 @@
 // A ray looks at the grid at places that lie a fixed step apart, counted from where it enters the grid: skipping empty nodes
 // leaves out places, and never moves them. SURFACE shows the boundary where the value passes `level`; otherwise places are
 // composited from front to back, until the ray is opaque.
+//
+// From the build: formula.h and orbit.h, empty where nothing asks the formula; volume_normals.h, whose normals surfaces have.
 #include "lanes.h"
-#if PLANES > 0 || HAS_PATHS
 #include "numbers/real.h"
-#endif
-#if PLANES > 0
 #include "numbers/dual.h"
-#endif
 #include "vectors.h"
 #include "structs.h"
-#if PLANES > 0
 #include "formula.h"
 #include "orbit.h"
-#endif
 #include "camera.h"
 #include "sampling.h"
 #include "shade.h"
@@ -39,6 +35,7 @@ typedef uchar sample;
 #endif
 #include "volume_ray.h"
 #include "volume_light.h"
+#include "volume_normals.h"
 #include "volume_sight.h"
 #include "volume_shot.h"
 #if HAS_PATHS
@@ -72,17 +69,17 @@ __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __c
                      __global const sample *values0, __global const sample *values1, __global const sample *values2,
                      __global const sample *values3, __global const uchar *normals0, __global const uchar *normals1,
                      __global const uchar *normals2, __global const uchar *normals3,
+                     __constant const struct Orbit *orbits, __constant const scalar *k,
 #if HAS_PATHS
                      __global const float *bounds, __global const float *environment,
 #endif
 #if PLANES > 0
-                     __global const struct CutPlane *planes, __constant const struct Orbit *orbits,
-                     __constant const scalar *k, __global const float *plane_palettes,
+                     __global const struct CutPlane *planes, __global const float *plane_palettes,
 #endif
                      PASS_SPAN) {
     const world w = {view, settings, material, lights, transfer,
                      {about, table, blocks, {values0, values1, values2, values3}, {normals0, normals1, normals2, normals3}},
-                     sampling
+                     sampling, orbits, k
 #if HAS_PATHS
                      , bounds, environment
 #endif

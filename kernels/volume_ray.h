@@ -7,6 +7,8 @@ typedef struct {
     __global const float *transfer;   // TRANSFER_SIZE entries of TRANSFER_COLUMNS numbers: opacity of a step, colour, light that a step adds
     grid grid;
     __constant const struct Sampling *sampling;
+    __constant const struct Orbit *orbits;   // the solid, and the formulas' constants; nothing where no program asks them
+    __constant const scalar *k;
 #if HAS_PATHS
     __global const float *bounds;        // of each stored brick the most extinction that may be met in it
     __global const float *environment;   // see environment.h

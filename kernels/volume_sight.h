@@ -109,13 +109,14 @@ INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, vec to_viewer, 
     const cell c = cell_at(place_of(g, at), w.grid.about);
     const ints entry = brick_at(c, w.grid);
     const mask stored = found & is_stored(entry);
+    const real t = distance_of(g, at, w);
+    const vec point = vec_along(r.origin, t, r.direction);
     vec normal = grid_normal(c, entry, stored, w.grid);
     const mask none = less(vec_dot(normal, normal), R(0.5));
     // A ray that begins inside, at the grid's side, meets a flat face.
-    normal = vec_pick(none, to_viewer, normal);
-    const real t = distance_of(g, at, w);
+    normal = vec_pick(none, to_viewer, normal_there(point, normal, found & ~none, w));
     const real value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
-    const color light = lit(vec_along(r.origin, t, r.direction), normal, tint_of(value, normal, w), to_viewer, found, w, looked);
+    const color light = lit(point, normal, tint_of(value, normal, w), to_viewer, found, w, looked);
     sight_add(e, light, R(1.0), t, value, normal, found & ~found, found);
 }
 #else

@@ -78,7 +78,7 @@ def has_faces(scene: Scene) -> bool:
 
 def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
     """The planes, one record each."""
-    zoom, origin = _zoom(scene)
+    zoom, origin = zoom_of(scene)
     rows = [
         {
             "center": placed.center,
@@ -121,7 +121,7 @@ def _iterations(scene: Scene, plane: CutPlane) -> int:
     return plane.iterations if plane.iterations is not None else scene.formula.iterations
 
 
-def _zoom(scene: Scene) -> tuple[float, npt.NDArray[np.float64]]:
+def zoom_of(scene: Scene) -> tuple[float, npt.NDArray[np.float64]]:
     """From the picture to where the formula is evaluated: a factor, and what is added."""
     if not isinstance(scene.renderer, VolumeRenderer):
         return 1.0, np.zeros(3)

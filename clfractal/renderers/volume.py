@@ -21,7 +21,7 @@ from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
-from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_palettes, plane_records
+from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_palettes, plane_records, zoom_of
 from clfractal.renderers.transfer import (
     MOST_OPACITY,
     SHINING_RATE,
@@ -49,6 +49,8 @@ from clfractal.voxels.grid import Grid
 
 # Shadow rays leave the surface by this many voxels, so that they do not meet the voxel that they start from.
 SHADOW_LIFT = 1.5
+# From one place to the next where the formula's surface is looked for, in voxels (`kernels/volume_exact.h`).
+NORMAL_STEP = 0.125
 
 GRID = Struct(
     "Grid",
@@ -87,6 +89,14 @@ VOLUME = Struct(
         Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("max_steps", "int", 0, "most places of a ray"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("zoom", "real", 0, "from the picture to where the formula is evaluated: a factor, ..."),
+        Field("zoom_origin", "real", 3, "... and what is added"),
+        Field(
+            "normal_step",
+            "real",
+            0,
+            "how far apart the formula's surface is looked for: an eighth of a voxel there",
+        ),
     ],
 )
 
@@ -100,7 +110,7 @@ def settings_of(scene: Scene) -> VolumeRenderer:
 
 
 def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
-    """The whole text of the program; the formula is no part of it unless planes show it."""
+    """The whole text of the program; the formula is part of it only where it is asked."""
     settings = settings_of(scene)
     defines = {
         **pass_defines(plan),
@@ -132,19 +142,32 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
     }
     structs = "".join(struct.c_text() for struct in STRUCTS)
     body = Body.of(scene)
-    formulas = {"formula.h": ""}
-    if scene.cut_planes:
+    formulas = {"formula.h": "", "orbit.h": ""}
+    if asks_formula(scene):
         formulas = body.texts(files=("escape.h",), defines=escape_defines)
         defines |= body.defines
-    return flat_text("volume.cl", generated={"structs.h": structs, **formulas}, defines=defines)
+    normals = f'#include "volume_{"exact" if has_exact_normals(scene) else "blended"}.h"\n'
+    generated = {"structs.h": structs, "volume_normals.h": normals, **formulas}
+    return flat_text("volume.cl", generated=generated, defines=defines)
+
+
+def has_exact_normals(scene: Scene) -> bool:
+    """Whether the surface has the formula's normals where rays meet it."""
+    settings = settings_of(scene)
+    return settings.normals == "exact" and settings.transfer.opacity is None and scene.given is None
+
+
+def asks_formula(scene: Scene) -> bool:
+    """Whether pictures evaluate the formula themselves."""
+    return bool(scene.cut_planes) or has_exact_normals(scene)
 
 
 def ray_precision(scene: Scene, plan: Plan) -> Precision:
     """The number type of rays: rays use the grid's own coordinates, whatever number type filled it.
 
-    Only cut planes evaluate the formula where a zoom has led, and want what filling wants.
+    Only what evaluates the formula where a zoom has led wants what filling wants.
     """
-    return plan.precision if scene.cut_planes else "float32"
+    return plan.precision if asks_formula(scene) else "float32"
 
 
 class VolumeKernel(TileKernel):
@@ -194,6 +217,7 @@ class VolumeKernel(TileKernel):
             blocks,
             *(_one_of(grid.values, pool) for pool in four),
             *(_one_of(grid.normals, pool) for pool in four),
+            *_formula_arguments(scene, precision),
             *(self._path_arguments() if has_paths(scene) else []),
             *(_plane_arguments(scene, precision) if scene.cut_planes else []),
         ]
@@ -300,6 +324,7 @@ def volume_record(
     """How rays go through the grid and how pixels are put together."""
     settings = settings_of(scene)
     voxel = float(min(grid.spacing)) * _zoom(scene)
+    zoom, origin = zoom_of(scene)
     # Paths count in sides of a voxel.
     step = voxel if has_paths(scene) else settings.step * voxel
     longest = grid.place.diagonal * _zoom(scene)
@@ -318,6 +343,9 @@ def volume_record(
         **_path_fields(scene, environment),
         "max_steps": int(np.ceil(longest / step)) + 2,
         "light_count": len(scene.lights),
+        "zoom": zoom,
+        "zoom_origin": origin,
+        "normal_step": NORMAL_STEP * voxel * zoom,
     }
     return VOLUME.value(precision, values)
 
@@ -428,14 +456,16 @@ def _shining_length(extinctions: npt.NDArray[np.float64], step: float) -> npt.ND
 
 
 def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
-    """The cut planes, and the formula that they show, in the kernel's order."""
+    """The cut planes, in the kernel's order."""
+    return [plane_records(scene, precision), plane_palettes(scene)]
+
+
+def _formula_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
+    """The solid and the formulas' constants, or nothing where they are not asked."""
+    if not asks_formula(scene):
+        return [np.zeros(1, np.float32), np.zeros(1, np.float32)]
     body = Body.of(scene)
-    return [
-        plane_records(scene, precision),
-        body.records(precision),
-        body.constants(precision),
-        plane_palettes(scene),
-    ]
+    return [body.records(precision), body.constants(precision)]
 
 
 def _zoom(scene: Scene) -> float:

@@ -53,6 +53,32 @@ def onto_level(chain: Chain, points: Floats, applications: int, level: float) ->
     return points
 
 
+def inside(chain: Chain, points: Floats, applications: int) -> npt.NDArray[np.bool_]:
+    """Which points belong to the solid of so many applications."""
+    size = sizes(chain, points, applications)
+    within: npt.NDArray[np.bool_] = (size <= chain.distance_bailout).all(axis=0) & (size[-1] <= chain.bailout)
+    return within
+
+
+def along(
+    chain: Chain, points: Floats, normals: Floats, applications: int, reach: float, looks: int = 30
+) -> Floats:
+    """The solid's surface straight above points that are inside, and straight below others: where lines along their
+    normals first pass it, just outside; NaN where they do not, looked at so often within reach."""
+    began = inside(chain, points, applications)
+    way = np.where(began, 1.0, -1.0)[:, None] * normals
+    part, past = reach / looks, np.full(len(points), np.nan)
+    for look in range(1, looks + 1):
+        passed = inside(chain, points + look * part * way, applications) != began
+        past = np.where(np.isnan(past) & passed, look * part, past)
+    before = past - part
+    for _ in range(40):
+        middle = (before + past) / 2
+        passed = inside(chain, points + middle[:, None] * way, applications) != began
+        before, past = np.where(passed, before, middle), np.where(passed, middle, past)
+    return points + np.where(began, past, before)[:, None] * way
+
+
 def degrees(normals: Floats, expected: Floats) -> Floats:
     """Angles between normals and directions of any length."""
     with np.errstate(all="ignore"):
