@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
 from clfractal.optics.view import camera_view
-from clfractal.renderers.planes import _zoom
+from clfractal.renderers.planes import zoom_of
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -88,7 +88,7 @@ def test_the_stage_is_where_cut_planes_evaluate_the_formula(
     data: st.DataObject, point: tuple[float, float, float]
 ) -> None:
     scene = zoomed(START, data.draw(boxes(stage_of(START))))
-    zoom, origin = _zoom(scene)
+    zoom, origin = zoom_of(scene)
     stage = stage_of(scene)
     np.testing.assert_allclose(stage.to_formula(point), origin + zoom * np.array(point), atol=1e-15)
     np.testing.assert_allclose(stage.to_picture(stage.to_formula(point)), point, atol=1e-11)
