@@ -13,6 +13,9 @@
 #define LANDED_LEAST R(0.03)     // a ray past the solid hits at this part of the cone: a smooth rim stays where it is
 #define POINT_REACH R(1.35)      // a pixel's points hit at that much more ...
 #define POINT_LEAST R(0.0075)    // ... but at their own rims they are as exact as they are many
+// Rays that do not land hit where light is computed:
+#define SEEN R(2.0)              // of the cone: the solid expected so near ahead is hit ...
+#define SEEN_BRACKETED R(0.5)    // ... and so is a bracket this narrow
 #define BRACKETED (HOLLOWS && POLISH ? R(0.005) : R(0.1))  // of the cone: a bracket this narrow is the surface
 #define LEAST_SLOPE R(0.1)       // no landing step is longer than ten distances ...
 #define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
@@ -228,6 +231,10 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     if (goal == GOAL_SURFACE) {
         reach *= clamp(-LANDED * slope, LANDED_LEAST, LANDED_MOST);
         mask landed = m->landing | less(s.near, LANDED_LEAST * cone);
+        if (!settings->lands) {
+            reach = cone * clamp(-SEEN * slope, LANDED_LEAST, (real)(settings->near));
+            landed = outside;
+        }
 #if POINTS > 1
         landed |= is_point;
         reach = pick(is_point, POINT_REACH * cone * clamp(-LANDED * slope, POINT_LEAST, LANDED_MOST), reach);
@@ -237,7 +244,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     touched &= less(s.near, pick(passed_between(m), LANDED_LEAST * cone, reach));
     real ahead = goal == GOAL_SURFACE ? fmin(s.near / fmax(-slope, GRAZING_SLOPE), GRAZING_MOST * cone) : R(0.0);
     ahead = pick(passed_between(m), R(0.0), ahead);
-    const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, BRACKETED * cone) : inside;
+    const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, (settings->lands ? BRACKETED : SEEN_BRACKETED) * cone) : inside;
     const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings);
     m->found.hit |= done;
     m->found.last = pick(done, m->low, m->found.last);

@@ -60,6 +60,7 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant 
             *there = here;
             surface = found;
             wide = *normal = gradient;
+            if (!settings->lands) break;
             asked &= ~is_blind(here);
             // The search by steps has no place before the hit.
             asked &= less(met->touch, met->last) | less(met->touch, met->t);

@@ -74,6 +74,7 @@ MARCH = Struct(
         Field("relaxation", "real", 0, "factor on steps, taken back where spheres do not touch"),
         Field("detail", "real", 0, "distance that counts as a hit, in footprints of the reference"),
         Field("near", "real", 0, "scaled distance at which light is computed, in cones"),
+        Field("lands", "int", 0, "whether rays go on from where light is computed to the solid itself"),
         Field("shadow_lift", "real", 0, "where shadow rays start, in footprints above the surface"),
         Field("shadow_detail", "real", 0, "hit distance of shadow rays, in footprints over detail"),
         Field(
@@ -200,6 +201,9 @@ LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle"
 LIGHT_DEFINES = {f"LIGHT_{kind.upper()}": number for kind, number in LIGHT_KINDS.items()}
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
+# Of paths that do not land: light from just above their places counts. These lie where the scaled distance is a part of the
+# scale, so rays that hit at a part of it have no acne.
+FINE_LIFT, FINE_SHADOW = 1.0, 0.3
 # A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
 # And the part of a scaled distance that the cone takes for free.
 CONE_MARGIN, CONE_SHARE = 1.5, 0.8
@@ -283,6 +287,9 @@ def march_record(
     spread = fineness.pixel if points > 1 else 1.0
     touch = max(TOUCH * spread / fineness.detail, 1 / math.sqrt(points)) if points > 1 else 1.0
     near = step_scale(scene) * fineness.near
+    # Points of a pixel stand for each other by their hits; the search by steps has no places before the solid.
+    lands = fineness.lands or points > 1 or renderer.search != "distance"
+    lift, shadow = (SHADOW_LIFT, SHADOW_DETAIL) if lands else (FINE_LIFT, FINE_SHADOW * step_scale(scene))
     values = {
         "bounds_center": center,
         "bounds_radius": radius,
@@ -293,8 +300,9 @@ def march_record(
         "relaxation": renderer.over_relaxation,
         "detail": fineness.detail,
         "near": near,
-        "shadow_lift": SHADOW_LIFT * fineness.level,
-        "shadow_detail": SHADOW_DETAIL * fineness.level / fineness.detail,
+        "lands": int(lands),
+        "shadow_lift": lift * fineness.level,
+        "shadow_detail": shadow * fineness.level / fineness.detail,
         "cone_margin": max(CONE_MARGIN * fineness.near, 1.5 * touch),
         "cone_share": CONE_SHARE,
         "max_steps": renderer.max_steps,
