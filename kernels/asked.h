@@ -28,5 +28,5 @@ INLINE real asked_quantity(const spot *here, mask active, __constant const struc
     if (m->asks == MAP_CURVATURE) return mean_curvature(here->point, here->normal, active, m, orbit, k);
     if (m->asks == MAP_THICKNESS) return set_thickness(here->point, vec_scale(here->normal, R(-1.0)), here->cone, active, m, orbit, k);
     if (m->asks == MAP_LAYER_DISTANCE) return layer_distance(here->point, here->normal, active, m, orbit, k);
-    return orbit_trap(m->trap_shape, here->point, active, m, orbit, k);
+    return orbit_trap(here->point, active, m, orbit, k);
 }

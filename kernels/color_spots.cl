@@ -23,8 +23,6 @@
 #include "bump_places.h"
 #endif
 
-#define COLORING_ASKS (COLORING == COLORING_THICKNESS || COLORING == COLORING_LAYER_DISTANCE || COLORING == COLORING_TRAP)
-
 #if ASKED > 0 || BUMP_SURFACE
 // Keeps what the formula answers at spots, or at a place around them. On objects beside the set it has an answer for traps only.
 INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask of_set, __constant const struct Material *questions,
@@ -84,9 +82,8 @@ STAGE(color_spots) {
         answers_keep(s, &there, place, asks, asks & found, material + 1, orbit, k);
     }
 #endif
-#if COLORING_ASKS
+    if (material->coloring <= COLORING_RESIDUAL) return;
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);
     spot_keep(&here, s.state, bounce, s.stride);
-#endif
 }

@@ -1,9 +1,6 @@
-// The quantity that chooses a surface point's place in the palette, by COLORING: its smooth escape count, how uneven the
+// The quantity that chooses a surface point's place in the palette, by a material's `coloring`: its smooth escape count, how uneven the
 // surface is there, how thick the set is behind it, how far off the surface of another iteration count lies, or how near
 // its orbit comes to a shape.
-//
-// The build defines COLORING (COLORING_SOLID, _NORMAL, _ITERATIONS, _RESIDUAL, _THICKNESS, _LAYER_DISTANCE, _TRAP), ALONG
-// (ALONG_VIEW, _NORMAL, _REFLECTION) and TRAP (TRAP_POINT, _AXIS, _PLANE, _SPHERE).
 
 #define WAY_GROWTH R(0.5)        // steps that grow: this part of the way so far
 #define WAY_START R(0.015625)    // the first of them on the way to a layer, in full steps
@@ -89,9 +86,9 @@ INLINE real layer_distance(vec point, vec outward, mask active, __constant const
 #include "trap_near.h"
 
 // The same, for the trap that chooses colours.
-INLINE real orbit_trap(int shape, vec point, mask active, __constant const struct Material *material,
-                       __constant const struct Orbit *orbit, __constant const scalar *k) {
-    const trap near = {shape, vec_splat(material->trap_center), vec_splat(material->trap_direction), (real)(material->trap_radius)};
+INLINE real orbit_trap(vec point, mask active, __constant const struct Material *material, __constant const struct Orbit *orbit,
+                       __constant const scalar *k) {
+    const trap near = {material->trap_shape, vec_splat(material->trap_center), vec_splat(material->trap_direction), (real)(material->trap_radius)};
     return orbit_near(near, point, active, orbit, k);
 }
 
@@ -100,23 +97,19 @@ INLINE real orbit_trap(int shape, vec point, mask active, __constant const struc
 INLINE real coloring_quantity(vec point, vec normal, vec view_direction, real cone, real smooth, real residual, mask active,
                               __constant const struct Material *material, __constant const struct Orbit *orbit,
                               __constant const scalar *k) {
-#if COLORING == COLORING_RESIDUAL
-    return residual;
-#elif COLORING == COLORING_THICKNESS
-    const vec way = ALONG == ALONG_VIEW ? view_direction : vec_scale(normal, R(-1.0));
-    return set_thickness(point, way, cone, active, material, orbit, k);
-#elif COLORING == COLORING_LAYER_DISTANCE
-#if ALONG == ALONG_VIEW
-    const vec outward = vec_scale(view_direction, R(-1.0));
-#elif ALONG == ALONG_REFLECTION
-    const vec outward = vec_along(view_direction, R(-2.0) * vec_dot(view_direction, normal), normal);
-#else
-    const vec outward = normal;
-#endif
-    return layer_distance(point, outward, active, material, orbit, k);
-#elif COLORING == COLORING_TRAP
-    return orbit_trap(TRAP, point, active, material, orbit, k);
-#else
-    return smooth;
-#endif
+    switch (material->coloring) {
+    case COLORING_RESIDUAL: return residual;
+    case COLORING_THICKNESS: {
+        const vec way = material->along == ALONG_VIEW ? view_direction : vec_scale(normal, R(-1.0));
+        return set_thickness(point, way, cone, active, material, orbit, k);
+    }
+    case COLORING_LAYER_DISTANCE: {
+        vec outward = normal;
+        if (material->along == ALONG_VIEW) outward = vec_scale(view_direction, R(-1.0));
+        if (material->along == ALONG_REFLECTION) outward = vec_along(view_direction, R(-2.0) * vec_dot(view_direction, normal), normal);
+        return layer_distance(point, outward, active, material, orbit, k);
+    }
+    case COLORING_TRAP: return orbit_trap(point, active, material, orbit, k);
+    default: return smooth;
+    }
 }

@@ -130,7 +130,7 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
 #if JOINS_SMOOTHLY
     if (any_lane(less(R(0.0), here->share))) {
         spot one = *here, other = one;
-        const real quantity = COLORING_PER_POINT ? here->smooth : here->quantity;
+        const real quantity = is_colored_at_once(w.material) ? here->smooth : here->quantity;
         other.object = here->other;
         one.share = other.share = R(0.0);
         one.tint = object_color(here->normal, quantity, one.object, w);

@@ -25,7 +25,7 @@ STAGE(scatter_paths) {
     vec outward = found.normal, shading = outward;
     color reflects = color_of(R(1.0), R(1.0), R(1.0));
     if (any_lane(lands)) {
-        if (!COLORING_PER_POINT) found.tint = tint_of(&found, w);
+        if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
         pbr p = pbr_of_spot(s, &found, w);
         mask behind = lands & ~lands, shows = lands;
 #if HAS_GLASS

@@ -112,10 +112,10 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
     p->other = pick(nearer, met.other, p->other);
     p->share = pick(nearer, met.share, p->share);
 #endif
-#if COLORING_PER_POINT
-    const color tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
-    p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
-#endif
+    if (is_colored_at_once(w.material)) {
+        const color tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
+        p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
+    }
 #if GEOMETRIC
     points_place(p, turn, found, base);
 #endif
@@ -168,8 +168,8 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
 #endif
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);
-#if HAS_CUT_OBJECTS && !COLORING_PER_POINT
-    here.tint = spot_color(p->normal, p->smooth, p->object, OTHER_OF(*p), SHARE_OF(*p), w);
+#if HAS_CUT_OBJECTS
+    if (!is_colored_at_once(w.material)) here.tint = spot_color(p->normal, p->smooth, p->object, OTHER_OF(*p), SHARE_OF(*p), w);
 #endif
     here.normal = p->normal;
     here.residual = R(0.0);

@@ -96,15 +96,14 @@ INLINE real palette_place(real quantity, __constant const struct Material *mater
     return place_in_palette(quantity, material->palette_scale, material->palette_offset, material->palette_repeat);
 }
 
+// Whether a point's colour is known as soon as it is met: else one quantity chooses that of all a pixel's points.
+INLINE int is_colored_at_once(__constant const struct Material *material) { return material->coloring <= COLORING_ITERATIONS; }
+
 // The surface's own colour M; `quantity` is that of coloring.h.
 INLINE color surface_color(vec normal, real quantity, __constant const struct Material *material,
                            __global const float *palette) {
-#if COLORING == COLORING_SOLID
-    return color_splat(material->color);
-#elif COLORING == COLORING_NORMAL
+    if (material->coloring == COLORING_SOLID) return color_splat(material->color);
     // The thesis stores normals as (n + 1) / 2 in RGB (sec. 3.2.1).
-    return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-#else
+    if (material->coloring == COLORING_NORMAL) return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
     return palette_color(palette_place(quantity, material), material->palette_repeat, palette);
-#endif
 }

@@ -39,7 +39,7 @@ typedef struct {
 #if JOINS_SMOOTHLY
     real other, share;       // where two solids flow together: the number of the other object, and its part of the colour
 #endif
-    real quantity;           // what chooses the colour, where that is not known at once
+    real quantity;           // what chooses the colour
     real residual;           // distance of the pixel's points from their plane, in footprints
 } spot;
 
@@ -118,11 +118,8 @@ typedef struct {
 } glance;
 #endif
 
-#define COLORING_PER_POINT \
-    (COLORING == COLORING_SOLID || COLORING == COLORING_NORMAL || COLORING == COLORING_ITERATIONS)
-// Numbers that are kept of an aim, and of a spot.
+// Numbers that are kept of an aim.
 #define AIM_NUMBERS (NUMBERS_OF(aim) - (HAS_LENS || HAS_MOTION ? 0 : 3))
-#define SPOT_NUMBERS (NUMBERS_OF(spot) - (COLORING_PER_POINT ? 2 : 0))
 
 #define STATE_AIM 0
 #define STATE_SIGHTING (STATE_AIM + NUMBERS_OF(aim))
@@ -175,11 +172,10 @@ INLINE aim aim_kept(__global const scalar *state, int stride) {
 
 INLINE spot spot_kept(__global const scalar *state, int bounce, int stride) {
     spot here;
-    here.quantity = here.residual = R(0.0);
-    numbers_recall((real *)&here, SPOT_NUMBERS, state + STATE_SPOT(bounce) * stride, stride);
+    RECALL(here, state + STATE_SPOT(bounce) * stride, stride);
     return here;
 }
 
 INLINE void spot_keep(const spot *here, __global scalar *state, int bounce, int stride) {
-    numbers_keep((const real *)here, SPOT_NUMBERS, state + STATE_SPOT(bounce) * stride, stride);
+    KEEP(*here, state + STATE_SPOT(bounce) * stride, stride);
 }

@@ -167,7 +167,7 @@ STAGE(find_spots) {
         found.normal = vec_pick(path_emerges(bounce, &with, &found, w), vec_scale(found.normal, R(-1.0)), found.normal);
     }
 #endif
-    if (COLORING == COLORING_RESIDUAL) found.quantity = found.residual;
+    if (w.material->coloring == COLORING_RESIDUAL) found.quantity = found.residual;
     spot_keep(&found, s.state, bounce, s.stride);
     send_for_light(s, &here.at, &found, next_turns, w);
 #if HAS_SHAFTS
@@ -195,9 +195,7 @@ STAGE(light_spots) {
     path_meets_light(s, &so_far, &found, arrived, w);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
-#if !COLORING_PER_POINT
-        found.tint = tint_of(&found, w);
-#endif
+        if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
         gathered = color_pick(on_face(&found), found.tint, gathered);
     }

@@ -102,7 +102,7 @@ INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, in
         if (!any_lane(met) || bounce > w.settings->bounces) break;
         const cell c = cell_at(place_of(g, number), w.grid.about);
         vec normal = vec_scale(p->direction, R(-1.0));
-        if (bounce == 0 || COLOR_BY_NORMAL) {
+        if (bounce == 0 || w.material->coloring == COLORING_NORMAL) {
             const ints entry = brick_at(c, w.grid);
             normal = facing_normal(grid_normal(c, entry, met & is_stored(entry), w.grid), normal);
         }

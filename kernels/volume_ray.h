@@ -128,9 +128,8 @@ INLINE color emission_of(real value, world w) {
 
 // The colour of a value, or that of a normal: the thesis's (n + 1) / 2.
 INLINE color tint_of(real value, vec normal, world w) {
-#if COLOR_BY_NORMAL
-    return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-#elif TINTED
+    if (w.material->coloring == COLORING_NORMAL) return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
+#if TINTED
     const transfer_place p = transfer_at(value, w.settings);
     return color_of(transfer_column(p, 1, w.transfer), transfer_column(p, 2, w.transfer), transfer_column(p, 3, w.transfer));
 #else

@@ -14,6 +14,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.optics.view import View
 from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.renderers.fineness import Fineness
+from clfractal.renderers.kinds import ALONG, COLORINGS, LIGHT_KINDS, TRAPS, kind_text
 from clfractal.renderers.maps import MAP, asked_maps
 from clfractal.renderers.materials import PBR
 from clfractal.renderers.objects import OBJECT, mirrors
@@ -124,7 +125,7 @@ LIGHT = Struct(
         ),
         Field("color", "real", 3, "linear Rec. 709"),
         Field("intensity", "real", 0, "factor on the colour"),
-        Field("kind", "int", 0, "one of LIGHT_KINDS"),
+        Field("kind", "int", 0, "LIGHT_"),
         Field("inverse_square", "int", 0, "1: weakens with the square of the distance"),
         Field("shadow", "int", 0, "1: blocked by the set"),
         Field("spread", "real", 0, "1 - cos of half its angular size"),
@@ -155,6 +156,8 @@ MATERIAL = Struct(
         Field("palette_scale", "real", 0, "palettes per unit of the quantity that chooses the colour"),
         Field("palette_offset", "real", 0, "start in the palette"),
         Field("palette_repeat", "int", 0, "1: the palette begins again after its end; 0: its ends go on"),
+        Field("coloring", "int", 0, "what chooses the colour, COLORING_"),
+        Field("along", "int", 0, "the way of thickness or layer distance, ALONG_"),
         Field("coloring_step", "real", 0, "step along the way of thickness or layer distance, scene units"),
         Field("coloring_limit", "real", 0, "longest way, scene units"),
         Field("coloring_tests", "int", 0, "most inside tests for one end of a way"),
@@ -165,7 +168,7 @@ MATERIAL = Struct(
         Field(
             "asks", "int", 0, "of a record behind the scene's own: what a material's map asks the formula for"
         ),
-        Field("trap_shape", "int", 0, "likewise, one of TRAPS"),
+        Field("trap_shape", "int", 0, "of the trap, TRAP_"),
         Field("reflection", "real", 0, "part that is mirrored sharply"),
         Field("fog_color", "real", 3, "linear Rec. 709"),
         Field("fog_density", "real", 0, "per scene unit"),
@@ -180,6 +183,7 @@ MATERIAL = Struct(
         Field("glow_color", "real", 3, "times its intensity"),
         Field("glow_width", "real", 0, "distance over which it fades to 1/e, scene units"),
         Field("glow_reach", "real", 0, "distance from its trap over which it fades to 1/e, in z"),
+        Field("glow_trap", "int", 0, "its shape, TRAP_; below 0: it has none"),
         Field("glow_center", "real", 3, "of its trap, as for colours"),
         Field("glow_direction", "real", 3, ""),
         Field("glow_radius", "real", 0, ""),
@@ -196,9 +200,6 @@ MATERIAL = Struct(
 
 STRUCTS = (VIEW, SAMPLING, ORBIT, MARCH, LIGHT, MATERIAL, PBR, MAP, OBJECT)
 
-TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
-LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
-LIGHT_DEFINES = {f"LIGHT_{kind.upper()}": number for kind, number in LIGHT_KINDS.items()}
 # In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
 SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
 # Of paths that do not land: light from just above their places counts. These lie where the scaled distance is a part of the
@@ -218,8 +219,8 @@ EXTRA_TESTS = 64
 
 
 def struct_text() -> str:
-    """The declarations in C, for inclusion after `lanes.h`."""
-    return "".join(struct.c_text() for struct in STRUCTS)
+    """The declarations in C, with the numbers of kinds, for inclusion after `lanes.h`."""
+    return kind_text() + "".join(struct.c_text() for struct in STRUCTS)
 
 
 def view_records(poses: Sequence[View], image: Image, plan: Plan, precision: Precision) -> Record:
@@ -462,6 +463,7 @@ def _glow(scene: Scene) -> dict[str, object]:
         "glow_color": tuple(glow.intensity * part for part in glow.color),
         "glow_width": glow.used_width(scene.bounds[1]),
         "glow_reach": glow.reach,
+        "glow_trap": TRAPS[glow.trap.shape] if glow.by == "trap" else -1,
         "glow_center": glow.trap.center,
         "glow_direction": unit(glow.trap.direction),
         "glow_radius": glow.trap.radius,
@@ -474,6 +476,8 @@ def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
     step = coloring.step if coloring.step is not None else radius / 100
     direction = np.array(coloring.trap.direction, float)
     return {
+        "coloring": COLORINGS.get(coloring.by or "", 0),
+        "along": ALONG[coloring.along] if isinstance(coloring, Coloring) else ALONG["normal"],
         "coloring_step": step,
         "coloring_limit": 2 * radius,
         "coloring_tests": math.ceil(2 * radius / step) + EXTRA_TESTS,

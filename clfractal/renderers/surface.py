@@ -62,8 +62,6 @@ from clfractal.renderers.waves import (
     most_turns,
     surface_stages,
 )
-from clfractal.scene.coloring import Coloring
-from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
@@ -71,14 +69,9 @@ from clfractal.scene.parts import PerspectiveCamera
 from clfractal.solids import Body, joins_smoothly
 
 PALETTE_SIZE = 256
-COLORINGS = {
-    name: number
-    for number, name in enumerate(
-        ("solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap")
-    )
-}
-ALONG = {"view": 0, "normal": 1, "reflection": 2}
 NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
+# Entries that ask how near orbits come to traps.
+_ASK_TRAPS = ("color_spots.cl", "glow.cl")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
 # Neither search of `search_defines`: rays within glass have one of their own.
@@ -128,7 +121,7 @@ def inside_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     if not has_cloudy_glass(scene):
         return {**found, "HAS_GLASS_SCATTER": 0}
     # Walks know what paths carry, and what may stand in their way.
-    return {**found, **state_defines(scene, plan), **coloring_defines(Coloring())}
+    return {**found, **state_defines(scene, plan)}
 
 
 def several_points(scene: Scene) -> int:
@@ -149,7 +142,6 @@ def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     rays = records.hemisphere_rays(scene)
     return {
         **state_defines(scene, plan),
-        **coloring_defines(scene.coloring),
         "NORMAL_COUNT": normal_count(scene),
         "POINTS": points.count,
         "POINT_PATTERN": int(points.pattern == "stochastic"),
@@ -175,7 +167,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
-        **records.LIGHT_DEFINES,
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
         "ADAPTIVE": 0,
         "POINTS": several_points(scene),
@@ -198,19 +189,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     }
 
 
-def glow_defines(scene: Scene, plan: Plan, glow: Glow) -> dict[str, object]:
-    """The defines of `kernels/glow.cl`."""
-    return {
-        **state_defines(scene, plan),
-        **coloring_defines(Coloring()),
-        "HAS_FOG": int(scene.fog is not None),
-        "GLOW_BY_CLOSENESS": 0,
-        "GLOW_BY_TRAP": 1,
-        "GLOW_BY": int(glow.by == "trap"),
-        "GLOW_TRAP": records.TRAPS[glow.trap.shape],
-    }
-
-
 def normal_count(scene: Scene) -> int:
     """Normals over which a pixel's shading is averaged."""
     renderer = scene.surface
@@ -228,20 +206,6 @@ def state_numbers(scene: Scene, plan: Plan) -> int:
     more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
     more += _CLOUDY_NUMBERS * has_cloudy_glass(scene)
     return STATE_NUMBERS + 4 * normal_count(scene) + more
-
-
-def coloring_defines(coloring: Coloring) -> dict[str, object]:
-    """The defines that `kernels/coloring.h` and `shade.h` need."""
-    families = (
-        ("COLORING", COLORINGS, coloring.by),
-        ("ALONG", ALONG, coloring.along),
-        ("TRAP", records.TRAPS, coloring.trap.shape),
-    )
-    result: dict[str, object] = {}
-    for family, numbers, chosen in families:
-        result.update({f"{family}_{name.upper()}": number for name, number in numbers.items()})
-        result[family] = numbers[chosen]
-    return result
 
 
 class SurfaceKernel(TileKernel):
@@ -336,7 +300,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
 
     def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
         files = [
-            *(("trap_near.h",) if "COLORING" in defines else ()),
+            *(("trap_near.h",) if entry in _ASK_TRAPS else ()),
             *(("escape.h",) if "ESCAPE_COLORS" in defines else ()),
         ]
         turns = escape_defines if "escape.h" in files else None
@@ -360,12 +324,13 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     if has_glass_set(scene):
         texts.append(text("glass", "glass.cl", inside_defines(scene, plan), *inside_kernels(plan)))
     if asks_formula(scene):
-        colors = {**state_defines(scene, plan), **coloring_defines(scene.coloring), "PLANES": 0}
+        colors = {**state_defines(scene, plan), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
     if scene.glow is not None:
-        texts.append(text("glow", "glow.cl", glow_defines(scene, plan, scene.glow), "add_glow"))
+        glow = {**state_defines(scene, plan), "HAS_FOG": int(scene.fog is not None)}
+        texts.append(text("glow", "glow.cl", glow, "add_glow"))
     if scene.cut_planes:
-        planes = {**state_defines(scene, plan), **coloring_defines(Coloring()), **plane_defines(scene)}
+        planes = {**state_defines(scene, plan), **plane_defines(scene)}
         faces = ("find_faces",) if has_faces(scene) else ()
         texts.append(text("planes", "see_planes.cl", planes, *faces, "find_planes"))
     return texts

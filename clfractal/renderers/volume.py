@@ -19,6 +19,7 @@ from clfractal.renderers import records
 from clfractal.renderers.environment import PackedEnvironment, packed_map
 from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
+from clfractal.renderers.kinds import kind_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_palettes, plane_records, zoom_of
@@ -116,7 +117,6 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         **pass_defines(plan),
         "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
-        **records.LIGHT_DEFINES,
         "TRANSFER_SIZE": TRANSFER_SIZE,
         "TRANSFER_COLUMNS": transfer_columns(settings.transfer),
         "HAS_EMISSION": int(settings.transfer.emission is not None),
@@ -132,15 +132,10 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         "HAS_ENVIRONMENT": int(has_paths(scene) and scene.environment is not None),
         "HAS_SUN": int(has_paths(scene) and scene.environment is not None and scene.environment.has_sun),
         "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
-        "COLOR_BY_NORMAL": int(scene.coloring.by == "normal"),
         "ADAPTIVE": int(settings.noise is not None),
         **plane_defines(scene),
-        # What headers of the surface's colours ask for.
-        "COLORING": 0,
-        "COLORING_SOLID": 0,
-        "COLORING_NORMAL": 1,
     }
-    structs = "".join(struct.c_text() for struct in STRUCTS)
+    structs = kind_text() + "".join(struct.c_text() for struct in STRUCTS)
     body = Body.of(scene)
     formulas = {"formula.h": "", "orbit.h": ""}
     if asks_formula(scene):

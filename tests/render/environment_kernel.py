@@ -16,7 +16,6 @@ from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers import records
 from clfractal.renderers.environment import PackedEnvironment, material_fields
-from clfractal.renderers.records import LIGHT_DEFINES
 from clfractal.scene.lighting import Environment
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -62,8 +61,6 @@ __kernel void environment(__global const scalar *in, __global scalar *out, __glo
 }
 """
 
-_DEFINES = {**LIGHT_DEFINES, "PALETTE_SIZE": 256, "COLORING_NORMAL": 1, "COLORING_ITERATIONS": 2}
-
 
 def settings_of(**values: Any) -> Environment:
     """A scene's environment with these values; which map it names does not matter here."""
@@ -72,7 +69,7 @@ def settings_of(**values: Any) -> Environment:
 
 @cache
 def _program(device: Device, precision: Precision, lanes: int, has_sun: bool) -> Any:
-    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "COLORING": 0, **_DEFINES}
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "PALETTE_SIZE": 256}
     defines["HAS_SUN"] = int(has_sun)
     generated = {"environment.cl": _TEXT, "structs.h": records.struct_text()}
     flat = flatten("environment.cl", generated=generated, defines=defines)

@@ -16,9 +16,8 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import reference
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
+from clfractal.renderers.kinds import TRAPS, kind_text
 from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.records import LIGHT_DEFINES, TRAPS
-from clfractal.renderers.surface import coloring_defines
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of
 from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, PERSPECTIVE, SOLIDS, scene_of
@@ -68,8 +67,11 @@ __kernel void traps(__global const scalar *points, __global scalar *result, int 
                     __constant const scalar *k) {
     const int first = (int)get_global_id(0) * LANES;
     const vec point = load_vec(points, stride, first);
-    for (int shape = 0; shape < 4; ++shape)
-        store_plane(result, shape * stride + first, orbit_trap(shape, point, equal(R(0.0), R(0.0)), material, orbit, k));
+    for (int shape = 0; shape < 4; ++shape) {
+        const trap near = {shape, vec_splat(material->trap_center), vec_splat(material->trap_direction),
+                           (real)(material->trap_radius)};
+        store_plane(result, shape * stride + first, orbit_near(near, point, equal(R(0.0), R(0.0)), orbit, k));
+    }
 }
 """
 
@@ -103,8 +105,7 @@ def compiled(text: str, precision: Precision, lanes: int) -> Any:
 
 def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> Any:
     """A kernel behind the scene's formula and the headers. What changes only numbers builds nothing anew."""
-    defines = {**coloring_defines(scene.coloring), "PALETTE_SIZE": 256, **LIGHT_DEFINES}
-    head = "".join(f"#define {name} {value}\n" for name, value in defines.items())
+    head = kind_text() + "#define PALETTE_SIZE 256\n"
     headers = "".join(kernel_file(name) for name in ("orbit.h", "coloring.h", "shade.h"))
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)
 

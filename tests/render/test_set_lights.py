@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.formulas import reference
-from clfractal.renderers.records import TRAPS
+from clfractal.renderers.kinds import TRAPS
 from clfractal.renderers.set_lights import BALL_NUMBERS, SetLights, packed, probabilities, set_lights_of
 from clfractal.scene import places
 from clfractal.scene.coloring import Trap

@@ -1,0 +1,35 @@
+"""Numbers that stand for words of a scene in records and in kernels: every program gets the same ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
+TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
+# In the order of when they are known: with the hit, with all of a pixel's points, by asking the formula.
+COLORINGS = {
+    "solid": 0,
+    "normal": 1,
+    "iterations": 2,
+    "residual": 3,
+    "thickness": 4,
+    "layer_distance": 5,
+    "trap": 6,
+}
+ALONG = {"view": 0, "normal": 1, "reflection": 2}
+
+_FAMILIES: Mapping[str, Mapping[str, int]] = {
+    "LIGHT": LIGHT_KINDS,
+    "TRAP": TRAPS,
+    "COLORING": COLORINGS,
+    "ALONG": ALONG,
+}
+
+
+def kind_text() -> str:
+    """The numbers as constants in C, such as `TRAP_AXIS`."""
+    return "".join(
+        f"#define {family}_{word.upper()} {number}\n"
+        for family, numbers in _FAMILIES.items()
+        for word, number in numbers.items()
+    )
