@@ -12,7 +12,7 @@ INLINE real object_material(real object, world w) {
     return number;
 }
 
-INLINE real spot_material(const spot *here, world w) { return object_material(OBJECT_OF(*here), w); }
+INLINE real spot_material(const spot *here, world w) { return object_material(here->object, w); }
 
 // The part of each material in a spot's, before blends are told apart.
 INLINE real material_share(const spot *here, int number, world w) {

@@ -31,7 +31,7 @@ INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, real time, __con
         r.direction = vec_scale(from_eye, inverse);
         r.footprint = R(0.0);
         r.spread = VIEW_NUMBER(view, pixel_size, time) * inverse;
-#if HAS_LENS
+        if (!view->has_lens) return r;
         // A thin lens: whatever its point, all rays of a pixel meet again in the plane of focus.
         const real to_focus = VIEW_NUMBER(view, focus_distance, time) / vec_dot(r.direction, VIEW_VEC(view, axis, time));
         const real lens_radius = VIEW_NUMBER(view, lens_radius, time);
@@ -39,7 +39,6 @@ INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, real time, __con
                                       lens_y * lens_radius, VIEW_VEC(view, up, time));
         r.direction = vec_normalize(vec_sub(vec_scale(r.direction, to_focus), on_lens));
         r.origin = vec_add(r.origin, on_lens);
-#endif
     } else {
         r.origin = on_plane;
         r.direction = VIEW_VEC(view, axis, time);

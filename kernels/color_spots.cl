@@ -29,12 +29,12 @@ INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask 
                          __constant const struct Orbit *orbit, __constant const scalar *k) {
 #if ASKED > 0
     // After the scene's own record.
-    const int count = place == AT_SPOT ? ASKED : BUMP_ASKED, first_number = place == AT_SPOT ? STATE_ASKED(0) : STATE_ASKED_BESIDE(place, 0);
+    const int count = place == AT_SPOT ? ASKED : BUMP_ASKED;
     for (int i = 0; i < count; ++i) {
         __constant const struct Material *m = questions + i;
         const mask answered = m->asks == MAP_TRAP ? asks : of_set;
         const real answer = pick(answered, asked_quantity(there, answered, m, orbit, k), R(0.0));
-        numbers_keep(&answer, 1, s.state + (first_number + i) * s.stride, s.stride);
+        lanes_store(answer, asked_at(s, place, i));
     }
 #endif
 #if BUMP_SURFACE
@@ -46,7 +46,7 @@ INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask 
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | here.end.inside;
     const vec known = vec_pick(flat, there->normal, normal);
     const real numbers[4] = {known.x, known.y, known.z, smooth_count(here.end, surface, orbit)};
-    numbers_keep(numbers, 4, s.state + STATE_SURFACE_BESIDE(place) * s.stride, s.stride);
+    numbers_keep(numbers, 4, surface_beside_at(s, place), s.stride);
 #endif
 }
 #endif
@@ -55,11 +55,11 @@ STAGE(color_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    spot here = spot_kept(s.state, bounce, s.stride);
-    const mask seen = mask_of(here.found), found = seen & of_the_set(OBJECT_OF(here), w);
+    spot here = spot_kept(s, bounce);
+    const mask seen = mask_of(here.found), found = seen & of_the_set(here.object, w);
     if (!any_lane(ASKED > 0 ? seen : found)) return;
     path so_far;
-    const aim a = aim_kept(s.state, s.stride);
+    const aim a = aim_kept(s);
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
 #if ASKED > 0 || BUMP_SURFACE
     spot there = here;
@@ -85,5 +85,5 @@ STAGE(color_spots) {
     if (material->coloring <= COLORING_RESIDUAL) return;
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);
-    spot_keep(&here, s.state, bounce, s.stride);
+    spot_keep(s, &here, bounce);
 }

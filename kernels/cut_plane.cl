@@ -27,7 +27,8 @@ typedef struct {
 
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
     const real from_center_x = at->x - (real)(w.view->center_x), from_center_y = at->y - (real)(w.view->center_y);
-    const real time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
+    real time = R(0.0);
+    if (w.view->spans > 0) time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
     const vec right = VIEW_VEC(w.view, right, time), down = VIEW_VEC(w.view, down, time);
     shot s;
     s.point = vec_along(vec_along(VIEW_VEC(w.view, center, time), from_center_x + across, right), from_center_y + below, down);

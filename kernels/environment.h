@@ -10,11 +10,13 @@
 //   by_column[rows][columns + 1] the same along each row,
 //   density[rows][columns]       probability per steradian, constant in a cell,
 //   pixels[height][width][3]     linear Rec. 709.
-// clfractal/renderers/environment.py fills it. Needs lanes.h, numbers/real.h, vectors.h, structs.h, shade.h; with HAS_SUN sampling.h.
+// clfractal/renderers/environment.py fills it. Needs lanes.h, numbers/real.h, vectors.h, structs.h, shade.h; sampling.h.
 #define ENVIRONMENT_TURN S(6.283185307179586)
-#if HAS_SUN
 #include "sun.h"
-#endif
+
+// Whether there is one, and whether it has a sun before it.
+INLINE int has_environment(__constant const struct Material *m) { return m->environment_width > 0; }
+INLINE int has_sun(__constant const struct Material *m) { return m->environment_sun; }
 
 // Where in the picture a direction lies: parts of its width and height, both 0 to 1.
 INLINE void environment_place(vec direction, __constant const struct Material *m, real *across, real *below) {
@@ -52,11 +54,9 @@ CALLED color environment_color(vec direction, __constant const struct Material *
                          mix(lower[3 * first + 2], lower[3 * second + 2], right), low);
     }
     const real intensity = (real)(m->environment_intensity);
-#if HAS_SUN
-    const color sun = sun_light(direction, m, sun_numbers(m, map));
-    return color_of(intensity * (lanes_load(red) + sun.r), intensity * (lanes_load(green) + sun.g), intensity * (lanes_load(blue) + sun.b));
-#endif
-    return color_of(intensity * lanes_load(red), intensity * lanes_load(green), intensity * lanes_load(blue));
+    color found = color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
+    if (has_sun(m)) found = color_add(found, sun_light(direction, m, sun_numbers(m, map)));
+    return color_scale(found, intensity);
 }
 
 // The last of `count` entries that is not above u; the next one is, so that cells without probability are never chosen.
@@ -112,9 +112,8 @@ INLINE real map_density(vec direction, __constant const struct Material *m, __gl
     return lanes_load(found);
 }
 
-#if HAS_SUN
-// A direction towards the map or the sun's disc, and its probability by both ways together.
-INLINE vec environment_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+// The same of a map with a sun before it: its disc or the map, and the probability by both ways together.
+INLINE vec sun_or_map_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
     __global const float *sun = sun_numbers(m, map);
     const real share = sun_share(sun), rest = R(1.0) - share;
     const mask of_sun = less(v, share);
@@ -128,16 +127,15 @@ INLINE vec environment_sample(real u, real v, __constant const struct Material *
     return found;
 }
 
-INLINE real environment_density(vec direction, __constant const struct Material *m, __global const float *map) {
-    __global const float *sun = sun_numbers(m, map);
-    return (R(1.0) - sun_share(sun)) * map_density(direction, m, map) + sun_density(direction, m, sun);
-}
-#else
+// A direction chosen by the environment's brightness, and its probability per steradian.
 INLINE vec environment_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+    if (has_sun(m)) return sun_or_map_sample(u, v, m, map, density);
     return map_sample(u, v, m, map, density);
 }
 
 INLINE real environment_density(vec direction, __constant const struct Material *m, __global const float *map) {
-    return map_density(direction, m, map);
+    const real of_map = map_density(direction, m, map);
+    if (!has_sun(m)) return of_map;
+    __global const float *sun = sun_numbers(m, map);
+    return (R(1.0) - sun_share(sun)) * of_map + sun_density(direction, m, sun);
 }
-#endif

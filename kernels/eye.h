@@ -28,12 +28,12 @@ INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     real across, below;
     sample_offset(s.span, &here->at, s.sample, &across, &below);
     aim a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0), R(0.0)};
-#if HAS_LENS
-    const bits seed = pixel_seed(here->at.columns, here->at.rows, (uint)s.span.sampling->seed, PURPOSE_LENS);
-    unit_square((bits)((uint)s.sample), seed, &a.lens_x, &a.lens_y);
-    unit_disk(a.lens_x, a.lens_y, &a.lens_x, &a.lens_y);
-#endif
-    a.time = shutter_time(here->at.columns, here->at.rows, (uint)s.span.sampling->seed, s.sample);
+    const uint seed = (uint)s.span.sampling->seed;
+    if (s.span.view->has_lens) {
+        unit_square((bits)((uint)s.sample), pixel_seed(here->at.columns, here->at.rows, seed, PURPOSE_LENS), &a.lens_x, &a.lens_y);
+        unit_disk(a.lens_x, a.lens_y, &a.lens_x, &a.lens_y);
+    }
+    if (s.span.view->spans > 0) a.time = shutter_time(here->at.columns, here->at.rows, seed, s.sample);
     return a;
 }
 
@@ -68,7 +68,7 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask 
     send_to_set(s, turn, r, free, wanted, w);
 }
 
-#if HAS_OBJECTS && POINTS > 1
+#if HAS_OBJECTS
 // Sends a ray that looks for the set alone.
 INLINE void send_past_objects(stage s, int turn, ray r, real free, mask wanted, world w) {
     lanes_store((real)(REAL_LARGEST), s.q.rays + RAY_OBJECT * s.q.stride + turn * s.q.wave + s.slot);
@@ -95,11 +95,10 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
 // (What is kept says so from the second bounce on, and rays that are not sent stay so.)
 INLINE int paths_are_over(stage s) {
     if (s.bounce < 2) return 0;
+    // Of whole structs too much would be read.
     path so_far;
-    carried with;
-    spot here;
-    const int on_path = STATE_PATH + (int)(&so_far.on_path - (real *)&so_far), found = STATE_SPOT(s.bounce) + (int)(&here.found - (real *)&here);
-    const int awaited = STATE_CARRIED + (int)(&with.awaited.r - (real *)&with);
+    const int on_path = s.at[STATE_PATH] + (int)(&so_far.on_path - (real *)&so_far);
+    const int found = s.at[STATE_SPOT] + NUMBERS_OF(spot), awaited = s.at[STATE_ASKED_LIGHT];
     const int numbers[5] = {on_path, found, awaited, awaited + 1, awaited + 2};
     mask left = less(R(1.0), R(0.0));
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));

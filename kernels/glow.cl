@@ -16,9 +16,7 @@
 #include "stage.h"
 #include "state.h"
 #include "eye.h"
-#if HAS_FOG
 #include "fog.h"
-#endif
 #include "glow.h"
 
 // Keeps what the eye's ray sees to the end of the shot; what others see is light of their paths.
@@ -27,8 +25,8 @@ STAGE(add_glow) {
     STAGE_OF(s);
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s.state, s.stride);
-    const spot found = spot_kept(s.state, bounce, s.stride);
+    const aim a = aim_kept(s);
+    const spot found = spot_kept(s, bounce);
     path so_far;
     ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const mask wanted = mask_of(bounce == 0 ? a.wanted : so_far.on_path);

@@ -27,9 +27,7 @@ INLINE real glow_along(ray r, mask active, bits seed, tally *cost, world w, __co
             const trap near = {m->glow_trap, vec_splat(m->glow_center), vec_splat(m->glow_direction), (real)(m->glow_radius)};
             bright *= exp(-fmin(orbit_near(near, point, active, orbit, k) / (real)(m->glow_reach), R(80.0)));
         }
-#if HAS_FOG
-        bright *= exp(-fog_depth(r.origin, r.direction, place, m));
-#endif
+        if (HAS(w, FOG)) bright *= exp(-fog_depth(r.origin, r.direction, place, m));
         sum += pick(active, part * bright, R(0.0));
         cost->steps += pick(active, R(1.0), R(0.0));
         cost->count += pick(active, here.end.count, R(0.0));

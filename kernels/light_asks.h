@@ -28,10 +28,10 @@ INLINE real weight_of_all(vec point, real own, world w) {
 // A negative density: nothing else could have found it.
 INLINE color light_past(vec direction, real picture_y, vec from, real density, real total, world w) {
     color sum = sky(direction, picture_y, 1, w);
-#if HAS_ENVIRONMENT
-    const real asked = (real)(w.settings->environment_weight) / total * environment_density(direction, w.material, w.environment);
-    sum = color_scale(sum, pick(less(density, R(0.0)), R(1.0), power_share(density, asked)));
-#endif
+    if (has_environment(w.material)) {
+        const real asked = (real)(w.settings->environment_weight) / total * environment_density(direction, w.material, w.environment);
+        sum = color_scale(sum, pick(less(density, R(0.0)), R(1.0), power_share(density, asked)));
+    }
     for (int i = 0; i < w.settings->light_count; ++i) {
         const mask met = light_met(w.lights + i, direction);
         if (!any_lane(met)) continue;
@@ -87,13 +87,10 @@ INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *
         if (is_light) {
             r = light_sample(light, light_is_seen(light) ? from : point, u, v);
         } else {
-#if HAS_ENVIRONMENT
+            if (!has_environment(w.material)) continue;
             r.toward = environment_sample(u, v, w.material, w.environment, &r.density);
             r.light = environment_color(r.toward, w.material, w.environment);
             r.distance = (real)(REAL_LARGEST);
-#else
-            continue;
-#endif
         }
         chosen.toward = vec_pick(here, r.toward, chosen.toward);
         chosen.distance = pick(here, r.distance, chosen.distance);

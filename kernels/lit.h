@@ -2,10 +2,10 @@
 
 // The light that one light ray adds, for every normal of the spot.
 INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open, vec to_viewer,
-                    __constant const struct Light *light, look l) {
+                    __constant const struct Light *light, look l, world w) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
-    for (int i = 0; i < TURNS(facet_count(s.bounce)); ++i) {
-        const facet f = facet_of(s, here, i);
+    for (int i = 0; i < facet_count(s.bounce, w); ++i) {
+        const facet f = facet_of(s, here, i, w);
         const color one = shaded(here->tint, f.normal, to_viewer, in, lit, open, light, l);
         sum = color_add(sum, color_scale(one, f.weight));
     }
@@ -23,7 +23,7 @@ INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, in
     mask shadow;
     const int number = s.sample * w.settings->set_rays + of_set;
     const incidence in = set_incidence(here->point, here->normal, &place.at, number, s.bounce, w, &shines, &shadow);
-    const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, l);
+    const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, l, w);
     return color_scale(color_mul(white, shines), (real)(S(1.0) / (scalar)w.settings->set_rays));
 }
 #endif
@@ -34,7 +34,6 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     const look l = look_of(here, w);
     real open = R(1.0);
     int turn = 0;
-#if HAS_AMBIENT
     if (w.settings->occlusion_share > S(0.0)) open = R(0.0);
     for (; turn < hemisphere_turns(w); ++turn) {
         const encounter met = queue_met(s.q, turn, s.slot);
@@ -42,7 +41,6 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
         gathered = color_add(gathered, ambient_light(s, here, turn, met, surround_of(l), w, &open));
     }
     gathered = limited(gathered, w.settings);
-#endif
     for (; turn < turns_for_light(w); ++turn) {
         const int number = turn - hemisphere_turns(w);
 #if HAS_SET_LIGHTS
@@ -59,7 +57,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
         if (light_is_seen(light)) in = light_along(light, here->point, in.toward);
-        const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l);
+        const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l, w);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }
 #if HAS_OBJECTS
@@ -81,13 +79,9 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->seen = vec_pick(met, found->point, found->seen);
     found->normal = vec_pick(met, vec_scale(direction, R(-1.0)), found->normal);
     found->smooth = pick(met, R(0.0), found->smooth);   // no march has written one
-#if HAS_MATTES || HAS_FACES
     found->object = pick(met, object, found->object);
-#if JOINS_SMOOTHLY
     found->share = pick(met, R(0.0), found->share);
-#endif
-#endif
-    spot_keep(found, s.state, 0, s.stride);
+    spot_keep(s, found, 0);
 }
 
 // A path that meets a light before the surface ends there.
@@ -123,7 +117,7 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
 // Goes on along the mirrored ray.
 INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const spot *here, color mirrored, world w) {
     spot seen_first = *here;
-    if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
+    if (s.bounce > 0) seen_first = spot_kept(s, 0);
     so_far->through = color_mul(so_far->through, mirrored);
     so_far->origin = vec_along(here->point, lift_of(here, w), here->normal);
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);

@@ -63,7 +63,7 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
     *smooth = there->smooth;
 #if BUMP_SURFACE
     real known[4];
-    numbers_recall(known, 4, s.state + STATE_SURFACE_BESIDE(place) * s.stride, s.stride);
+    numbers_recall(known, 4, surface_beside_at(s, place), s.stride);
     *normal = vec_of(known[0], known[1], known[2]);
     *smooth = known[3];
 #if HAS_OBJECTS
@@ -95,10 +95,7 @@ INLINE real map_quantity(stage s, const spot *here, int place, __global const st
     }
 #if ASKED > 0
     if (m->by >= MAP_CURVATURE) {
-        real answer;
-        const int number = place == AT_SPOT ? STATE_ASKED(m->asked) : STATE_ASKED_BESIDE(place, m->asked);
-        numbers_recall(&answer, 1, s.state + number * s.stride, s.stride);
-        return answer;
+        return lanes_load(asked_at(s, place, m->asked));
     }
 #endif
     return smooth;

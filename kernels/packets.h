@@ -19,7 +19,7 @@ CALLED void render_packet(int packet, int tile, pass s, world w) {
         real across, below;
         sample_offset(s, &here.at, sample, &across, &below);
         const shot found = sample_shot(&here.at, across, below, sample, active, w, &cost);
-        sample_add(&p, found, active, across * across + below * below);
+        sample_add(s, &p, found, active, across * across + below * below);
         hits += pick(active & less(R(0.0), found.coverage), R(1.0), R(0.0));
     }
     // A shot that was told to end is worth nothing: what the packet had before stays.

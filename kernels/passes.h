@@ -40,21 +40,17 @@ INLINE void kept_pixel(__global scalar *kept, __global const int *slots, int wri
     FOR_NUMBERS(NUMBERS_OF(pixel), KEPT_NUMBER)
 }
 
-#if HAS_PARTS
 // Likewise; their numbers follow those of `pixel`.
 INLINE void kept_parts(__global scalar *kept, __global const int *slots, int write, parts *sum) {
 #define KEPT_PART(i) kept_number(kept, slots, NUMBERS_OF(pixel) + i, write, (real *)sum + i);
     FOR_NUMBERS(NUMBERS_OF(parts), KEPT_PART)
 }
-#endif
 
-#if HAS_MATTES
 // And these; see `KEPT`.
 INLINE void kept_mattes(__global scalar *kept, __global const int *slots, int write, mattes *sum) {
 #define KEPT_MATTE(i) kept_number(kept, slots, KEPT_MATTE_0 + i, write, (real *)sum + i);
     FOR_NUMBERS(NUMBERS_OF(mattes), KEPT_MATTE)
 }
-#endif
 
 // A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
 typedef struct {
@@ -83,12 +79,10 @@ INLINE pixel pixel_before(pass s, const place_in_pass *here) {
 // interrupted.
 INLINE mask sample_wanted(pass s, const packet_pixels *at, const pixel *p, int sample) {
     mask active = at->in_region & equal(p->shots, (real)((scalar)sample));
-#if ADAPTIVE
     // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
-    if (sample > 0 && sample >= s.sampling->min_samples && (sample & 3) == 0) {
+    if (s.sampling->adaptive && sample > 0 && sample >= s.sampling->min_samples && (sample & 3) == 0) {
         active &= less((real)(s.sampling->noise), noise_of(p, s.sampling->transparent));
     }
-#endif
     return active;
 }
 
@@ -102,11 +96,9 @@ INLINE void sample_offset(pass s, const packet_pixels *at, int sample, real *acr
 }
 
 // Adds one sample to the sums of the packet's pixels; `offset`: its distance squared from the middle, pixels.
-INLINE void sample_add(pixel *p, shot found, mask active, real offset) {
+INLINE void sample_add(pass s, pixel *p, shot found, mask active, real offset) {
     pixel_add(p, found, active, offset);
-#if ADAPTIVE
-    noise_add(p, found, active);
-#endif
+    if (s.sampling->adaptive) noise_add(p, found, active);
 }
 
 // Writes what the pixels have so far: means to the film, and sums for a later pass.

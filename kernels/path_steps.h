@@ -185,7 +185,7 @@ INLINE mask path_comes_out(int bounce, carried *with, spot *here, vec direction,
 // How wide a path is from a spot on: as a pixel there, and as fast as the pixel grows before the first spot.
 INLINE void path_widens(stage s, path *so_far, const spot *here, ray from_eye, real time, world w) {
     spot seen_first = *here;
-    if (s.bounce > 0) seen_first = spot_kept(s.state, 0, s.stride);
+    if (s.bounce > 0) seen_first = spot_kept(s, 0);
     so_far->footprint = here->cone;
     so_far->spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone);
 }
@@ -241,7 +241,7 @@ INLINE mask path_arrives(stage s, const packet_pixels *at, path *so_far, const c
 INLINE carried path_carries(stage s, const packet_pixels *at, const path *so_far, vec eye, world w) {
     carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
     if (s.bounce > 0) {
-        STATE_RECALL(s, with, STATE_CARRIED);
+        with = carried_kept(s);
         return with;
     }
 #if HAS_GLASS

@@ -8,8 +8,8 @@ STAGE(scatter_paths) {
     if (paths_are_over(s)) return;
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s.state, s.stride);
-    spot found = spot_kept(s.state, bounce, s.stride);
+    const aim a = aim_kept(s);
+    spot found = spot_kept(s, bounce);
     path so_far;
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
     carried with = path_carries(s, &here.at, &so_far, arrived.origin, w);
@@ -39,11 +39,11 @@ STAGE(scatter_paths) {
 #endif
         p.emerges = number_of(emerges);
         spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), shows & ~emerges, w);
-        if (HAS_PARTS) reflects = pbr_albedo(&p, w.albedos);
+        if (KEEPS(s, STATE_GLANCE)) reflects = pbr_albedo(&p, w.albedos);
         const bsdf b = bsdf_of_spot(s, &found, &p, behind, vec_pick(emerges, found.normal, vec_scale(arrived.direction, R(-1.0))), &shading, w);
         so_far.origin = vec_along(found.point, lift_of(&found, w), outward);
-        with.total = weight_of_all(so_far.origin, OBJECT_OF(found), w);
-        const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, OBJECT_OF(found), &b, with.total, behind, w, &with.awaited);
+        with.total = weight_of_all(so_far.origin, found.object, w);
+        const light_ray light = path_asks(s, &here.at, found.point, so_far.origin, found.object, &b, with.total, behind, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
 #if HAS_CLOUDS
         with.awaited = color_scale(with.awaited, light_passes_clouds(s, &here.at, so_far.origin, light.toward, light.distance, shows, w));
@@ -73,13 +73,13 @@ STAGE(scatter_paths) {
     path_in_cloud(s, &here.at, &so_far, &with, flown, within, arrived, &by.cloud, &asks, by.cloud.met, w);
     asking |= by.cloud.met;
 #endif
-#if HAS_PARTS
-    if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
-    if (bounce == 1) glance_once(s, so_far.seen);
-#endif
+    if (KEEPS(s, STATE_GLANCE)) {
+        if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
+        if (bounce == 1) glance_once(s, so_far.seen);
+    }
     with.awaited = color_pick(asking, with.awaited, color_of(R(0.0), R(0.0), R(0.0)));
     STATE_KEEP(s, so_far, STATE_PATH);
-    STATE_KEEP(s, with, STATE_CARRIED);
+    carried_keep(s, &with);
     send_clipped(s, 0, asks, R(0.0), WHETHER, asking & less(R(0.0), asks.far), w);
 }
 
@@ -92,19 +92,17 @@ STAGE(gather_paths) {
     path so_far;
     carried with;
     STATE_RECALL(s, so_far, STATE_PATH);
-    STATE_RECALL(s, with, STATE_CARRIED);
+    with = carried_kept(s);
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     const encounter answer = queue_met(s.q, 0, s.slot);
     tally_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
-#if HAS_SHAFTS
-    if (bounce == 0) {
+    if (bounce == 0 && KEEPS(s, STATE_AIR)) {
         const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-        const spot found = spot_kept(s.state, 0, s.stride);
-        air_gather(s, &here.at, aim_kept(s.state, s.stride), &found, 1, &cost, w);
+        const spot found = spot_kept(s, 0);
+        air_gather(s, &here.at, aim_kept(s), &found, 1, &cost, w);
     }
-#endif
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
@@ -126,12 +124,12 @@ STAGE(end_paths) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const aim a = aim_kept(s.state, s.stride);
+    const aim a = aim_kept(s);
     path so_far;
     carried with;
     tally cost;
     STATE_RECALL(s, so_far, STATE_PATH);
-    STATE_RECALL(s, with, STATE_CARRIED);
+    with = carried_kept(s);
     STATE_RECALL(s, cost, STATE_TALLY);
     const encounter last = queue_met(s.q, 0, s.slot);
     tally_met(&cost, last, 0);
@@ -159,9 +157,7 @@ STAGE(end_paths) {
 #if HAS_EMITTERS
     path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
 #endif
-#if HAS_PARTS
-    if (bounce == 1) glance_once(s, so_far.seen);
-#endif
-    const spot first_spot = spot_kept(s.state, 0, s.stride);
+    if (bounce == 1 && KEEPS(s, STATE_GLANCE)) glance_once(s, so_far.seen);
+    const spot first_spot = spot_kept(s, 0);
     end_shots(s, a, so_far.seen, &first_spot, cost, w);
 }

@@ -1,23 +1,6 @@
 // The sums over the samples of a pixel, for every renderer.
 #include "memory.h"
-
-#if HAS_PARTS
-// What a shot knows of the first surface, and of its light by how often that was reflected; or sums over shots. Normals count as
-// much as they cover.
-typedef struct {
-    color albedo, emission, direct, indirect;
-    vec normal;
-} parts;
-#endif
-
-#if HAS_MATTES
-// Which things a pixel shows: of each rank a number from 1, or 0 where there is none, and the sum of what it covers; and the
-// number nearest to the pixel's middle. Things that come when all ranks are taken are not noted.
-typedef struct {
-    real pairs[2 * MATTE_RANKS];
-    real nearest;
-} mattes;
-#endif
+#include "carried.h"
 
 // The results of one sample.
 typedef struct {
@@ -27,30 +10,9 @@ typedef struct {
     real depth;           // along the view axis
     vec normal, point;
     real smooth, steps;   // escape count; evaluations
-#if HAS_PARTS
     parts of_light;
-#endif
-#if HAS_MATTES
     real thing, covers;   // the number of what is seen, from 1, and what it covers
-#endif
 } shot;
-
-// What rays cost: distance evaluations (of a volume: places looked at), formula applications, and steps that ended inside.
-typedef struct {
-    real steps, count, bad;
-} tally;
-
-// Sums over the shots of a pixel, and what the one nearest to its middle found.
-typedef struct {
-    color radiance;
-    real coverage, shots;
-    real brightness, brightness_square;   // of each shot, for its noise
-    real coverage_square;
-    real nearest;                         // distance squared of the kept shot from the middle, pixels
-    real depth;
-    vec normal, point;
-    real smooth, steps;
-} pixel;
 
 INLINE pixel pixel_start(void) {
     pixel p = {0};
@@ -75,7 +37,6 @@ INLINE void pixel_add(pixel *p, shot s, mask active, real offset) {
     p->steps = pick(nearer, s.steps, p->steps);
 }
 
-#if ADAPTIVE
 // Adds a shot to the sums for a pixel's noise: perceived brightness (the square root of luminance), and coverage.
 INLINE void noise_add(pixel *p, shot s, mask active) {
     const real luminance = R(0.2126) * s.radiance.r + R(0.7152) * s.radiance.g + R(0.0722) * s.radiance.b;
@@ -93,7 +54,6 @@ INLINE real noise_of(const pixel *p, int transparent) {
     const real variance = fmax(p->brightness_square * share - mean * mean, of_coverage);
     return sqrt(fmax(variance, R(0.0)) / fmax(p->shots - R(1.0), R(1.0)));
 }
-#endif
 
 // Which number of a pixel a channel shows: both are listed in the same order, but for the count of samples.
 INLINE int number_of_channel(int channel) {
@@ -111,7 +71,6 @@ INLINE void pixel_write(__global float *film, __global const int *slots, const i
     FOR_NUMBERS(RAY_CHANNELS, WRITE_CHANNEL)
 }
 
-#if HAS_PARTS
 INLINE void parts_add(parts *sum, parts more, mask active) {
 #define ADD_PART(i) ((real *)sum)[i] += pick(active, ((const real *)&more)[i], R(0.0));
     FOR_NUMBERS(NUMBERS_OF(parts), ADD_PART)
@@ -123,9 +82,7 @@ INLINE void parts_write(__global float *film, __global const int *slots, const i
 #define WRITE_PART(i) write_channel(film, slots[RAY_CHANNELS + i], place, ((const real *)sum)[i] * share);
     FOR_NUMBERS(NUMBERS_OF(parts), WRITE_PART)
 }
-#endif
 
-#if HAS_MATTES
 // `nearest`: whether this shot is the nearest to the pixel's middle so far.
 INLINE void mattes_add(mattes *sum, real thing, real covers, mask active, mask nearest) {
     sum->nearest = pick(nearest, thing, sum->nearest);
@@ -150,4 +107,3 @@ INLINE void mattes_write(__global float *film, __global const int *slots, const 
         write_channel(film, slots[CHANNEL_CRYPTOMATERIAL00R + i], place, value);
     }
 }
-#endif

@@ -1,9 +1,8 @@
 // The points of a pixel (Englund 2010, sec. 3.2.3): they share one march up to where the pixel's cone first touches the set;
 // from there each finds the surface on its own ray. What they find becomes one spot: its normals, colour and coverage.
 //
-// GEOMETRIC says that positions matter (all normals but the gradient, and the residual): they are kept relative to a point
+// Where positions matter (`geometric`: all normals but the gradient, and the residual) they are kept relative to a point
 // of the pixel's ray, in the pixel's frame: x right, y up, z to the viewer.
-#if POINTS > 1
 typedef struct {
     bits seed;
     real cone;                  // the pixel's, where the shared march ended, or at the object that is seen
@@ -15,15 +14,14 @@ typedef struct {
     real other, share;
 #endif
     color tint;                 // sum over the points
-#if GEOMETRIC
     vec reference, right, up, toward;
     plane_sums sums;
     vec compass[9];             // corners, edges and middle of the grid, row by row from the top left
     mask compass_found[9];
-#endif
 } pixel_points;
 
-INLINE int point_of_turn(int turn) { return (turn + POINTS / 2) % POINTS; }
+// The middle one first.
+INLINE int point_of_turn(int turn, int count) { return (turn + count / 2) % count; }
 
 // Each sample of a pixel has points of its own.
 INLINE bits points_seed(const packet_pixels *at, int sample, world w) {
@@ -44,7 +42,6 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
     p.other = p.share = R(0.0);
 #endif
     p.tint = color_of(R(0.0), R(0.0), R(0.0));
-#if GEOMETRIC
     p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
     p.toward = vec_scale(pixel_ray.direction, R(-1.0));
     const vec side = VIEW_VEC(w.view, side, time);
@@ -55,16 +52,16 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
         p.compass[i] = vec_of(R(0.0), R(0.0), R(0.0));
         p.compass_found[i] = less(R(1.0), R(0.0));
     }
-#endif
     return p;
 }
 
 // Sends a ray for each point, from a little before where the pixel's cone touched on (for the search by steps: from the eye).
 INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed, world w) {
     const real cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
-    for (int turn = 0; turn < POINTS; ++turn) {
+    const int count = w.settings->point_count;
+    for (int turn = 0; turn < count; ++turn) {
         real across, below;
-        point_offset(point_of_turn(turn), seed, &across, &below);
+        point_offset(point_of_turn(turn, count), count, w.settings->point_rows, seed, &across, &below);
         ray r = camera_ray(a.x + across, a.y + below, a.lens_x, a.lens_y, a.time, w.view);
         r.near = fmax(touched.t - (real)(w.settings->point_start) * cone, R(0.0));
         r.known = touched.t;
@@ -73,29 +70,26 @@ INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed,
     }
 }
 
-#if GEOMETRIC
-INLINE void points_place(pixel_points *p, int turn, mask found, vec point) {
-    const vec offset = vec_sub(point, p->reference);
+INLINE void points_place(pixel_points *p, int point, int rows, mask found, vec place_of_point) {
+    const vec offset = vec_sub(place_of_point, p->reference);
     const vec place = vec_of(vec_dot(offset, p->right), vec_dot(offset, p->up), vec_dot(offset, p->toward));
     p->sums = plane_add(p->sums, found, place);
-#if POINT_PATTERN == PATTERN_GRID && POINT_SIDE % 2 == 1 && POINT_SIDE > 1
-    const int column = point_of_turn(turn) % POINT_SIDE, row = point_of_turn(turn) / POINT_SIDE;
-    const int half_side = POINT_SIDE / 2;
+    if (rows % 2 == 0 || rows < 3) return;
+    const int column = point % rows, row = point / rows, half_side = rows / 2;
     if (column % half_side == 0 && row % half_side == 0) {
         const int at = 3 * (row / half_side) + column / half_side;
         p->compass[at] = place;
         p->compass_found[at] = found;
     }
-#endif
 }
-#endif
 
 INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, real object, vec base, world w) {
     const mask found = mask_of(met.hit);
     const vec point = vec_along(r.origin, met.t, r.direction);
     p->count += met.hit;
     real across, below;
-    point_offset(point_of_turn(turn), p->seed, &across, &below);
+    const int count = w.settings->point_count, number = point_of_turn(turn, count);
+    point_offset(number, count, w.settings->point_rows, p->seed, &across, &below);
     const real offset = across * across + below * below;
     const mask nearer = found & less(offset, p->nearest);
     p->nearest = pick(nearer, offset, p->nearest);
@@ -116,22 +110,17 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
         const color tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
         p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
     }
-#if GEOMETRIC
-    points_place(p, turn, found, base);
-#endif
-#if NORMAL == NORMAL_GRADIENT
-    const facet f = {vec_pick(found, met.normal, r.direction), met.hit};
-    STATE_KEEP(s, f, STATE_FACET(turn));
-#endif
+    if (w.settings->geometric) points_place(p, number, w.settings->point_rows, found, base);
+    if (w.settings->normal == NORMAL_GRADIENT) {
+        const facet f = {vec_pick(found, met.normal, r.direction), met.hit};
+        STATE_KEEP_ONE(s, f, STATE_FACET, turn);
+    }
 }
 
-#if GEOMETRIC
 INLINE vec points_to_space(const pixel_points *p, vec a) {
     return vec_along(vec_along(vec_scale(p->right, a.x), a.y, p->up), a.z, p->toward);
 }
-#endif
 
-#if NORMAL == NORMAL_EIGHT_TRIANGLES_SHADING
 // Keeps the normals of the triangles whose points have all been found, or `instead` where there is none.
 INLINE void points_triangles(stage s, const pixel_points *p, vec instead) {
     vec around[8];
@@ -143,10 +132,9 @@ INLINE void points_triangles(stage s, const pixel_points *p, vec instead) {
     for (int i = 0; i < TURNS(8); ++i) {
         const facet f = {vec_pick(whole[i], points_to_space(p, around[i]), instead),
                          pick(some, pick(whole[i], R(1.0) / number, R(0.0)), R(0.125))};
-        STATE_KEEP(s, f, STATE_FACET(i));
+        STATE_KEEP_ONE(s, f, STATE_FACET, i);
     }
 }
-#endif
 
 // The spot that stands for the pixel. Where points are missing or lie on a line the normal is made from what is left: by least
 // squares, or else that of the middle one.
@@ -157,15 +145,9 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     here.point = p->base;
     here.seen = p->point;
     here.smooth = p->smooth;
-#if HAS_OBJECTS
     here.object = p->object;
-#elif HAS_MATTES || HAS_FACES
-    here.object = R(0.0);
-#endif
-#if JOINS_SMOOTHLY
-    here.other = p->other;
-    here.share = p->share;
-#endif
+    here.other = OTHER_OF(*p);
+    here.share = SHARE_OF(*p);
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);
 #if HAS_CUT_OBJECTS
@@ -174,31 +156,26 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     here.normal = p->normal;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-#if GEOMETRIC
-    mask usable;
-    real residual;
-    const vec plane = points_to_space(p, plane_normal(p->sums, &residual, &usable));
-    here.residual = residual / p->cone;
-#endif
-#if NORMAL == NORMAL_LEAST_SQUARES
-    here.normal = vec_pick(usable, plane, here.normal);
-#elif NORMAL == NORMAL_ONE_TRIANGLE
-    const vec triangle = triangle_normal(p->compass, p->compass_found, &usable);
-    here.normal = vec_pick(usable, points_to_space(p, triangle), here.normal);
-#elif NORMAL != NORMAL_GRADIENT
-    const vec mean = eight_mean(p->compass, p->compass_found, &usable);
-    here.normal = vec_pick(usable, points_to_space(p, mean), here.normal);
-#endif
-#if NORMAL == NORMAL_GRADIENT
-    for (int i = 0; i < POINTS; ++i) {
-        facet f;
-        STATE_RECALL(s, f, STATE_FACET(i));
-        f.weight *= share;
-        STATE_KEEP(s, f, STATE_FACET(i));
+    mask usable = less(R(1.0), R(0.0));
+    if (w.settings->geometric) {
+        real residual;
+        const vec plane = points_to_space(p, plane_normal(p->sums, &residual, &usable));
+        here.residual = residual / p->cone;
+        vec made = plane;
+        if (w.settings->normal == NORMAL_ONE_TRIANGLE) made = points_to_space(p, triangle_normal(p->compass, p->compass_found, &usable));
+        if (w.settings->normal == NORMAL_EIGHT_TRIANGLES_NORMAL || w.settings->normal == NORMAL_EIGHT_TRIANGLES_SHADING) {
+            made = points_to_space(p, eight_mean(p->compass, p->compass_found, &usable));
+        }
+        if (w.settings->normal != NORMAL_GRADIENT) here.normal = vec_pick(usable, made, here.normal);
     }
-#elif NORMAL == NORMAL_EIGHT_TRIANGLES_SHADING
-    points_triangles(s, p, here.normal);
-#endif
+    if (w.settings->normal == NORMAL_EIGHT_TRIANGLES_SHADING) points_triangles(s, p, here.normal);
+    if (w.settings->normal == NORMAL_GRADIENT) {
+        for (int i = 0; i < w.settings->point_count; ++i) {
+            facet f;
+            STATE_RECALL_ONE(s, f, STATE_FACET, i);
+            f.weight *= share;
+            STATE_KEEP_ONE(s, f, STATE_FACET, i);
+        }
+    }
     return here;
 }
-#endif

@@ -27,15 +27,6 @@ INLINE real plane_of_face(real thing) { return pick(is_face(thing), floor(thing 
 // The number of what is cut there; of other things their own.
 INLINE real thing_cut(real thing) { return pick(is_face(thing), thing - floor(thing / FACE_OF_PLANE) * FACE_OF_PLANE, thing); }
 
-// What the planes add to a picture. In front of the object: light, and the part that comes through; behind it the same.
-typedef struct {
-    color front, behind;
-    real front_through, behind_through;
-    real nearest;      // the nearest plane that is seen well, along the ray; the largest number if there is none
-    vec normal, point;
-    real count;
-} plane_layers;
-
 // Cuts a part of a ray's line to what is behind a plane. `face`: the plane at which it begins, which may now be this one.
 INLINE void plane_cut(__global const struct CutPlane *plane, int i, vec origin, vec direction, real *near, real *far, real *face) {
     const vec normal = vec_splat(plane->normal);

@@ -21,10 +21,10 @@ typedef struct {
 #endif
 } encounter;
 
-// Places of numbers in these structs; only points of a pixel have something that is known.
+// Places of numbers in these structs.
 #define RAY_NEAR 6
 #define RAY_FAR 7
-#define RAY_NUMBERS (POINTS > 1 ? NUMBERS_OF(ray) : NUMBERS_OF(ray) - 1)
+#define RAY_NUMBERS NUMBERS_OF(ray)
 // Beside a ray stands one number more: of a ray of ambient light the weight of what it brings; of one that looks for a surface
 // where it began before a cone took it farther.
 #define RAY_STRENGTH NUMBERS_OF(ray)

@@ -45,8 +45,6 @@ typedef JOIN(uint, LANES) bits;
 #define FILTER_TENT 1
 #define FILTER_BLACKMAN_HARRIS 2
 
-#define PATTERN_GRID 0
-#define PATTERN_STOCHASTIC 1
 
 // Integer hash with full avalanche (the finaliser of MurmurHash3, Appleby 2011).
 INLINE bits hash_bits(bits a) {
@@ -109,10 +107,8 @@ INLINE void unit_square(bits index, bits seed, real *u, real *v) {
 
 // When a sample of each lane's pixel is taken: 0 is where the shutter opens, and 1 where it closes.
 INLINE real shutter_time(const int *columns, const int *rows, uint seed, int sample) {
-    real time = R(0.0), unused;
-#if HAS_MOTION
+    real time, unused;
     unit_square((bits)((uint)sample), pixel_seed(columns, rows, seed, PURPOSE_TIME), &time, &unused);
-#endif
     return time;
 }
 
@@ -165,20 +161,20 @@ INLINE void filter_offset(real u, real v, int filter, real width, real *across, 
     *below = filter_place(v, filter, width);
 }
 
-#ifdef POINT_PATTERN
-// Place of one of the POINTS points of a pixel: its offset from the centre, in pixels, within (-0.5, 0.5). A grid has
-// POINT_SIDE rows, numbered along each from the top left. Stochastic points are another set for each seed: one at a random
-// place in each of POINTS equal strips, a golden section of the pixel further along it than the last (so that no two are
+// Place of one of `count` points of a pixel: its offset from the centre, in pixels, within (-0.5, 0.5). A grid has
+// `rows`, numbered along each from the top left. Stochastic points, which have none, are another set for each seed: one at a random
+// place in each of `count` equal strips, a golden section of the pixel further along it than the last (so that no two are
 // near each other), the first anywhere; the strips upright or level, mirrored or not.
-INLINE void point_offset(int point, bits seed, real *across, real *below) {
-#if POINT_PATTERN == PATTERN_GRID
-    const scalar row = (scalar)(point / POINT_SIDE), column = (scalar)(point % POINT_SIDE), side = (scalar)(POINT_SIDE);
-    *across = (real)((S(2.0) * column + S(1.0) - side) / (S(2.0) * side));
-    *below = (real)((S(2.0) * row + S(1.0) - side) / (S(2.0) * side));
-#else
+INLINE void point_offset(int point, int count, int rows, bits seed, real *across, real *below) {
+    if (rows > 0) {
+        const scalar row = (scalar)(point / rows), column = (scalar)(point % rows), side = (scalar)rows;
+        *across = (real)((S(2.0) * column + S(1.0) - side) / (S(2.0) * side));
+        *below = (real)((S(2.0) * row + S(1.0) - side) / (S(2.0) * side));
+        return;
+    }
     const uint golden = 0x9e3779b9u;
     const bits first = hash_bits(seed), turn = hash_bits(first);
-    const uint strips = (uint)(POINTS);
+    const uint strips = (uint)count;
     const bits within = hash_bits(seed + golden * (uint)(point + 1));
     bits x = (bits)(0xffffffffu / strips * (uint)point) + within / strips;
     bits y = first + golden * (uint)point;  // of 2^32, as all here
@@ -186,9 +182,7 @@ INLINE void point_offset(int point, bits seed, real *across, real *below) {
     const bits swapped = (x ^ y) & -((turn >> 1) & 1u);
     *across = unit_of_bits(x ^ swapped) - R(0.5);
     *below = unit_of_bits(y ^ swapped) - R(0.5);
-#endif
 }
-#endif
 
 // Point of the disk of radius 1, uniform in area (Shirley and Chiu 1997): squares around the middle become circles.
 INLINE void unit_disk(real u, real v, real *x, real *y) {

@@ -2,7 +2,6 @@
 
 INLINE color limited(color c, __constant const struct March *settings) { return color_limited(c, (real)(settings->firefly_limit)); }
 
-#if HAS_SOFT_LIGHT
 // The direction to the part of a light that this ray goes to; `toward` is the direction to its middle.
 INLINE vec soft_light(stage s, const packet_pixels *at, vec point, vec toward, int light_index, int turn, world w) {
     __constant const struct Light *light = w.lights + light_index;
@@ -12,9 +11,7 @@ INLINE vec soft_light(stage s, const packet_pixels *at, vec point, vec toward, i
     unit_square((bits)((uint)(s.sample * light->rays + turn)), seed, &u, &v);
     return light_direction(light, point, toward, u, v);
 }
-#endif
 
-#if HAS_AMBIENT
 // Ray `turn` of the hemisphere over a spot: the first `cosine_rays` are spread like the cosine, the others like the
 // environment's brightness. `strength` is the weight of what it brings, cosine / pi over the density of both kinds together
 // (the balance heuristic, Veach and Guibas 1995).
@@ -29,7 +26,10 @@ INLINE incidence ambient_ray(stage s, const packet_pixels *at, const spot *here,
     incidence in;
     in.distance = (real)(w.settings->ambient_far);
     in.strength = R(0.0);
-#if HAS_ENVIRONMENT
+    if (!has_environment(w.material)) {
+        in.toward = hemisphere_direction(here->normal, u, v);
+        return in;
+    }
     real density;
     if (by_cosine) {
         in.toward = hemisphere_direction(here->normal, u, v);
@@ -40,9 +40,6 @@ INLINE incidence ambient_ray(stage s, const packet_pixels *at, const spot *here,
     const real cosine = fmax(vec_dot(in.toward, here->normal), R(0.0)) * R(0.31830988618);
     const real both = cosine * (real)((scalar)w.settings->cosine_rays) + density * (real)((scalar)w.settings->map_rays);
     in.strength = pick(less(R(0.0), both), cosine / both, R(0.0));
-#else
-    in.toward = hemisphere_direction(here->normal, u, v);
-#endif
     return in;
 }
 
@@ -57,16 +54,12 @@ INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, r
         const mask near = mask_of(met.hit) & less(met.t, (real)(w.settings->occlusion_distance));
         *open += pick(near, R(0.0), (real)(w.settings->occlusion_share));
     }
-#if HAS_ENVIRONMENT
+    if (!has_environment(w.material)) return color_of(R(0.0), R(0.0), R(0.0));
     const real strength = lanes_load(ambient_strength(s, turn));
     const color bright = environment_color(queue_ray(s.q, turn, s.slot).direction, w.material, w.environment);
     const real share = pick(mask_of(met.hit), R(0.0), strength * diffuse);
     return color_of(bright.r * here->tint.r * share, bright.g * here->tint.g * share, bright.b * here->tint.b * share);
-#else
-    return color_of(R(0.0), R(0.0), R(0.0));
-#endif
 }
-#endif
 
 // The turns of the rays that leave a spot: first those into the hemisphere, then each light's.
 INLINE int hemisphere_turns(world w) { return w.settings->cosine_rays + w.settings->map_rays; }
@@ -76,12 +69,10 @@ INLINE int turns_for_light(world w) { return hemisphere_turns(w) + w.settings->l
 
 // The direction that a ray of this turn takes, and whether anything may be in its way; false for turns that a light does not need.
 INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w, incidence *in, mask *wanted) {
-#if HAS_AMBIENT
     if (turn < hemisphere_turns(w)) {
         *in = ambient_ray(s, at, here, turn, w);
         return 1;
     }
-#endif
     const int light_index = (turn - hemisphere_turns(w)) / w.settings->light_rays;
     const int ray_of_light = (turn - hemisphere_turns(w)) % w.settings->light_rays;
 #if HAS_SET_LIGHTS
@@ -97,10 +88,10 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn
     __constant const struct Light *light = w.lights + light_index;
     if (ray_of_light >= light->rays) return 0;
     *in = light_at(light, here->point);
-#if HAS_SOFT_LIGHT
-    in->toward = soft_light(s, at, here->point, in->toward, light_index, ray_of_light, w);
-    if (light_is_seen(light)) *in = light_along(light, here->point, in->toward);
-#endif
+    if (w.settings->soft_lights) {
+        in->toward = soft_light(s, at, here->point, in->toward, light_index, ray_of_light, w);
+        if (light_is_seen(light)) *in = light_along(light, here->point, in->toward);
+    }
     if (!light->shadow) *wanted &= ~*wanted;
     return 1;
 }
@@ -115,7 +106,7 @@ INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, i
             queue_skip(s.q, turn, s.slot);
             continue;
         }
-        wanted &= faces(s, here, in.toward);
+        wanted &= faces(s, here, in.toward, w);
         ray r;
         r.origin = vec_along(here->point, lift_of(here, w), here->normal);
         r.direction = in.toward;
@@ -127,8 +118,6 @@ INLINE void send_for_light(stage s, const packet_pixels *at, const spot *here, i
         // How near an obstacle is matters for the open part of the hemisphere.
         const int measured = turn < w.settings->cosine_rays && w.settings->occlusion_share > S(0.0);
         send_clipped(s, turn, r, R(0.0), measured ? (real)(w.settings->occlusion_distance) : WHETHER, wanted, w);
-#if HAS_AMBIENT && HAS_ENVIRONMENT
-        if (turn < hemisphere_turns(w)) lanes_store(in.strength, ambient_strength(s, turn));
-#endif
+        if (turn < hemisphere_turns(w) && has_environment(w.material)) lanes_store(in.strength, ambient_strength(s, turn));
     }
 }

@@ -26,7 +26,7 @@ STAGE(find_faces) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const aim a = aim_kept(s.state, s.stride);
+    const aim a = aim_kept(s);
     path so_far;
     const ray whole = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     ray r = whole;
@@ -55,12 +55,12 @@ STAGE(find_planes) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const aim a = aim_kept(s.state, s.stride);
-    const spot found = spot_kept(s.state, 0, s.stride);
+    const aim a = aim_kept(s);
+    const spot found = spot_kept(s, 0);
     const ray r = eye_ray(&a, view);
     const real way = vec_dot(vec_sub(found.seen, r.origin), r.direction);
     const real object = pick(mask_of(found.found), way, (real)(REAL_LARGEST));
-    const real hidden = HAS_PATHS ? plane_of_face(OBJECT_OF(found)) : R(-1.0);
+    const real hidden = HAS_PATHS ? plane_of_face(found.object) : R(-1.0);
     const plane_layers layers = planes_seen(r, object, hidden, mask_of(a.wanted), w.planes);
     STATE_KEEP(s, layers, STATE_LAYERS);
 }

@@ -1,25 +1,18 @@
 // Shots as pixels keep them: what has been seen, put together with all that lies before and behind it.
 
-#if HAS_PARTS
 // The normal by which a shot's first surface has scattered light; `own` is the surface's.
-INLINE vec normal_seen(glance look, vec own) {
-#if HAS_BUMP
-    return look.normal;
-#else
-    return own;
-#endif
-}
+INLINE vec normal_seen(glance look, vec own, world w) { return HAS(w, BUMP) ? look.normal : own; }
 
 // A shot's layers, of the part of its surface that is in the picture: `comes`. Of what its path has seen in all, that part is light; and a
 // surface that fog hides must not tell the filter of detail where there is none.
-INLINE parts parts_of(glance look, color seen, vec normal, real comes) {
+INLINE parts parts_of(glance look, color seen, vec normal, real comes, world w) {
     parts found;
     found.albedo = color_scale(look.albedo, comes);
     found.emission = color_scale(look.emission, comes);
     found.direct = color_scale(color_add(look.once, color_scale(look.emission, R(-1.0))), comes);
     found.indirect = color_scale(color_add(seen, color_scale(look.once, R(-1.0))), comes);
     const vec none = vec_of(R(0.0), R(0.0), R(0.0));   // where nothing is found there is no normal
-    found.normal = vec_scale(vec_pick(less(R(0.0), comes), normal_seen(look, normal), none), comes);
+    found.normal = vec_scale(vec_pick(less(R(0.0), comes), normal_seen(look, normal, w), none), comes);
     return found;
 }
 
@@ -28,9 +21,7 @@ INLINE void glance_begin(stage s, mask surface, color albedo, color seen, vec no
     glance look;
     look.albedo = color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0)));
     look.emission = look.once = seen;
-#if HAS_BUMP
     look.normal = normal;
-#endif
     STATE_KEEP(s, look, STATE_GLANCE);
 }
 
@@ -41,62 +32,45 @@ INLINE void glance_once(stage s, color seen) {
     look.once = seen;
     STATE_KEEP(s, look, STATE_GLANCE);
 }
-#endif
 
 // The shot at its end: what its path has seen, over the background; and what it has found first.
 INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, world w) {
     sighting first;
     STATE_RECALL(s, first, STATE_SIGHTING);
     spot found = *here;
-    if (s.bounce > 0) found = spot_kept(s.state, 0, s.stride);
-#if HAS_PARTS
-    glance look;
-    STATE_RECALL(s, look, STATE_GLANCE);
+    if (s.bounce > 0) found = spot_kept(s, 0);
     const color in_all = seen;
-#endif
 #if CLOUDS_SHINE
     const color on_the_way = color_pick(mask_of(found.found), color_of(R(0.0), R(0.0), R(0.0)), seen);
 #endif
     shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
-#if HAS_MATTES
     result.thing = pick(result.hit, thing_cut(found.object) + R(1.0), R(0.0));
     result.covers = result.coverage;
-#endif
     result.depth = depth_of(result.point, a.time, w.view);
     real comes = pick(result.hit, result.coverage, R(0.0));
     color background = sky(from_eye.direction, a.y, 0, w);
-#if HAS_FOG
-    const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
-    const color mist = color_splat(w.material->fog_color);
-    const real passes = exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material));
-    seen = color_mix(seen, mist, R(1.0) - passes);
-    comes *= pick(result.hit, passes, R(1.0));
-    if (w.material->fog_background) {
-        background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
+    if (HAS(w, FOG)) {
+        const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
+        const color mist = color_splat(w.material->fog_color);
+        const real passes = exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material));
+        seen = color_mix(seen, mist, R(1.0) - passes);
+        comes *= pick(result.hit, passes, R(1.0));
+        if (w.material->fog_background) {
+            background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
+        }
     }
-#endif
-#if HAS_SHAFTS
-    color air;
-    STATE_RECALL(s, air, STATE_AIR);
-    seen = color_add(seen, air);
-#endif
-#if HAS_GLOW
-    color glow;
-    STATE_RECALL(s, glow, STATE_GLOW);
-    seen = color_add(seen, glow);
-#endif
+    color air = color_of(R(0.0), R(0.0), R(0.0)), glow = air;
+    if (KEEPS(s, STATE_AIR)) STATE_RECALL(s, air, STATE_AIR);
+    if (KEEPS(s, STATE_GLOW)) STATE_RECALL(s, glow, STATE_GLOW);
+    seen = color_add(color_add(seen, air), glow);
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
-#if HAS_SHAFTS
     background = color_add(background, air);
-#endif
 #if CLOUDS_SHINE
     // What clouds have added to a ray that went through all of them.
     background = color_add(background, on_the_way);
 #endif
-#if HAS_GLOW
     background = color_add(background, glow);
-#endif
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
     // The part of the light on rays' ways that comes: to surfaces, and past all.
@@ -110,22 +84,20 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     const color beside = color_scale(layers.behind, layers.front_through * (R(1.0) - result.coverage));
     result = planes_into(result, seen, background, layers, a.time, w.view);
 #endif
-#if HAS_PARTS
-    result.of_light = parts_of(look, in_all, found.normal, comes);
+    if (!KEEPS(s, STATE_GLANCE)) return result;
+    glance look;
+    STATE_RECALL(s, look, STATE_GLANCE);
+    result.of_light = parts_of(look, in_all, found.normal, comes, w);
     // Rays that meet nothing have seen what shines before it.
-    result.of_light.emission = color_add(result.of_light.emission, color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past)));
-#if HAS_GLOW
-    result.of_light.emission = color_add(result.of_light.emission, color_scale(glow, of_ways + of_past));
-#endif
+    const color past = color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past));
+    result.of_light.emission = color_add(color_add(result.of_light.emission, past), color_scale(glow, of_ways + of_past));
 #if PLANES > 0
     result.of_light.albedo = color_add(color_add(layers.front, beside), result.of_light.albedo);
     result.of_light.normal = vec_pick(less(layers.nearest, (real)(REAL_LARGEST)), layers.normal, result.of_light.normal);
 #endif
-#endif
     return result;
 }
 
-#if HAS_PARTS
 // The sums of layers before this sample; see `sums_before`.
 INLINE parts parts_before(stage s, const place_in_pass *here) {
     parts sum = {0};
@@ -149,9 +121,7 @@ INLINE void end_parts(stage s, const place_in_pass *here, parts more, mask wante
     parts_write(span.film + here->tile * span.channel_count * TILE_PIXELS, span.slots, here->at.place, &sum, shots);
     if (span.mode & PASS_KEEP) kept_parts(here->kept, span.slots + CHANNEL_COUNT, 1, &sum);
 }
-#endif
 
-#if HAS_MATTES
 // Likewise which things they show; `sums` are those before.
 INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, shot found, mask wanted, real offset) {
     mattes sum = {{0}};
@@ -170,7 +140,6 @@ INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, sh
     mattes_write(span.film + here->tile * span.channel_count * TILE_PIXELS, span.slots, here->at.place, &sum, shots);
     if (span.mode & PASS_KEEP) kept_mattes(here->kept, span.slots + CHANNEL_COUNT, 1, &sum);
 }
-#endif
 
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.
 INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
@@ -178,13 +147,9 @@ INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, 
     const mask wanted = mask_of(a.wanted);
     const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);
     pixel p = sums_before(s, &at);
-#if HAS_MATTES
-    end_mattes(s, &at, &p, found, wanted, a.offset);
-#endif
-    sample_add(&p, found, wanted, a.offset);
-#if HAS_PARTS
-    end_parts(s, &at, found.of_light, wanted, p.shots);
-#endif
+    if (KEEPS(s, STATE_MATTES)) end_mattes(s, &at, &p, found, wanted, a.offset);
+    sample_add(s.span, &p, found, wanted, a.offset);
+    if (KEEPS(s, STATE_PARTS)) end_parts(s, &at, found.of_light, wanted, p.shots);
     const mask hit = wanted & less(R(0.0), found.coverage);
     pass_count(&at, (s.span.mode & PASS_ADD) || s.sample > s.span.first, a.wanted, number_of(hit), cost);
     if (s.sample + 1 < s.span.end) {

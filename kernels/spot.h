@@ -1,19 +1,19 @@
 // Spots of the surface, of what marches have met.
 
 // Normals of a spot: only the first one, and that of pixels with points, may have several.
-INLINE int facet_count(int bounce) { return POINTS > 1 && bounce == 0 ? NORMAL_COUNT : 1; }
+INLINE int facet_count(int bounce, world w) { return bounce == 0 ? w.settings->normal_count : 1; }
 
-INLINE facet facet_of(stage s, const spot *here, int i) {
+INLINE facet facet_of(stage s, const spot *here, int i, world w) {
     facet f = {here->normal, R(1.0)};
-    if (facet_count(s.bounce) > 1) STATE_RECALL(s, f, STATE_FACET(i));
+    if (facet_count(s.bounce, w) > 1) STATE_RECALL_ONE(s, f, STATE_FACET, i);
     return f;
 }
 
 // Whether any normal of the spot faces that way. (With the mean normal only, a rough spot's other normals would have no shadow.)
-INLINE mask faces(stage s, const spot *here, vec direction) {
+INLINE mask faces(stage s, const spot *here, vec direction, world w) {
     mask any_normal = less(R(1.0), R(0.0));
-    for (int i = 0; i < TURNS(facet_count(s.bounce)); ++i) {
-        const facet f = facet_of(s, here, i);
+    for (int i = 0; i < facet_count(s.bounce, w); ++i) {
+        const facet f = facet_of(s, here, i, w);
         any_normal |= less(R(0.0), f.weight) & less(R(0.0), vec_dot(f.normal, direction));
     }
     return any_normal;
@@ -47,7 +47,7 @@ INLINE color spot_color(vec normal, real quantity, real object, real other, real
 
 // The same once its quantity is known. Faces have their colour already.
 INLINE color tint_of(const spot *here, world w) {
-    const color found = spot_color(here->normal, here->quantity, OBJECT_OF(*here), OTHER_OF(*here), SHARE_OF(*here), w);
+    const color found = spot_color(here->normal, here->quantity, here->object, here->other, here->share, w);
     return color_pick(on_face(here), here->tint, found);
 }
 
@@ -132,13 +132,9 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, vec place, world w) {
     here.residual = R(0.0);
     here.quantity = R(0.0);
     here.tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
-#if HAS_OBJECTS || HAS_MATTES || HAS_FACES
     here.object = object;
-#endif
-#if JOINS_SMOOTHLY
-    here.other = met.other;
-    here.share = met.share;
-#endif
+    here.other = OTHER_OF(met);
+    here.share = SHARE_OF(met);
     return here;
 }
 
@@ -161,9 +157,7 @@ INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
     here->smooth = pick(bare, face.count, here->smooth);
     here->tint = color_pick(bare, face.tint, here->tint);
     here->object = pick(bare, face.number, here->object);
-#if JOINS_SMOOTHLY
     here->share = pick(bare, R(0.0), here->share);
-#endif
     return bare;
 }
 #endif

@@ -28,23 +28,28 @@ typedef struct {
 #endif
 #define WORLD {view, settings, material, lights, palette, environment, PLANE_SET, materials, albedos, maps, tables, set_lights, objects}
 
+// Whether a scene has something of which kernels need not know more.
+#define HAS(w, feature) ((w).settings->features & FEATURE_##feature)
+
 // A work-item's packet.
 typedef struct {
     pass span;
     queue q;
     __global scalar *state;   // see state.h
+    __constant const int *at;   // which number of it each part begins with; below 0: the scene has none
     int stride;               // from one number of it to the next
     int packet, tile;         // of the tile, and of the launch
     int slot;                 // number of the packet's first pixel in the wave
     int bounce, sample;
 } stage;
 
-INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *state, int first_tile, int bounce, int sample) {
+INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *state, __constant const int *at, int first_tile, int bounce,
+                      int sample) {
     const int slot = (row * (span.end_packet - span.first_packet) + item) * LANES;
-    const stage s = {span, q, state + slot, q.wave + STATE_PADDING, item + span.first_packet, first_tile + row, slot, bounce, sample};
+    const stage s = {span, q, state + slot, at, q.wave + STATE_PADDING, item + span.first_packet, first_tile + row, slot, bounce, sample};
     return s;
 }
 #define STAGE_OF(name)                                                                                                     \
     const pass span_ = PASS;                                                                                               \
     const queue queue_ = STAGE_QUEUE;                                                                                      \
-    const stage name = stage_of(ITEM, ROW, span_, queue_, state, first_tile, bounce, sample)
+    const stage name = stage_of(ITEM, ROW, span_, queue_, state, settings->state_at, first_tile, bounce, sample)

@@ -9,9 +9,7 @@
 #include "tiles.h"
 #include "pixel.h"
 #include "normals.h"
-#if HAS_ENVIRONMENT
 #include "environment.h"
-#endif
 #include "planes.h"
 #include "stage.h"
 #include "state.h"
@@ -23,12 +21,8 @@
 #include "pixel_points.h"
 #include "light_places.h"
 #include "secondary.h"
-#if HAS_FOG
 #include "fog.h"
-#endif
-#if HAS_SHAFTS
 #include "air.h"
-#endif
 #include "look.h"
 #include "lit.h"
 #include "shots.h"
@@ -60,7 +54,7 @@ STAGE(begin_shots) {
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const pixel p = sums_before(s, &here);
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
-    numbers_keep((const real *)&a, AIM_NUMBERS, s.state + STATE_AIM * s.stride, s.stride);
+    STATE_KEEP(s, a, STATE_AIM);
     if (sample == first) count_waits_from(s.span, &here);
     tally cost = {R(0.0), R(0.0), R(0.0)};
     start_of_rays begin = {R(0.0)};
@@ -74,22 +68,23 @@ STAGE(begin_shots) {
     ray r = eye_ray(&a, view);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
-#if HAS_OBJECTS && POINTS > 1
-    // Its points look for objects on their own rays.
-    send_past_objects(s, 0, r, begin.t, mask_of(a.wanted), w);
-#else
-    send_clipped(s, 0, r, begin.t, WHICH, mask_of(a.wanted), w);
+#if HAS_OBJECTS
+    // A pixel's points look for objects on their own rays.
+    if (settings->point_count > 1) {
+        send_past_objects(s, 0, r, begin.t, mask_of(a.wanted), w);
+        return;
+    }
 #endif
+    send_clipped(s, 0, r, begin.t, WHICH, mask_of(a.wanted), w);
 }
 
-#if POINTS > 1
 // Sends the rays of a pixel's points, from where its cone touched.
 STAGE(send_points) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s.state, s.stride);
+    const aim a = aim_kept(s);
     const encounter end_of_cone = queue_met(s.q, 0, s.slot);
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
@@ -101,25 +96,34 @@ STAGE(send_points) {
     points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
 }
 
-// The spot of a pixel with several points.
-INLINE spot spot_of_points(stage s, const packet_pixels *at, ray pixel_ray, real time, sighting *first, tally *cost, world w) {
+// Makes spots of what a pixel's points have met.
+STAGE(join_points) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+    const aim a = aim_kept(s);
+    tally cost;
     touch touched;
+    STATE_RECALL(s, cost, STATE_TALLY);
     STATE_RECALL(s, touched, STATE_TOUCH);
-    first->steps = cost->steps;
-    pixel_points points = points_begin(pixel_ray, time, touched, points_seed(at, s.sample, w), w);
-    for (int turn = 0; turn < POINTS; ++turn) {
+    sighting at_first = {R(0.0), cost.steps};
+    pixel_points points = points_begin(eye_ray(&a, view), a.time, touched, points_seed(&here.at, sample, w), w);
+    for (int turn = 0; turn < settings->point_count; ++turn) {
         const ray r = queue_ray(s.q, turn, s.slot);
         real object;
         vec place;
         const encounter met = surface_met(s, turn, r, &object, &place, w);
-        tally_met(cost, met, 1);
-        first->steps += met.steps;
+        tally_met(&cost, met, 1);
+        at_first.steps += met.steps;
         points_add(s, &points, turn, r, met, object, place, w);
     }
-    first->coverage = points.count * (R(1.0) / (real)(POINTS));
-    return points_spot(s, &points, w);
+    at_first.coverage = points.count * (R(1.0) / (real)((scalar)settings->point_count));
+    const spot found = points_spot(s, &points, w);
+    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, at_first, STATE_SIGHTING);
+    spot_keep(s, &found, 0);
 }
-#endif
 
 // Makes spots of what the rays along the path have met, and sends the rays that bring their light.
 STAGE(find_spots) {
@@ -130,19 +134,17 @@ STAGE(find_spots) {
 #endif
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s.state, s.stride);
+    const aim a = aim_kept(s);
     path so_far;
     const ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
-    sighting at_first;
+    sighting at_first = {R(0.0), R(0.0)};
     spot found;
-#if POINTS > 1
-    if (bounce == 0) {
-        found = spot_of_points(s, &here.at, r, a.time, &at_first, &cost, w);
-    } else
-#endif
-    {
+    if (bounce == 0 && settings->point_count > 1) {
+        found = spot_kept(s, 0);
+        STATE_RECALL(s, at_first, STATE_SIGHTING);
+    } else {
         real object;
         vec place;
         encounter met = surface_met(s, 0, r, &object, &place, w);
@@ -163,16 +165,14 @@ STAGE(find_spots) {
 #if HAS_SUBSURFACE
     if (bounce > 0) {
         carried with;
-        STATE_RECALL(s, with, STATE_CARRIED);
+        with = carried_kept(s);
         found.normal = vec_pick(path_emerges(bounce, &with, &found, w), vec_scale(found.normal, R(-1.0)), found.normal);
     }
 #endif
     if (w.material->coloring == COLORING_RESIDUAL) found.quantity = found.residual;
-    spot_keep(&found, s.state, bounce, s.stride);
+    spot_keep(s, &found, bounce);
     send_for_light(s, &here.at, &found, next_turns, w);
-#if HAS_SHAFTS
-    if (bounce == 0) air_send(s, &here.at, a, &found, HAS_PATHS ? 1 : next_turns, w);
-#endif
+    if (bounce == 0 && KEEPS(s, STATE_AIR)) air_send(s, &here.at, a, &found, HAS_PATHS ? 1 : next_turns, w);
 }
 
 #if !HAS_PATHS
@@ -181,17 +181,17 @@ STAGE(light_spots) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
     const world w = WORLD;
-    const aim a = aim_kept(s.state, s.stride);
-    spot found = spot_kept(s.state, bounce, s.stride);
+    const aim a = aim_kept(s);
+    spot found = spot_kept(s, bounce);
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const vec direction = arrived.direction;
-#if HAS_SHAFTS
-    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    if (bounce == 0) air_gather(s, &here.at, a, &found, turns_for_light(w), &cost, w);
-#endif
+    if (bounce == 0 && KEEPS(s, STATE_AIR)) {
+        const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+        air_gather(s, &here.at, a, &found, turns_for_light(w), &cost, w);
+    }
     path_meets_light(s, &so_far, &found, arrived, w);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
@@ -199,9 +199,9 @@ STAGE(light_spots) {
         gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
         gathered = color_pick(on_face(&found), found.tint, gathered);
     }
-#if HAS_PARTS
-    if (bounce == 0) glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
-#endif
+    if (bounce == 0 && KEEPS(s, STATE_GLANCE)) {
+        glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
+    }
     const int last = bounce == settings->bounces;
     const color mirrored = color_pick(on_face(&found), color_of(R(0.0), R(0.0), R(0.0)), mirrored_at(&found, direction, w));
     path_add(s, &so_far, direction, a.y, &found, gathered, mirrored, last, w);

@@ -1,10 +1,10 @@
 // A View while a shutter is open. Its poses are a list, evenly in time: at 0 the shutter opens, at 1 it closes. Each lane has a
 // time of its own; between two poses all numbers are mixed. A view that stands still is one pose, whatever the time.
-#if HAS_MOTION
 // All fields of the struct are as wide as a number, or fill up one.
 #define POSE_NUMBERS ((int)(sizeof(struct View) / sizeof(scalar)))
 
-INLINE real view_mixed(__constant const scalar *number, real time, int spans) {
+INLINE real view_number(__constant const scalar *number, real time, int spans) {
+    if (spans == 0) return (real)(*number);
     scalar each[LANES];
     lanes_store(time * (real)((scalar)spans), each);
     for (int lane = 0; lane < LANES; ++lane) {
@@ -15,13 +15,9 @@ INLINE real view_mixed(__constant const scalar *number, real time, int spans) {
     return lanes_load(each);
 }
 
-INLINE vec view_mixed_vec(__constant const scalar *numbers, real time, int spans) {
-    return vec_of(view_mixed(numbers, time, spans), view_mixed(numbers + 1, time, spans), view_mixed(numbers + 2, time, spans));
+INLINE vec view_vec(__constant const scalar *numbers, real time, int spans) {
+    return vec_of(view_number(numbers, time, spans), view_number(numbers + 1, time, spans), view_number(numbers + 2, time, spans));
 }
 
-#define VIEW_NUMBER(view, field, time) view_mixed(&(view)->field, time, (view)->spans)
-#define VIEW_VEC(view, field, time) view_mixed_vec((view)->field, time, (view)->spans)
-#else
-#define VIEW_NUMBER(view, field, time) ((real)((view)->field))
-#define VIEW_VEC(view, field, time) vec_splat((view)->field)
-#endif
+#define VIEW_NUMBER(view, field, time) view_number(&(view)->field, time, (view)->spans)
+#define VIEW_VEC(view, field, time) view_vec((view)->field, time, (view)->spans)

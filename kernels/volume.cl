@@ -30,7 +30,7 @@ typedef float sample;
 typedef uchar sample;
 #endif
 #include "grid.h"
-#if HAS_ENVIRONMENT
+#if HAS_PATHS
 #include "environment.h"
 #endif
 #include "volume_ray.h"
@@ -47,13 +47,13 @@ typedef uchar sample;
 #endif
 
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
-    real lens_x = R(0.0), lens_y = R(0.0);
-#if HAS_LENS
-    const bits seed = pixel_seed(at->columns, at->rows, (uint)w.sampling->seed, PURPOSE_LENS);
-    unit_square((bits)((uint)sample), seed, &lens_x, &lens_y);
-    unit_disk(lens_x, lens_y, &lens_x, &lens_y);
-#endif
-    const real time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
+    real lens_x = R(0.0), lens_y = R(0.0), time = R(0.0);
+    if (w.view->has_lens) {
+        const bits seed = pixel_seed(at->columns, at->rows, (uint)w.sampling->seed, PURPOSE_LENS);
+        unit_square((bits)((uint)sample), seed, &lens_x, &lens_y);
+        unit_disk(lens_x, lens_y, &lens_x, &lens_y);
+    }
+    if (w.view->spans > 0) time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
 #if HAS_PATHS
     return take_path(at, at->x + across, at->y + below, lens_x, lens_y, time, sample, active, w, &cost->steps);
 #else

@@ -163,11 +163,11 @@ INLINE void lanes_put(real number, __global scalar *to, const int *places, uint 
 }
 
 // Lanes that have taken new rays take the paths of these.
-INLINE void walk_takes(walk *a, const int *places, uint fresh, __global const scalar *state, int stride) {
+INLINE void walk_takes(walk *a, const int *places, uint fresh, __global const scalar *state, __constant const int *at, int stride) {
     if (fresh == 0) return;
-#define TAKE_OF_PATH(i) lanes_take((real *)&a->so_far + i, state + (STATE_PATH + i) * stride, places, fresh);
+#define TAKE_OF_PATH(i) lanes_take((real *)&a->so_far + i, state + (at[STATE_PATH] + i) * stride, places, fresh);
     WRITTEN_OUT(NUMBERS_OF(path), TAKE_OF_PATH)
-#define TAKE_OF_CARRIED(i) lanes_take((real *)&a->with + i, state + (STATE_CARRIED + i) * stride, places, fresh);
+#define TAKE_OF_CARRIED(i) lanes_take((real *)&a->with + i, state + carried_number(at, i) * stride, places, fresh);
     WRITTEN_OUT(NUMBERS_OF(carried), TAKE_OF_CARRIED)
     const mask here = lanes_of_bits(fresh);
     a->scatterings = pick(here, R(-1.0), a->scatterings);
@@ -177,14 +177,15 @@ INLINE void walk_takes(walk *a, const int *places, uint fresh, __global const sc
 }
 
 // Lanes whose walks have ended put their paths down, as they set out last: nothing scatters them before what they meet.
-INLINE void walk_puts(const march *m, const walk *a, const int *places, uint ended, queue q, __global scalar *state, int stride) {
+INLINE void walk_puts(const march *m, const walk *a, const int *places, uint ended, queue q, __global scalar *state, __constant const int *at,
+                      int stride) {
     if (ended == 0) return;
     path so_far = a->so_far;
     so_far.origin = m->r.origin;
     so_far.direction = m->r.direction;
-#define PUT_OF_PATH(i) lanes_put(((const real *)&so_far)[i], state + (STATE_PATH + i) * stride, places, ended);
+#define PUT_OF_PATH(i) lanes_put(((const real *)&so_far)[i], state + (at[STATE_PATH] + i) * stride, places, ended);
     WRITTEN_OUT(NUMBERS_OF(path), PUT_OF_PATH)
-    const int flight = STATE_CARRIED + (int)(&a->with.flight - (real *)&a->with);
+    const int flight = carried_number(at, (int)(&a->with.flight - (real *)&a->with));
     lanes_put((real)(REAL_LARGEST), state + flight * stride, places, ended);
 #define PUT_OF_RAY(i) lanes_put(((const real *)&m->r)[i], q.rays + i * q.stride, places, ended);
     WRITTEN_OUT(RAY_FAR + 1, PUT_OF_RAY)
@@ -206,9 +207,9 @@ INLINE int walk_share(share mine, queue q, __global scalar *state, int stride, i
         const uint waiting = lanes_waiting(&m, &left, places, q, GOAL_SURFACE, w.settings);
         if (waiting == ALL_LANES) return waits;
         waits += bits_count(waiting);
-        walk_takes(&a, places, lanes_bits(m.active & equal(m.found.steps, R(0.0))), state, stride);
+        walk_takes(&a, places, lanes_bits(m.active & equal(m.found.steps, R(0.0))), state, w.settings->state_at, stride);
         const mask before = m.active;
         walk_step(&m, &a, bounce, w, orbit, k);
-        walk_puts(&m, &a, places, lanes_bits(before & ~m.active), q, state, stride);
+        walk_puts(&m, &a, places, lanes_bits(before & ~m.active), q, state, w.settings->state_at, stride);
     }
 }

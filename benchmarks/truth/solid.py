@@ -17,6 +17,7 @@ from clfractal.errors import DeviceError
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import records
+from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.points import Distances, distances
 
@@ -57,7 +58,7 @@ class Solid:
         generated = {
             "inside.cl": Path(__file__).with_name("inside.cl").read_text(encoding="utf-8"),
             "formula.h": formula.text,
-            "structs.h": records.struct_text(),
+            "structs.h": struct_text(),
         }
         defines = {"LANES": self.lanes, "REAL_IS_DOUBLE": 1}
         text = flatten("inside.cl", generated=generated, defines=defines, user=["formula.h"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Struct
+from clfractal.renderers.carried import carried_text
 from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
     escape_colors_record,
@@ -45,9 +46,12 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
         **body.defines,
         "PALETTE_SIZE": PALETTE_SIZE,
         "SMOOTH": int(renderer.colors.mode == "smooth"),
-        "ADAPTIVE": int(renderer.noise is not None),
     }
-    generated = {**body.texts(files=("escape.h",), defines=escape_defines), "structs.h": structs}
+    generated = {
+        **body.texts(files=("escape.h",), defines=escape_defines),
+        "structs.h": structs,
+        "carried.h": carried_text(),
+    }
     return flat_text("cut_plane.cl", generated=generated, defines=defines)
 
 

@@ -111,6 +111,7 @@ def material_fields(environment: Environment | None, packed: PackedEnvironment |
         "environment_intensity": environment.intensity if environment else 0.0,
         "environment_turn": (math.cos(angle), math.sin(angle)),
         "environment_width": packed.width if packed else 0,
+        "environment_sun": int(packed is not None and environment is not None and environment.has_sun),
         "environment_height": packed.height if packed else 0,
         "environment_columns": packed.columns if packed else 0,
         "environment_rows": packed.rows if packed else 0,

@@ -17,12 +17,23 @@ COLORINGS = {
     "trap": 6,
 }
 ALONG = {"view": 0, "normal": 1, "reflection": 2}
+NORMALS = {
+    "gradient": 0,
+    "one_triangle": 1,
+    "eight_triangles_shading": 2,
+    "eight_triangles_normal": 3,
+    "least_squares": 4,
+}
+# What a scene has beside what other fields tell, as bits.
+FEATURES = {"fog": 1, "bump": 2}
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {
     "LIGHT": LIGHT_KINDS,
     "TRAP": TRAPS,
     "COLORING": COLORINGS,
     "ALONG": ALONG,
+    "NORMAL": NORMALS,
+    "FEATURE": FEATURES,
 }
 
 

@@ -20,6 +20,7 @@ SAMPLING = Struct(
     [
         Field("samples", "int", 0, "shots per pixel, at most"),
         Field("min_samples", "int", 0, "shots before the noise is judged"),
+        Field("adaptive", "int", 0, "1: a pixel is done when it has little noise"),
         Field("noise", "real", 0, "standard error at which a pixel is done"),
         Field("transparent", "int", 0, "1: coverage is seen, so its noise counts too"),
         Field("filter", "int", 0, "FILTER_BOX, FILTER_TENT or FILTER_BLACKMAN_HARRIS"),
@@ -68,12 +69,9 @@ def pass_defines(plan: Plan) -> dict[str, object]:
         "LANES": plan.lanes,
         "REAL_IS_DOUBLE": int(plan.precision == "float64"),
         "TILE": TILE,
-        "HAS_MOTION": int(plan.moving),
         **_numbered("CHANNEL", (name.replace(".", "") for name in CHANNELS)),
         "CHANNEL_COUNT": len(CHANNELS),
         "RAY_CHANNELS": len(RAY_CHANNELS),
-        "HAS_PARTS": int(has_parts(plan)),
-        "HAS_MATTES": int(has_mattes(plan)),
         "MATTE_RANKS": MATTE_RANKS,
         **_numbered("KEPT", _KEPT),
         **_numbered("STATISTIC", STATISTICS),
@@ -99,6 +97,7 @@ def sampling_record(sampled: Sampled, samples: int, precision: Precision, *, tra
     values = {
         "samples": samples,
         "min_samples": min(sampled.used_min_samples, samples),
+        "adaptive": int(sampled.noise is not None),
         "noise": sampled.noise or 0.0,
         "transparent": int(transparent),
         "filter": FILTERS.index(sampled.filter),

@@ -19,7 +19,7 @@ from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.device.watched import Watched
 from clfractal.formulas.language import Chain
-from clfractal.renderers import records
+from clfractal.renderers.declarations import struct_text
 from clfractal.solids import Body
 
 Floats = npt.NDArray[np.float64]
@@ -121,7 +121,7 @@ def nearest(
 
 def program_text(body: Body, lanes: int, precision: Precision) -> FlatText:
     """The whole text of the program for a body's points."""
-    generated = {**body.texts(), "structs.h": records.struct_text()}
+    generated = {**body.texts(), "structs.h": struct_text()}
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines}
     return flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
 

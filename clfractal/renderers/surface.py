@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.renderers import records
+from clfractal.renderers.carried import carried_text
+from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.environment import packed_map
 from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.glass import glass_tables
@@ -27,9 +29,6 @@ from clfractal.renderers.kernel import (
 from clfractal.renderers.maps import (
     MAP,
     MappedMaterials,
-    asked_maps,
-    bump_numbers,
-    has_bump,
     has_cloudy_glass,
     has_glass,
     has_glass_set,
@@ -37,10 +36,11 @@ from clfractal.renderers.maps import (
     map_defines,
     mapped_materials,
 )
+from clfractal.renderers.march import march_record, uses_positions
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.object_grids import ObjectGrids
 from clfractal.renderers.objects import object_defines, object_records
-from clfractal.renderers.passes import has_mattes, has_parts, pass_defines
+from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
@@ -52,9 +52,9 @@ from clfractal.renderers.planes import (
     plane_records,
 )
 from clfractal.renderers.scattering import albedo_tables
-from clfractal.renderers.set_lights import set_light_data, set_lights_of, single_lights
+from clfractal.renderers.set_lights import set_light_data, set_lights_of
+from clfractal.renderers.state import state_numbers, state_places, state_text
 from clfractal.renderers.waves import (
-    air_turns,
     asks_formula,
     has_cones,
     inside_kernels,
@@ -65,26 +65,15 @@ from clfractal.renderers.waves import (
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import PerspectiveCamera
 from clfractal.solids import Body, joins_smoothly
 
 PALETTE_SIZE = 256
-NORMALS = ("gradient", "one_triangle", "eight_triangles_shading", "eight_triangles_normal", "least_squares")
 # Entries that ask how near orbits come to traps.
 _ASK_TRAPS = ("color_spots.cl", "glow.cl")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
 # Neither search of `search_defines`: rays within glass have one of their own.
 SEARCH_INSIDE = 2
-# Numbers of a pixel in `kernels/state.h`, without its normals.
-STATE_NUMBERS = 120
-# More of them where the picture has layers: sums, and what one shot knows of them.
-_PARTS_NUMBERS = 15 + 9
-# Of mattes likewise; and each spot's object.
-_MATTE_NUMBERS = 13
-# And of what a path carries through glass, and more through that which scatters light.
-_GLASS_NUMBERS, _CLOUDY_NUMBERS = 8, 7
-
 Floats = npt.NDArray[np.float32]
 
 
@@ -100,9 +89,6 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "POINTS": several_points(scene),
         # A binary search ends where the surface is; a march, somewhere within the point's footprint.
         "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
-        # Rays are marched as they were sent.
-        "HAS_LENS": 0,
-        "HAS_MOTION": 0,
         "HAS_OBJECTS": 0,
         **Body.of(scene).defines,
     }
@@ -129,35 +115,10 @@ def several_points(scene: Scene) -> int:
     return min(scene.surface.used_points.count, 2)
 
 
-def uses_positions(scene: Scene) -> bool:
-    """Whether normals or colours are made from the places of a pixel's points."""
-    renderer = scene.surface
-    return renderer.used_points.count > 1 and (renderer.normal_of_points or scene.coloring.by == "residual")
-
-
 def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """What is done with what the search finds, as far as the text of `kernels/surface.cl` depends on it."""
-    renderer = scene.surface
-    points = renderer.used_points
-    rays = records.hemisphere_rays(scene)
     return {
         **state_defines(scene, plan),
-        "NORMAL_COUNT": normal_count(scene),
-        "POINTS": points.count,
-        "POINT_PATTERN": int(points.pattern == "stochastic"),
-        "POINT_SIDE": math.isqrt(points.count),
-        **{f"NORMAL_{name.upper()}": number for number, name in enumerate(NORMALS)},
-        "NORMAL": NORMALS.index(renderer.normal if renderer.normal_of_points else "gradient"),
-        "GEOMETRIC": int(uses_positions(scene)),
-        "HAS_AMBIENT": int(rays.cosine + rays.map > 0),
-        "HAS_ENVIRONMENT": int(scene.environment is not None),
-        "HAS_SUN": int(scene.environment is not None and scene.environment.has_sun),
-        "HAS_SOFT_LIGHT": int(
-            any(light.has_size for light in single_lights(scene))
-            and not isinstance(scene.lighting, PathLighting)
-        ),
-        "HAS_FOG": int(scene.fog is not None),
-        "ADAPTIVE": int(renderer.noise is not None),
         **(scattering_defines() if isinstance(scene.lighting, PathLighting) else {}),
     }
 
@@ -167,17 +128,12 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
-        "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
-        "ADAPTIVE": 0,
         "POINTS": several_points(scene),
-        "NORMAL_COUNT": 1,
-        "STATE_NUMBERS": state_numbers(scene, plan),
         "STATE_PADDING": STATE_PADDING,
         "PLANES": plane_count(scene),
         **face_defines(scene),
         **object_defines(scene),
         **Body.of(scene).defines,
-        "HAS_SHAFTS": int(air_turns(scene) > 0),
         "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
         "HAS_GLASS": int(has_glass(scene)),
@@ -185,27 +141,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_GLASS_SCATTER": int(has_cloudy_glass(scene)),
         **({"HAS_SUBSURFACE": 1} if has_subsurface(scene) else {}),
         "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
-        "HAS_GLOW": int(scene.glow is not None),
     }
-
-
-def normal_count(scene: Scene) -> int:
-    """Normals over which a pixel's shading is averaged."""
-    renderer = scene.surface
-    if not renderer.normal_of_points:
-        return renderer.used_points.count
-    return 8 if renderer.normal == "eight_triangles_shading" else 1
-
-
-def state_numbers(scene: Scene, plan: Plan) -> int:
-    """Numbers of a pixel that are kept between stages, at least; kernels check it."""
-    more = len(asked_maps(scene)) + bump_numbers(scene) + 2 * (bool(scene.objects) or has_faces(scene))
-    more += 4 * joins_smoothly(scene)
-    if has_parts(plan):
-        more += _PARTS_NUMBERS + 3 * has_bump(scene)
-    more += (_MATTE_NUMBERS + 2) * has_mattes(plan) + _GLASS_NUMBERS * has_glass(scene)
-    more += _CLOUDY_NUMBERS * has_cloudy_glass(scene)
-    return STATE_NUMBERS + 4 * normal_count(scene) + more
 
 
 class SurfaceKernel(TileKernel):
@@ -234,7 +170,7 @@ class SurfaceKernel(TileKernel):
         on_set, body = set_lights_of(scene), Body.of(scene)
         of_maps, tables = self._tables()
         return [
-            records.march_record(scene, precision, self.plan.divider, packed, on_set),
+            march_record(scene, precision, self.plan.divider, packed, on_set, state_places(scene, self.plan)),
             body.records(precision),
             body.constants(precision),
             records.material_record(scene, precision, packed),
@@ -296,7 +232,11 @@ def light_kernels(scene: Scene) -> tuple[str, ...]:
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     """The texts of the scene's programs: those that know the formula, and the one that knows the scene's features."""
-    structs = {"structs.h": records.struct_text() + CUT_PLANE.c_text(), "pbr.h": pbr_text()}
+    structs = {
+        "structs.h": struct_text() + CUT_PLANE.c_text(),
+        "carried.h": carried_text() + state_text(),
+        "pbr.h": pbr_text(),
+    }
 
     def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
         files = [
@@ -307,7 +247,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         generated = {**Body.of(scene).texts(files=files, defines=turns), **structs}
         return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
 
-    points = ("send_points",) if scene.surface.used_points.count > 1 else ()
+    points = ("send_points", "join_points") if scene.surface.used_points.count > 1 else ()
     texts = [
         text("rays", "march.cl", search_defines(scene, plan), *march_kernels(plan)),
         text(
@@ -327,8 +267,7 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         colors = {**state_defines(scene, plan), "PLANES": 0}
         texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
     if scene.glow is not None:
-        glow = {**state_defines(scene, plan), "HAS_FOG": int(scene.fog is not None)}
-        texts.append(text("glow", "glow.cl", glow, "add_glow"))
+        texts.append(text("glow", "glow.cl", state_defines(scene, plan), "add_glow"))
     if scene.cut_planes:
         planes = {**state_defines(scene, plan), **plane_defines(scene)}
         faces = ("find_faces",) if has_faces(scene) else ()

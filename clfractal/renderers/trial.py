@@ -24,9 +24,11 @@ from clfractal.device.structs import Precision
 from clfractal.formulas.catalog import load_chain
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
+from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.fineness import NEAR
 from clfractal.renderers.kernel import MET_NUMBERS, STATE_PADDING
-from clfractal.renderers.records import MARCH, SHADOW_DETAIL, SHADOW_LIFT, orbit_record, struct_text
+from clfractal.renderers.march import MARCH, SHADOW_DETAIL, SHADOW_LIFT
+from clfractal.renderers.records import orbit_record
 from clfractal.renderers.waves import GOAL_SHADOW, GOAL_SURFACE, rays_group, rays_of_item
 from clfractal.scene.surface import SurfaceRenderer
 
@@ -105,7 +107,6 @@ def program_text(formula: FormulaText, lanes: int, precision: Precision) -> Flat
         "POINTS": 1,
         "POLISH": 0,
         "FAR_BOUNDS": 0,
-        "HAS_LENS": 0,
     }
     generated = {"structs.h": struct_text(), "formula.h": formula.text}
     return flatten("march_probe.cl", generated=generated, defines=defines)

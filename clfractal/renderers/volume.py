@@ -16,6 +16,7 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers import records
+from clfractal.renderers.carried import carried_text
 from clfractal.renderers.environment import PackedEnvironment, packed_map
 from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
@@ -39,7 +40,6 @@ from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.solids import Body
@@ -129,10 +129,6 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
             settings.shadows and any(light.shadow for light in scene.lights) and not has_paths(scene)
         ),
         "HAS_PATHS": int(has_paths(scene)),
-        "HAS_ENVIRONMENT": int(has_paths(scene) and scene.environment is not None),
-        "HAS_SUN": int(has_paths(scene) and scene.environment is not None and scene.environment.has_sun),
-        "HAS_LENS": int(isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0),
-        "ADAPTIVE": int(settings.noise is not None),
         **plane_defines(scene),
     }
     structs = kind_text() + "".join(struct.c_text() for struct in STRUCTS)
@@ -142,7 +138,7 @@ def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
         formulas = body.texts(files=("escape.h",), defines=escape_defines)
         defines |= body.defines
     normals = f'#include "volume_{"exact" if has_exact_normals(scene) else "blended"}.h"\n'
-    generated = {"structs.h": structs, "volume_normals.h": normals, **formulas}
+    generated = {"structs.h": structs, "carried.h": carried_text(), "volume_normals.h": normals, **formulas}
     return flat_text("volume.cl", generated=generated, defines=defines)
 
 

@@ -4,7 +4,7 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     [send_cones  march]  and for each sample
 
-    begin_shots  march  [send_points  march]  find_spots  [color_spots]  march  light_spots
+    begin_shots  march  [send_points  march  join_points]  find_spots  [color_spots]  march  light_spots
 
 with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look
 for a spot; each mirror adds what follows `begin_shots` but for the points.
@@ -132,6 +132,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield from _marched(marching, 1, GOAL_SURFACE)
             if bounce > 0 and has_glass_set(scene):
                 yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE, bounce)
+        if points > 1 and bounce == 0:
+            yield stage("join_points", turns)
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
         if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)

@@ -15,7 +15,7 @@ from clfractal.device.select import Device
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.formulas.opencl import FormulaText
-from clfractal.renderers import records
+from clfractal.renderers.declarations import struct_text
 from clfractal.resources import folder
 
 Floats = npt.NDArray[np.floating[Any]]
@@ -56,7 +56,7 @@ def compile_text(
     """The driver's program of a generated text; BuildFailureError with the log if it does not compile."""
     flat = flatten(
         "batch.cl",
-        generated={"batch.cl": text, "structs.h": records.struct_text()},
+        generated={"batch.cl": text, "structs.h": struct_text()},
         defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
     )
     return compiler.compile_source(device, flat.text, [*program.math_flags(precision), *flags])

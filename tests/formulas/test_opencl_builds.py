@@ -24,7 +24,8 @@ from clfractal.files.channels import CHANNELS
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from clfractal.pictures.tiles import Region
-from clfractal.renderers import records, surface
+from clfractal.renderers import surface
+from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.plan import Plan
 from clfractal.scene.load import load_scene
 from tests.formulas.opencl_batch import kernel_file, numbered
@@ -49,7 +50,7 @@ def points_text(name: str, precision: Precision, lanes: int) -> str:
     formula = write_formula(catalog.load_chain(name))
     return flatten(
         "points.cl",
-        generated={"formula.h": formula.text, "structs.h": records.struct_text()},
+        generated={"formula.h": formula.text, "structs.h": struct_text()},
         defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
     ).text
 

@@ -12,7 +12,8 @@ from clfractal.device.source import FlatText, SourceMap
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import cut_plane, points, records, surface, trial, volume
+from clfractal.renderers import cut_plane, points, surface, trial, volume
+from clfractal.renderers.declarations import STRUCTS
 from clfractal.renderers.plan import make_plan
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
@@ -46,7 +47,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
             trial.program_text(write_formula(catalog.load_chain(name)), count, precision),
         )
     if count == 1:  # these know no packets
-        yield "structs", FlatText(struct_layout.program_text(records.STRUCTS, precision), SourceMap())
+        yield "structs", FlatText(struct_layout.program_text(STRUCTS, precision), SourceMap())
         yield "peak", FlatText(peak.program_text(precision), SourceMap())
     if count == 1 and precision == "float32":
         yield "canvas", canvas.program_text()

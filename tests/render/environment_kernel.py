@@ -15,6 +15,7 @@ from clfractal.device.select import Device, choose
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers import records
+from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.scene.lighting import Environment
 
@@ -71,7 +72,7 @@ def settings_of(**values: Any) -> Environment:
 def _program(device: Device, precision: Precision, lanes: int, has_sun: bool) -> Any:
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "PALETTE_SIZE": 256}
     defines["HAS_SUN"] = int(has_sun)
-    generated = {"environment.cl": _TEXT, "structs.h": records.struct_text()}
+    generated = {"environment.cl": _TEXT, "structs.h": struct_text()}
     flat = flatten("environment.cl", generated=generated, defines=defines)
     return compiler.compile_source(device, flat.text, program.math_flags(precision))
 

@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.pictures.film import Film
-from clfractal.renderers import records, surface, waves
+from clfractal.renderers import march, surface, waves
 from clfractal.renderers.kernel import BLOCK
 from clfractal.renderers.plan import make_plan
 from clfractal.scene.model import Scene
@@ -122,7 +122,7 @@ def test_a_ray_whose_cone_ended_inside_begins_anew(
     scene = scene_of(formula, camera, (160, 120), renderer=renderer, lights=LIGHTS)
     origin, direction, _ = rays(scene)
     _, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
-    monkeypatch.setattr(records, "CONE_SHARE", 3.0)
+    monkeypatch.setattr(march, "CONE_SHARE", 3.0)
     cones, _ = rendered(scene, device)
     hit = nearest < 0.8 * BALL_RADIUS
     assert hit.sum() > 2000

@@ -15,7 +15,7 @@ from clfractal.device import compiler, program
 from clfractal.device.select import choose
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
-from clfractal.renderers import records
+from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.objects import object_defines, object_records
 from clfractal.scene.model import Scene
 from tests.render.material_kernel import LOADS
@@ -102,7 +102,7 @@ def look(shape: str, point: Floats, precision: Precision, lanes: int, count: int
         "HAS_MOTION": 0,
         **object_defines(lit),
     }
-    generated = {"look.cl": _TEXT, "structs.h": records.struct_text()}
+    generated = {"look.cl": _TEXT, "structs.h": struct_text()}
     flat = flatten("look.cl", generated=generated, defines=defines)
     kernel = cl.Kernel(compiler.compile_source(device, flat.text, program.math_flags(precision)), "look")
     given = np.clip(qmc.Sobol(3, seed=3).random(count), 1e-6, 1 - 1e-6).T

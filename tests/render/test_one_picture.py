@@ -15,7 +15,7 @@ from clfractal.errors import SceneError
 from clfractal.optics.view import seen_by
 from clfractal.pictures.film import Film
 from clfractal.renderers.fineness import NEAR, Fineness
-from clfractal.renderers.records import SHADOW_DETAIL, march_record
+from clfractal.renderers.march import SHADOW_DETAIL, march_record
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image

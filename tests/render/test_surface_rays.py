@@ -19,7 +19,8 @@ from clfractal.device.select import Device
 from clfractal.files.environment import read_environment
 from clfractal.files.exr import write_exr
 from clfractal.pictures.film import Film
-from clfractal.renderers.records import HemisphereRays, hemisphere_rays, march_record
+from clfractal.renderers.march import march_record
+from clfractal.renderers.records import HemisphereRays, hemisphere_rays
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import (

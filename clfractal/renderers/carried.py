@@ -1,0 +1,251 @@
+"""What is carried from stage to stage, and summed over shots: structs of reals in C, each declared here once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from clfractal.files.channels import MATTE_RANKS
+
+Kind = Literal["real", "vec", "color"]
+_NUMBERS: dict[Kind, int] = {"real": 1, "vec": 3, "color": 3}
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A number, a vector or a colour (linear Rec. 709) of a thing that is carried, or `count` of them.
+
+    Masks are kept as 1 or 0.
+    """
+
+    kind: Kind
+    name: str
+    meaning: str = ""
+    count: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """Something that is carried, as a struct in C."""
+
+    name: str
+    meaning: str
+    members: tuple[Member, ...]
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers it has."""
+        return sum(_NUMBERS[member.kind] * max(member.count, 1) for member in self.members)
+
+    def c_text(self) -> str:
+        """Its declaration."""
+        lines = [f"// {self.meaning}", "typedef struct {"]
+        for member in self.members:
+            many = f"[{member.count}]" if member.count else ""
+            told = f"  // {member.meaning}" if member.meaning else ""
+            lines.append(f"    {member.kind} {member.name}{many};{told}")
+        return "\n".join([*lines, f"}} {self.name};", ""])
+
+
+def _carried(name: str, meaning: str, *members: tuple[Kind, str, str]) -> Carried:
+    return Carried(name, meaning, tuple(Member(*member) for member in members))
+
+
+AIM = _carried(
+    "aim",
+    "Where the shot goes to.",
+    ("real", "wanted", "whether the pixel takes this sample"),
+    ("real", "x", "pixels from the picture's left side ..."),
+    ("real", "y", "... and from its top"),
+    ("real", "offset", "distance squared from the pixel's middle, pixels"),
+    ("real", "lens_x", "lens radii from its middle"),
+    ("real", "lens_y", ""),
+    ("real", "time", "while the shutter is open, 0 to 1"),
+)
+SIGHTING = _carried("sighting", "What was found first.", ("real", "coverage", ""), ("real", "steps", ""))
+START = _carried(
+    "start_of_rays",
+    "Where the pixel's rays begin: so far its block's cone is free.",
+    ("real", "t", "distance along its rays, scene units"),
+)
+TOUCH = _carried(
+    "touch",
+    "How far the pixel's whole cone is free.",
+    ("real", "touched", "whether the set is there"),
+    ("real", "t", "distance along its ray, scene units"),
+)
+TALLY = _carried(
+    "tally",
+    "What rays cost.",
+    ("real", "steps", "distance evaluations; of a volume: places looked at"),
+    ("real", "count", "applications of the formula"),
+    ("real", "bad", "steps that ended inside"),
+)
+SPOT = _carried(
+    "spot",
+    "A place on the surface, and how it looks.",
+    ("real", "found", ""),
+    ("vec", "point", "where it is shaded, and rays leave it"),
+    ("vec", "seen", "where the ray has met it"),
+    ("vec", "normal", "the one that stands for all: shadows, reflections, channel N"),
+    ("real", "cone", "the pixel's footprint there"),
+    ("real", "smooth", "escape count"),
+    ("color", "tint", "of the surface"),
+    (
+        "real",
+        "object",
+        "its number, from 1; 0: the set; -1: a light that is seen first; or a face's, see planes.h",
+    ),
+    ("real", "other", "where two solids flow together: the number of the other object ..."),
+    ("real", "share", "... and its part of the colour"),
+    ("real", "quantity", "what chooses the colour"),
+    ("real", "residual", "distance of the pixel's points from their plane, in footprints"),
+)
+FACET = _carried(
+    "facet",
+    "One of the normals over which shading is averaged.",
+    ("vec", "normal", ""),
+    ("real", "weight", ""),
+)
+PATH = _carried(
+    "path",
+    "A path after a bounce.",
+    ("vec", "origin", ""),
+    ("vec", "direction", ""),
+    ("real", "footprint", ""),
+    ("real", "spread", ""),
+    ("real", "on_path", "whether it goes on"),
+    ("color", "through", "part of what comes next that reaches the eye"),
+    ("color", "seen", "light so far"),
+)
+# What a path of light carries from a spot to the next, in three slices, of which a scene may not need the last ones.
+ASKED_LIGHT = _carried(
+    "asked_light",
+    "What a path awaits of the lights at its last spot.",
+    ("color", "awaited", "what one brings, if nothing is in the way of the ray that asks for it"),
+    (
+        "real",
+        "density",
+        "per steradian, of the path's direction; below 0 where lights were not asked for at all",
+    ),
+    ("real", "total", "what all lights weighed at the spot"),
+)
+WITHIN = _carried(
+    "within",
+    "The glass that a path is in.",
+    ("real", "medium", "by the number of its body, see media.h; 0: the open"),
+    ("real", "under", "the glass that this one stands in likewise"),
+    ("real", "wave", "the path's place in the spectrum; below 0 while it has all colours"),
+    ("color", "extinction", "what the medium absorbs and scatters, per unit of the way"),
+)
+FLIGHT = _carried(
+    "flight",
+    "The flight of a path through what scatters light.",
+    ("color", "scatters", "the part of the extinction that is scattered"),
+    ("real", "anisotropy", "of that, Henyey and Greenstein's g"),
+    ("real", "flight", "how far the path goes until it is scattered, if nothing is nearer"),
+    ("real", "seed_low", "32 random bits for a walk of its own, as two whole numbers ..."),
+    ("real", "seed_high", "... of which this is the higher one"),
+)
+SLICES = (ASKED_LIGHT, WITHIN, FLIGHT)
+CARRIED = Carried(
+    "carried",
+    "What a path of light carries from a spot to the next.",
+    tuple(member for each in SLICES for member in each.members),
+)
+FACE = _carried(
+    "plane_face",
+    "Where a plane opens the set on the way to the next spot.",
+    ("real", "number", "as a thing, or 0"),
+    ("real", "t", "distance along the ray, scene units"),
+    ("real", "count", "escape count"),
+    ("color", "tint", ""),
+    ("vec", "normal", ""),
+)
+LAYERS = _carried(
+    "plane_layers",
+    "What planes add to a picture. In front of the object: light, and the part that comes through; behind it the same.",
+    ("color", "front", ""),
+    ("color", "behind", ""),
+    ("real", "front_through", ""),
+    ("real", "behind_through", ""),
+    (
+        "real",
+        "nearest",
+        "the nearest plane that is seen well, along the ray; the largest number if there is none",
+    ),
+    ("vec", "normal", ""),
+    ("vec", "point", ""),
+    ("real", "count", "escape count"),
+)
+GLANCE = _carried(
+    "glance",
+    "What a shot knows of its layers before its end.",
+    ("color", "albedo", "of the first surface"),
+    ("color", "emission", "what the path had seen before any light was reflected ..."),
+    ("color", "once", "... and before any was reflected twice"),
+    ("vec", "normal", "by which the first surface has scattered light"),
+)
+# Sums over a pixel's shots.
+PIXEL = _carried(
+    "pixel",
+    "Sums over the shots of a pixel, and what the one nearest to its middle found.",
+    ("color", "radiance", ""),
+    ("real", "coverage", ""),
+    ("real", "shots", ""),
+    ("real", "brightness", "of each shot, for its noise ..."),
+    ("real", "brightness_square", ""),
+    ("real", "coverage_square", ""),
+    ("real", "nearest", "distance squared of the kept shot from the middle, pixels"),
+    ("real", "depth", "along the view axis, scene units"),
+    ("vec", "normal", ""),
+    ("vec", "point", ""),
+    ("real", "smooth", "escape count"),
+    ("real", "steps", "evaluations"),
+)
+PARTS_OF_LIGHT = _carried(
+    "parts",
+    "What a shot knows of the first surface, and of its light by how often that was reflected; or sums over shots."
+    " Normals count as much as they cover.",
+    ("color", "albedo", ""),
+    ("color", "emission", ""),
+    ("color", "direct", ""),
+    ("color", "indirect", ""),
+    ("vec", "normal", ""),
+)
+MATTES = Carried(
+    "mattes",
+    "Which things a pixel shows. Things that come when all ranks are taken are not noted.",
+    (
+        Member(
+            "real",
+            "pairs",
+            "of each rank a number from 1, or 0: none; the sum of what it covers",
+            2 * MATTE_RANKS,
+        ),
+        Member("real", "nearest", "the number nearest to the pixel's middle"),
+    ),
+)
+TYPES = (
+    TALLY,
+    PIXEL,
+    PARTS_OF_LIGHT,
+    MATTES,
+    AIM,
+    SIGHTING,
+    START,
+    TOUCH,
+    SPOT,
+    FACET,
+    PATH,
+    CARRIED,
+    FACE,
+    LAYERS,
+    GLANCE,
+)
+
+
+def carried_text() -> str:
+    """The declarations of TYPES in C, for inclusion after `color.h`."""
+    slices = [f"#define {each.name.upper()}_NUMBERS {each.numbers}" for each in SLICES]
+    return "\n".join([*slices, *(each.c_text() for each in TYPES)])

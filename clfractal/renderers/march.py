@@ -1,0 +1,196 @@
+"""The settings of the march and of a shot's rays, as kernels read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from clfractal.device.orbit import Record
+from clfractal.device.structs import Field, Precision, Struct
+from clfractal.renderers.environment import PackedEnvironment
+from clfractal.renderers.fineness import Fineness
+from clfractal.renderers.kinds import FEATURES, NORMALS
+from clfractal.renderers.maps import has_bump
+from clfractal.renderers.records import (
+    bounces,
+    environment_weight,
+    firefly_limit,
+    hemisphere_rays,
+    light_rays,
+)
+from clfractal.renderers.set_lights import SetLights, march_fields, single_lights
+from clfractal.renderers.state import PARTS, along_paths, normal_count
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.model import Scene
+
+MARCH = Struct(
+    "March",
+    [
+        Field("bounds_center", "real", 3, "centre of the sphere that holds the set, scene units"),
+        Field("bounds_radius", "real", 0, "its radius, scene units"),
+        Field("set_radius", "real", 0, "of the ball that holds the set, if that is smaller, scene units"),
+        Field("ball_center", "real", 3, "centre of the ball of the scene's own formula, scene units"),
+        Field("ball_radius", "real", 0, "its radius, scene units"),
+        Field("step_scale", "real", 0, "part of a distance that is safe to step"),
+        Field("relaxation", "real", 0, "factor on steps, taken back where spheres do not touch"),
+        Field("detail", "real", 0, "distance that counts as a hit, in footprints of the reference"),
+        Field("near", "real", 0, "scaled distance at which light is computed, in cones"),
+        Field("lands", "int", 0, "whether rays go on from where light is computed to the solid itself"),
+        Field("shadow_lift", "real", 0, "where shadow rays start, in footprints above the surface"),
+        Field("shadow_detail", "real", 0, "hit distance of shadow rays, in footprints over detail"),
+        Field(
+            "cone_margin", "real", 0, "what a block's cone is wider than its rays, in footprints over detail"
+        ),
+        Field("cone_share", "real", 0, "part of a scaled distance that is free for all of a block"),
+        Field("max_steps", "int", 0, "most distance evaluations along a ray"),
+        Field("step", "real", 0, "step of the search by steps, scene units"),
+        Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
+        Field(
+            "point_start",
+            "real",
+            0,
+            "how far before that march's end the points' marches begin, in footprints",
+        ),
+        Field("known_reach", "real", 0, "how far a proved hit proves its neighbours', in a point's cones"),
+        Field("seed", "uint", 0, "chooses the places of points and rays"),
+        Field("bounces", "int", 0, "most mirror reflections, or bounces of a path"),
+        Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
+        Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
+        Field("light_count", "int", 0, "number of lights"),
+        Field("object_count", "int", 0, "number of objects"),
+        Field("light_rays", "int", 0, "most shadow rays that a light has"),
+        Field("set_count", "int", 0, "number of balls of lights on the set"),
+        Field("set_cells", "int", 0, "cells of their probabilities along an edge of their cube"),
+        Field("set_lists", "int", 0, "cells of their lists likewise"),
+        Field("set_rays", "int", 0, "shadow rays of a shot to them"),
+        Field("set_corner", "real", 3, "of their cube, scene units"),
+        Field("set_edge", "real", 0, "its length"),
+        Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
+        Field("map_rays", "int", 0, "rays into the hemisphere, spread like the environment's light"),
+        Field("ambient_far", "real", 0, "how long these rays are, scene units"),
+        Field("occlusion_distance", "real", 0, "how far an obstacle counts as occlusion, scene units"),
+        Field("occlusion_share", "real", 0, "what one ray adds to the open part; 0: no ambient occlusion"),
+        Field("features", "int", 0, "bits FEATURE_"),
+        Field("point_count", "int", 0, "points of a pixel"),
+        Field("point_rows", "int", 0, "rows of their grid; 0: they are stochastic"),
+        Field("normal", "int", 0, "what normals are made of, NORMAL_"),
+        Field("normal_count", "int", 0, "normals over which a pixel's shading is averaged"),
+        Field("geometric", "int", 0, "1: places of a pixel's points matter"),
+        Field("soft_lights", "int", 0, "1: lights have sizes, and shadow rays go to places of them"),
+        Field("state_at", "int", len(PARTS), "where what a pixel carries is kept, STATE_; below 0: not"),
+        Field("firefly_limit", "real", 0, "brightest that mirrored light or the environment's may be"),
+    ],
+)
+
+# In footprints, tuned on spheres (no acne at any angle) and fractals (no light leaking into pores).
+SHADOW_LIFT, SHADOW_DETAIL = 3.0, 0.5
+# Of paths that do not land: light from just above their places counts. These lie where the scaled distance is a part of the
+# scale, so rays that hit at a part of it have no acne.
+FINE_LIFT, FINE_SHADOW = 1.0, 0.3
+# A block's cone is so much wider than its rays, in heights at which light is computed: no ray may begin behind these.
+# And the part of a scaled distance that the cone takes for free.
+CONE_MARGIN, CONE_SHARE = 1.5, 0.8
+# In footprints: a pixel's shared march ends where the set may be this near, half a pixel's diagonal.
+TOUCH = 0.7
+# In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
+KNOWN_REACH = 4.0
+# In footprints: how far before the end of their pixel's march the points begin.
+POINT_START = 0.5
+
+
+def step_scale(scene: Scene) -> float:
+    """How much of a distance is safe to step."""
+    given = scene.surface.step_scale
+    return given if given is not None else scene.chain.step_scale
+
+
+def features_of(scene: Scene) -> int:
+    """What a scene has, as bits of FEATURES."""
+    has = {"fog": scene.fog is not None, "bump": has_bump(scene)}
+    return sum(FEATURES[name] for name, there in has.items() if there)
+
+
+def uses_positions(scene: Scene) -> bool:
+    """Whether normals or colours are made from the places of a pixel's points."""
+    renderer = scene.surface
+    return renderer.used_points.count > 1 and (renderer.normal_of_points or scene.coloring.by == "residual")
+
+
+def march_record(
+    scene: Scene,
+    precision: Precision,
+    divider: int = 1,
+    environment: PackedEnvironment | None = None,
+    on_set: SetLights | None = None,
+    places: Sequence[int] | None = None,
+) -> Record:
+    """The settings of the march, and of the rays that a shot sends.
+
+    A pixel stands for `divider` x `divider` of the picture's.
+
+    Args:
+        places: where what a pixel carries is kept, see `state_places`.
+    """
+    renderer = scene.surface
+    center, radius = scene.bounds
+    occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
+    half = radius / 2
+    distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
+    largest = float(np.finfo(np.float32).max) / 16
+    limit = firefly_limit(scene)
+    points = renderer.used_points.count
+    fineness = Fineness.of(scene, divider)
+    # Points lie all over their pixel, and the march that they share has to be as wide.
+    spread = fineness.pixel if points > 1 else 1.0
+    touch = max(TOUCH * spread / fineness.detail, 1 / math.sqrt(points)) if points > 1 else 1.0
+    near = step_scale(scene) * fineness.near
+    # Points of a pixel stand for each other by their hits; the search by steps has no places before the solid.
+    lands = fineness.lands or points > 1 or renderer.search != "distance"
+    lift, shadow = (SHADOW_LIFT, SHADOW_DETAIL) if lands else (FINE_LIFT, FINE_SHADOW * step_scale(scene))
+    values = {
+        "bounds_center": center,
+        "bounds_radius": radius,
+        "set_radius": min(radius, scene.formula_bounds[1]),
+        "ball_center": scene.chain.center,
+        "ball_radius": scene.chain.radius,
+        "step_scale": step_scale(scene),
+        "relaxation": renderer.over_relaxation,
+        "detail": fineness.detail,
+        "near": near,
+        "lands": int(lands),
+        "shadow_lift": lift * fineness.level,
+        "shadow_detail": shadow * fineness.level / fineness.detail,
+        "cone_margin": max(CONE_MARGIN * fineness.near, 1.5 * touch),
+        "cone_share": CONE_SHARE,
+        "max_steps": renderer.max_steps,
+        "step": renderer.step if renderer.step is not None else radius / 100,
+        "touch_share": touch,
+        # The search by steps begins at the eye, and goes both ways from the touch.
+        "point_start": POINT_START * spread if renderer.search == "distance" else largest,
+        "known_reach": KNOWN_REACH * spread / fineness.detail,
+        "seed": renderer.seed,
+        "bounces": bounces(scene),
+        "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,
+        "environment_weight": environment_weight(scene, environment),
+        "light_count": len(single_lights(scene)),
+        **march_fields(on_set),
+        "object_count": len(scene.objects),
+        "light_rays": light_rays(scene),
+        "cosine_rays": rays.cosine,
+        "map_rays": rays.map,
+        "ambient_far": distance if not rays.lit else largest,
+        "occlusion_distance": distance,
+        "occlusion_share": 1 / rays.cosine if occlusion is not None and rays.cosine else 0.0,
+        "features": features_of(scene),
+        "point_count": points,
+        "point_rows": math.isqrt(points) if renderer.used_points.pattern == "grid" else 0,
+        "normal": NORMALS[renderer.normal if renderer.normal_of_points else "gradient"],
+        "normal_count": normal_count(scene),
+        "geometric": int(uses_positions(scene)),
+        "soft_lights": int(not along_paths(scene) and any(light.has_size for light in single_lights(scene))),
+        "state_at": [-1] * len(PARTS) if places is None else places,
+        "firefly_limit": largest if limit is None else min(limit, largest),
+    }
+    return MARCH.value(precision, values)

@@ -1,0 +1,111 @@
+"""Where the pixels of a wave keep what they carry from stage to stage: what is kept, and who needs it.
+
+`kernels/state.h` keeps and recalls it by the names of PARTS. Where it is kept is data of a launch, so that programs know
+nothing of what a scene has, and what that does not need takes no memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import accumulate
+
+from clfractal.renderers.carried import (
+    AIM,
+    ASKED_LIGHT,
+    FACE,
+    FACET,
+    FLIGHT,
+    GLANCE,
+    LAYERS,
+    MATTES,
+    PARTS_OF_LIGHT,
+    PATH,
+    PIXEL,
+    SIGHTING,
+    SPOT,
+    START,
+    TALLY,
+    TOUCH,
+    WITHIN,
+)
+from clfractal.renderers.maps import asked_maps, bump_numbers, has_cloudy_glass, has_glass
+from clfractal.renderers.passes import has_mattes, has_parts
+from clfractal.renderers.plan import Plan
+from clfractal.renderers.planes import has_faces
+from clfractal.renderers.records import bounces
+from clfractal.renderers.waves import air_turns, has_cones
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.model import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Something of the state: numbers of one, and how many a scene needs."""
+
+    name: str
+    numbers: int
+    many: Callable[[Scene, Plan], int]
+
+
+def along_paths(scene: Scene) -> bool:
+    """Whether light is followed along paths."""
+    return isinstance(scene.lighting, PathLighting)
+
+
+def _goes_on(scene: Scene) -> bool:
+    return along_paths(scene) or bounces(scene) > 0
+
+
+def normal_count(scene: Scene) -> int:
+    """Normals over which a pixel's shading is averaged."""
+    renderer = scene.surface
+    if not renderer.normal_of_points:
+        return renderer.used_points.count
+    return 8 if renderer.normal == "eight_triangles_shading" else 1
+
+
+PARTS = (
+    Part("AIM", AIM.numbers, lambda scene, plan: 1),
+    Part("SIGHTING", SIGHTING.numbers, lambda scene, plan: 1),
+    Part("TALLY", TALLY.numbers, lambda scene, plan: 1),
+    Part("SUMS", PIXEL.numbers, lambda scene, plan: 1),
+    Part("START", START.numbers, lambda scene, plan: int(has_cones(scene, plan))),
+    Part("TOUCH", TOUCH.numbers, lambda scene, plan: int(scene.surface.used_points.count > 1)),
+    # The first spot, and the one after the last bounce.
+    Part("SPOT", SPOT.numbers, lambda scene, plan: 1 + _goes_on(scene)),
+    Part("FACET", FACET.numbers, lambda scene, plan: normal_count(scene) if normal_count(scene) > 1 else 0),
+    Part("PATH", PATH.numbers, lambda scene, plan: int(_goes_on(scene))),
+    Part("ASKED_LIGHT", ASKED_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),
+    Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
+    Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_cloudy_glass(scene))),
+    Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0)),
+    Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
+    # What the formula was asked for the present spot's material; and the same around it, with the normal and escape count
+    # there, for the slopes of its material's relief (`kernels/bump_places.h`).
+    Part("ASKED", 1, lambda scene, plan: len(asked_maps(scene))),
+    Part("BESIDE", 1, lambda scene, plan: bump_numbers(scene)),
+    Part("FACE", FACE.numbers, lambda scene, plan: int(has_faces(scene))),
+    Part("LAYERS", LAYERS.numbers, lambda scene, plan: int(bool(scene.cut_planes))),
+    Part("GLANCE", GLANCE.numbers, lambda scene, plan: int(has_parts(plan))),
+    Part("PARTS", PARTS_OF_LIGHT.numbers, lambda scene, plan: int(has_parts(plan))),
+    Part("MATTES", MATTES.numbers, lambda scene, plan: int(has_mattes(plan))),
+)
+
+
+def state_places(scene: Scene, plan: Plan) -> list[int]:
+    """For each of PARTS the first of its numbers among those of a pixel; -1 where the scene needs none."""
+    counts = [part.many(scene, plan) * part.numbers for part in PARTS]
+    return [
+        first if count else -1 for first, count in zip(accumulate(counts, initial=0), counts, strict=False)
+    ]
+
+
+def state_numbers(scene: Scene, plan: Plan) -> int:
+    """Numbers of a pixel that are kept between stages."""
+    return sum(part.many(scene, plan) * part.numbers for part in PARTS)
+
+
+def state_text() -> str:
+    """The numbers of PARTS, for C."""
+    return "".join(f"#define STATE_{part.name} {number}\n" for number, part in enumerate(PARTS))
