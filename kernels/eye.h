@@ -90,7 +90,6 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     return r;
 }
 
-#if HAS_PATHS
 // Whether all paths of a packet ended at an earlier spot, and no light that they asked for is awaited: nothing is left to do for them.
 // (What is kept says so from the second bounce on, and rays that are not sent stay so.)
 INLINE int paths_are_over(stage s) {
@@ -104,4 +103,3 @@ INLINE int paths_are_over(stage s) {
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));
     return !any_lane(left);
 }
-#endif

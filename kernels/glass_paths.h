@@ -16,17 +16,6 @@ INLINE color spectrum_at(real place, real *bend, __global const float *table) {
     return color_of(lanes_load(found + LANES), lanes_load(found + 2 * LANES), lanes_load(found + 3 * LANES));
 }
 
-#if HAS_SUBSURFACE
-// Whether a path comes from below the boundary of a spot, which it then leaves as if it were seen from outside, straight on.
-INLINE mask path_emerges(int bounce, const carried *with, const spot *here, world w) {
-    real body = set_body(w);
-#if HAS_OBJECTS
-    body = pick(of_the_set(here->object, w), body, here->object);
-#endif
-    return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);
-}
-#endif
-
 // The material as a path meets it, from inside or not: for glass that spreads colours, at the path's wavelength, or at one that it
 // takes if it is refracted now, `wave` in (0, 1), which then is the path's; the result is what it weighs then. The index by Cauchy's
 // equation n = a + b / wavelength^2, and over that of the glass around.

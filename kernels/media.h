@@ -187,3 +187,14 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
     found.hidden = glass & less(found.body, found.around);
     return found;
 }
+
+#if HAS_SUBSURFACE
+// Whether a path comes from below the boundary of a spot, which it then leaves as if it were seen from outside, straight on.
+INLINE mask path_emerges(int bounce, const carried *with, const spot *here, world w) {
+    real body = set_body(w);
+#if HAS_OBJECTS
+    body = pick(of_the_set(here->object, w), body, here->object);
+#endif
+    return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);
+}
+#endif

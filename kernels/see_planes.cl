@@ -60,7 +60,7 @@ STAGE(find_planes) {
     const ray r = eye_ray(&a, view);
     const real way = vec_dot(vec_sub(found.seen, r.origin), r.direction);
     const real object = pick(mask_of(found.found), way, (real)(REAL_LARGEST));
-    const real hidden = HAS_PATHS ? plane_of_face(found.object) : R(-1.0);
+    const real hidden = HAS(w, PATHS) ? plane_of_face(found.object) : R(-1.0);
     const plane_layers layers = planes_seen(r, object, hidden, mask_of(a.wanted), w.planes);
     STATE_KEEP(s, layers, STATE_LAYERS);
 }

@@ -108,7 +108,7 @@ def step_scale(scene: Scene) -> float:
 
 def features_of(scene: Scene) -> int:
     """What a scene has, as bits of FEATURES."""
-    has = {"fog": scene.fog is not None, "bump": has_bump(scene)}
+    has = {"fog": scene.fog is not None, "bump": has_bump(scene), "paths": along_paths(scene)}
     return sum(FEATURES[name] for name, there in has.items() if there)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -45,7 +45,6 @@ from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
     face_defines,
-    has_faces,
     plane_count,
     plane_defines,
     plane_palettes,
@@ -55,10 +54,6 @@ from clfractal.renderers.scattering import albedo_tables
 from clfractal.renderers.set_lights import set_light_data, set_lights_of
 from clfractal.renderers.state import state_numbers, state_places, state_text
 from clfractal.renderers.waves import (
-    asks_formula,
-    has_cones,
-    inside_kernels,
-    march_kernels,
     most_turns,
     surface_stages,
 )
@@ -115,14 +110,6 @@ def several_points(scene: Scene) -> int:
     return min(scene.surface.used_points.count, 2)
 
 
-def feature_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """What is done with what the search finds, as far as the text of `kernels/surface.cl` depends on it."""
-    return {
-        **state_defines(scene, plan),
-        **(scattering_defines() if isinstance(scene.lighting, PathLighting) else {}),
-    }
-
-
 def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """The defines of all programs that read what is kept between stages (`kernels/state.h`)."""
     return {
@@ -134,7 +121,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         **face_defines(scene),
         **object_defines(scene),
         **Body.of(scene).defines,
-        "HAS_PATHS": int(isinstance(scene.lighting, PathLighting)),
         **map_defines(scene),
         "HAS_GLASS": int(has_glass(scene)),
         "HAS_GLASS_SET": int(has_glass_set(scene)),
@@ -142,6 +128,21 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         **({"HAS_SUBSURFACE": 1} if has_subsurface(scene) else {}),
         "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
     }
+
+
+def path_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The defines of stages of paths."""
+    return {**state_defines(scene, plan), **scattering_defines()}
+
+
+def color_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The defines of `kernels/color_spots.cl`, for which planes are nothing."""
+    return {**state_defines(scene, plan), "PLANES": 0}
+
+
+def face_and_plane_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The defines of `kernels/see_planes.cl`."""
+    return {**state_defines(scene, plan), **plane_defines(scene)}
 
 
 class SurfaceKernel(TileKernel):
@@ -221,55 +222,45 @@ class SurfaceKernel(TileKernel):
         )
 
 
-def light_kernels(scene: Scene) -> tuple[str, ...]:
-    """The kernels that gather the light of spots."""
-    return (
-        ("scatter_paths", "gather_paths", "end_paths")
-        if isinstance(scene.lighting, PathLighting)
-        else ("light_spots",)
-    )
+# Of each program its name, its entry point, the kernels that it may have, and the defines of its text. A scene needs those
+# whose stages it launches.
+_PROGRAMS: tuple[tuple[str, str, tuple[str, ...], Callable[[Scene, Plan], dict[str, object]]], ...] = (
+    ("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines),
+    ("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
+    ("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
+    ("spots", "find_spots.cl", ("find_spots",), state_defines),
+    ("light", "light_spots.cl", ("light_spots",), state_defines),
+    ("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
+    ("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
+    ("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines),
+    ("colors", "color_spots.cl", ("color_spots",), color_defines),
+    ("glow", "glow.cl", ("add_glow",), state_defines),
+    ("planes", "see_planes.cl", ("find_faces", "find_planes"), face_and_plane_defines),
+)
 
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
-    """The texts of the scene's programs: those that know the formula, and the one that knows the scene's features."""
+    """The texts of the programs whose stages the scene launches."""
+    body = Body.of(scene)
     structs = {
         "structs.h": struct_text() + CUT_PLANE.c_text(),
         "carried.h": carried_text() + state_text(),
         "pbr.h": pbr_text(),
     }
-
-    def text(name: str, entry: str, defines: dict[str, object], *kernels: str) -> ProgramText:
+    launched = {stage.kernel for stage in surface_stages(scene, plan, (0, 1))}
+    texts = []
+    for name, entry, kernels, defines_of in _PROGRAMS:
+        wanted = tuple(kernel for kernel in kernels if kernel in launched)
+        if not wanted:
+            continue
+        defines = defines_of(scene, plan)
         files = [
             *(("trap_near.h",) if entry in _ASK_TRAPS else ()),
             *(("escape.h",) if "ESCAPE_COLORS" in defines else ()),
         ]
-        turns = escape_defines if "escape.h" in files else None
-        generated = {**Body.of(scene).texts(files=files, defines=turns), **structs}
-        return ProgramText(name, flat_text(entry, generated=generated, defines=defines), kernels)
-
-    points = ("send_points", "join_points") if scene.surface.used_points.count > 1 else ()
-    texts = [
-        text("rays", "march.cl", search_defines(scene, plan), *march_kernels(plan)),
-        text(
-            "surface",
-            "surface.cl",
-            feature_defines(scene, plan),
-            *(("send_cones",) if has_cones(scene, plan) else ()),
-            "begin_shots",
-            *points,
-            "find_spots",
-            *light_kernels(scene),
-        ),
-    ]
-    if has_glass_set(scene):
-        texts.append(text("glass", "glass.cl", inside_defines(scene, plan), *inside_kernels(plan)))
-    if asks_formula(scene):
-        colors = {**state_defines(scene, plan), "PLANES": 0}
-        texts.append(text("colors", "color_spots.cl", colors, "color_spots"))
-    if scene.glow is not None:
-        texts.append(text("glow", "glow.cl", state_defines(scene, plan), "add_glow"))
-    if scene.cut_planes:
-        planes = {**state_defines(scene, plan), **plane_defines(scene)}
-        faces = ("find_faces",) if has_faces(scene) else ()
-        texts.append(text("planes", "see_planes.cl", planes, *faces, "find_planes"))
+        generated = {
+            **body.texts(files=files, defines=escape_defines if "escape.h" in files else None),
+            **structs,
+        }
+        texts.append(ProgramText(name, flat_text(entry, generated=generated, defines=defines), wanted))
     return texts

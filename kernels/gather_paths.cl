@@ -1,0 +1,81 @@
+// Entry points: what lights have brought to paths, where these go on, and their ends. They know no formula.
+#include "path_stages.h"
+
+// Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
+STAGE(gather_paths) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    if (paths_are_over(s)) return;
+    const world w = WORLD;
+    path so_far;
+    carried with;
+    STATE_RECALL(s, so_far, STATE_PATH);
+    with = carried_kept(s);
+    tally cost;
+    STATE_RECALL(s, cost, STATE_TALLY);
+    const encounter answer = queue_met(s.q, 0, s.slot);
+    tally_met(&cost, answer, 0);
+    so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
+    if (bounce == 0 && KEEPS(s, STATE_AIR)) {
+        const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+        const spot found = spot_kept(s, 0);
+        air_gather(s, &here.at, aim_kept(s), &found, 1, &cost, w);
+    }
+    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, so_far, STATE_PATH);
+    real far = (real)(REAL_LARGEST);
+#if HAS_GLASS_SCATTER && HAS_OBJECTS
+    far = pick(equal(body_of(with.medium), set_body(w)), far, flight_sought(&so_far, &with, w));
+#endif
+    const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
+#if HAS_GLASS_SET
+    const mask within = equal(body_of(with.medium), set_body(w));
+    send_clipped(s, 1, r, R(0.0), WHICH, mask_of(so_far.on_path) & within, w);
+    so_far.on_path = pick(within, R(0.0), so_far.on_path);
+#endif
+    send_clipped(s, 0, r, R(0.0), WHICH, mask_of(so_far.on_path), w);
+}
+
+// Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would
+// have a part of its weight.
+STAGE(end_paths) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const aim a = aim_kept(s);
+    path so_far;
+    carried with;
+    tally cost;
+    STATE_RECALL(s, so_far, STATE_PATH);
+    with = carried_kept(s);
+    STATE_RECALL(s, cost, STATE_TALLY);
+    const encounter last = queue_met(s.q, 0, s.slot);
+    tally_met(&cost, last, 0);
+    mask on_path = mask_of(so_far.on_path);
+#if HAS_GLASS_SET
+    on_path &= ~equal(body_of(with.medium), set_body(w));
+#endif
+    real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
+    lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
+    before.met &= on_path;
+#if HAS_CLOUDS
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+    const cloud_place cloud = path_meets_clouds(s, &here.at, &so_far, so_far.origin, so_far.direction, &far, on_path, w);
+#endif
+#if HAS_GLASS
+    const mask scatters = path_crosses_medium(&so_far, &with, far, on_path, w);
+    on_path &= ~scatters;
+    before.met &= ~scatters;
+#endif
+#if HAS_CLOUDS
+    on_path &= ~cloud.met;
+    before.met &= ~cloud.met;
+#endif
+    path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
+#if HAS_EMITTERS
+    path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
+#endif
+    if (bounce == 1 && KEEPS(s, STATE_GLANCE)) glance_once(s, so_far.seen);
+    const spot first_spot = spot_kept(s, 0);
+    end_shots(s, a, so_far.seen, &first_spot, cost, w);
+}

@@ -1,0 +1,50 @@
+// Entry point: the light of spots by Phong's model. It knows no formula.
+#include "stages.h"
+#include "environment.h"
+#include "sky.h"
+#include "phase.h"
+#include "spot.h"
+#include "light_places.h"
+#include "secondary.h"
+#include "fog.h"
+#include "air.h"
+#include "look.h"
+#include "lit.h"
+#include "shots.h"
+
+// Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
+STAGE(light_spots) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const aim a = aim_kept(s);
+    spot found = spot_kept(s, bounce);
+    tally cost;
+    STATE_RECALL(s, cost, STATE_TALLY);
+    path so_far;
+    const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
+    const vec direction = arrived.direction;
+    if (bounce == 0 && KEEPS(s, STATE_AIR)) {
+        const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+        air_gather(s, &here.at, a, &found, turns_for_light(w), &cost, w);
+    }
+    path_meets_light(s, &so_far, &found, arrived, w);
+    color gathered = color_of(R(0.0), R(0.0), R(0.0));
+    if (any_lane(mask_of(found.found))) {
+        if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
+        gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
+        gathered = color_pick(on_face(&found), found.tint, gathered);
+    }
+    if (bounce == 0 && KEEPS(s, STATE_GLANCE)) {
+        glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
+    }
+    const int last = bounce == settings->bounces;
+    const color mirrored = color_pick(on_face(&found), color_of(R(0.0), R(0.0), R(0.0)), mirrored_at(&found, direction, w));
+    path_add(s, &so_far, direction, a.y, &found, gathered, mirrored, last, w);
+    if (!last) {
+        STATE_KEEP(s, cost, STATE_TALLY);
+        path_mirror(s, &so_far, direction, eye_ray(&a, view), a.time, &found, mirrored, w);
+        return;
+    }
+    end_shots(s, a, so_far.seen, &found, cost, w);
+}

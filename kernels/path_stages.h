@@ -1,0 +1,22 @@
+// What the stages of paths include.
+#include "stages.h"
+#include "environment.h"
+#include "sky.h"
+#include "phase.h"
+#include "spot.h"
+#include "light_places.h"
+#include "secondary.h"
+#include "fog.h"
+#include "air.h"
+#include "look.h"
+#include "lit.h"
+#include "shots.h"
+#include "bsdf.h"
+#include "bsdf_bumped.h"
+#include "material_at.h"
+#include "lights.h"
+#if HAS_GLASS
+#include "glass_paths.h"
+#endif
+#include "light_asks.h"
+#include "path_steps.h"

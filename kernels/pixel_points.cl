@@ -1,0 +1,52 @@
+// Entry points: the points of a pixel, where it has several. They know no formula.
+#include "stages.h"
+#include "normals.h"
+#include "spot.h"
+#include "pixel_points.h"
+
+// Sends the rays of a pixel's points, from where its cone touched.
+STAGE(send_points) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+    const aim a = aim_kept(s);
+    const encounter end_of_cone = queue_met(s.q, 0, s.slot);
+    tally cost;
+    STATE_RECALL(s, cost, STATE_TALLY);
+    tally_met(&cost, end_of_cone, 0);
+    cost.bad += end_of_cone.bad;
+    const touch touched = {end_of_cone.hit, end_of_cone.t};
+    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, touched, STATE_TOUCH);
+    points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
+}
+
+// Makes spots of what a pixel's points have met.
+STAGE(join_points) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    const world w = WORLD;
+    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+    const aim a = aim_kept(s);
+    tally cost;
+    touch touched;
+    STATE_RECALL(s, cost, STATE_TALLY);
+    STATE_RECALL(s, touched, STATE_TOUCH);
+    sighting at_first = {R(0.0), cost.steps};
+    pixel_points points = points_begin(eye_ray(&a, view), a.time, touched, points_seed(&here.at, sample, w), w);
+    for (int turn = 0; turn < settings->point_count; ++turn) {
+        const ray r = queue_ray(s.q, turn, s.slot);
+        real object;
+        vec place;
+        const encounter met = surface_met(s, turn, r, &object, &place, w);
+        tally_met(&cost, met, 1);
+        at_first.steps += met.steps;
+        points_add(s, &points, turn, r, met, object, place, w);
+    }
+    at_first.coverage = points.count * (R(1.0) / (real)((scalar)settings->point_count));
+    const spot found = points_spot(s, &points, w);
+    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, at_first, STATE_SIGHTING);
+    spot_keep(s, &found, 0);
+}
