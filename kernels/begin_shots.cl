@@ -32,12 +32,10 @@ STAGE(begin_shots) {
     ray r = eye_ray(&a, view);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
-#if HAS_OBJECTS
     // A pixel's points look for objects on their own rays.
     if (settings->point_count > 1) {
         send_past_objects(s, 0, r, begin.t, mask_of(a.wanted), w);
         return;
     }
-#endif
     send_clipped(s, 0, r, begin.t, WHICH, mask_of(a.wanted), w);
 }

@@ -3,12 +3,10 @@
 // The number of an object's material, or the set's.
 INLINE real object_material(real object, world w) {
     real number = (real)((scalar)SET_MATERIAL);
-#if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask there = equal(object, (real)((scalar)(i + 1)));
         number = pick(there, (real)((scalar)w.objects[i].material), number);
     }
-#endif
     return number;
 }
 
@@ -18,12 +16,9 @@ INLINE real spot_material(const spot *here, world w) { return object_material(he
 INLINE real material_share(const spot *here, int number, world w) {
     const real found = (real)((scalar)number);
     const real own = pick(equal(spot_material(here, w), found), R(1.0), R(0.0));
-#if JOINS_SMOOTHLY
+    if (!any_lane(less(R(0.0), here->share))) return own;
     const real other = pick(equal(object_material(here->other, w), found), R(1.0), R(0.0));
     return own + here->share * (other - own);
-#else
-    return own;
-#endif
 }
 
 #if HAS_BUMP
@@ -34,13 +29,12 @@ INLINE real bump_width(const spot *here, world w) {
 #if MATERIALS > 1
     const real root = spot_material(here, w);
     for (int i = 1; i < MATERIALS; ++i) width = pick(equal(root, (real)((scalar)i)), (real)(w.materials[i].bump_width), width);
-#if JOINS_SMOOTHLY
     // Where two flow together, as either of them has.
     for (int i = 0; i < MATERIALS; ++i) {
+        if (!any_lane(less(R(0.0), here->share))) break;
         const mask has = less(R(0.0), material_share(here, i, w));
         width = pick(has, fmax(width, (real)(w.materials[i].bump_width)), width);
     }
-#endif
 #endif
     return pick(less(width, R(0.0)) | on_face(here), R(-1.0), fmax(width, here->cone));
 }

@@ -83,7 +83,6 @@ CALLED real clouds_passed(const vec *origin, const vec *direction, real far, mas
     return through;
 }
 
-#if CLOUDS_SHINE
 #define SHINING_APART R(2.0)   // sides of a voxel between places where a ray looks for light, at most
 #define MOST_SHINING 1024      // such places of a ray in one cloud
 
@@ -110,7 +109,6 @@ CALLED color clouds_shine(const vec *origin, const vec *direction, real far, mas
     }
     return sum;
 }
-#endif
 
 // The numbers of a path's ray: where it is scattered on it, what comes through to a light, what shines on it.
 #define CLOUD_MEETS 0x40000000u
@@ -126,12 +124,11 @@ INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_
     stream numbers = cloud_stream(s, at, CLOUD_MEETS, w);
     const cloud_place found = clouds_met(&origin, &direction, *far, here, &numbers, w);
     *far = pick(found.met, found.t, *far);
-#if CLOUDS_SHINE
+    if (!HAS(w, SHINING_CLOUDS)) return found;
     numbers = cloud_stream(s, at, CLOUD_SHINES, w);
     color more = color_mul(clouds_shine(&origin, &direction, *far, here, &numbers, w), so_far->through);
     if (s.bounce > 0) more = limited(more, w.settings);
     so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
-#endif
     return found;
 }
 

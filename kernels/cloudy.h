@@ -11,7 +11,6 @@ INLINE void path_sets_out(stage s, const packet_pixels *at, const path *so_far, 
     flight_begins(with, so_far->through, u, choice, here);
 }
 
-#if HAS_OBJECTS
 // How far a ray is marched for a flight: a surface just before its end is found some footprints beyond it.
 INLINE real flight_sought(const path *so_far, const carried *with, world w) {
     const real cone = (real)(w.settings->detail) * (so_far->footprint + so_far->spread * with->flight);
@@ -33,7 +32,7 @@ INLINE mask flight_is_free(const path *so_far, const carried *with, mask here, w
     if (!any_lane(here)) return here;
     ray r = {so_far->origin, so_far->direction, R(0.0), with->flight, so_far->footprint, so_far->spread, RAY_NOTHING_KNOWN};
     real number, far = with->flight;
-    here &= less(with->flight, objects_met(&r, w.objects, w.planes.planes, w.settings->object_count, w.tables, &number));
+    here &= less(with->flight, objects_met(&r, w.objects, w.planes, w.settings->object_count, w.tables, &number));
     here &= ~lamp_met(r.origin, r.direction, 0, &far, w).met;
     return here & ~ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
 }
@@ -60,12 +59,10 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
         path_sets_out(s, at, so_far, with, PURPOSE_FLIGHT + NEXT_BOUNCE + more, here, w);
     }
 }
-#endif
 
 // Follows paths that an object's medium `scatters` on their way: what they were when they arrived is `flown` and `within`.
 INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, carried *with, path flown, carried within, ray arrived,
                                mask scatters, world w) {
-#if HAS_OBJECTS
     if (!any_lane(scatters)) return;
     flown.origin = arrived.origin;
     flown.direction = arrived.direction;
@@ -76,5 +73,4 @@ INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, c
     path_scatters(s, at, &flown, &within, scatters, w);
     *so_far = path_pick(scatters, flown, *so_far);
     *with = carried_pick(scatters, within, *with);
-#endif
 }

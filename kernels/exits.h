@@ -3,8 +3,8 @@
 #define EXIT_GRAZES R(0.05)   // least cosine of a ray with the normal where it leaves the set
 
 // The rays within: each pixel's second one.
-INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride) {
-    const queue q = {rays + wave, met + wave, wave, 1, stride};
+INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride, __constant const struct March *settings) {
+    const queue q = {rays + wave, met + wave, wave, 1, stride, settings->met_numbers, HAS_GLASS_SCATTER ? settings->meets_objects : 0};
     return q;
 }
 
@@ -14,9 +14,7 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
                         __constant const scalar *k) {
     encounter e = queue_met(q, 0, at);
     mask hit = mask_of(e.hit);
-#if HAS_OBJECTS
     hit &= ~less(R(0.0), queue_object(q, 0, at, e));
-#endif
     if (!any_lane(hit)) return;
     ray r = queue_ray(q, 0, at);
     r.footprint += r.spread * e.t;
@@ -37,6 +35,5 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
     e.normal = vec_pick(less(facing, EXIT_GRAZES), turned, e.normal);
     e.touch = beyond - e.touch;
     e.t = t;
-    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,
-                 q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
+    encounter_keep_surface(q, at, &e);
 }

@@ -4,11 +4,9 @@
 // Whether a surface is one that marches find: of the set or a part of it, and not of an object beside it.
 INLINE mask of_the_set(real object, world w) {
     mask found = equal(object, R(0.0));
-#if SOLIDS > 1
     for (int i = 0; i < w.settings->object_count; ++i) {
         if (w.objects[i].kind == OBJECT_JOINED) found |= equal(object, (real)((scalar)(i + 1)));
     }
-#endif
     return found;
 }
 
@@ -51,30 +49,27 @@ INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world 
 #define WHICH R(0.0)
 #define WHETHER ((real)(REAL_LARGEST))
 
-// Sends a ray for all that it may meet. The march ends at the nearest object, and is left out where that is nearer than `enough`.
+// Sends a ray for all that it may meet. Its march ends at the nearest object, and is left out where that is nearer than `enough`: see
+// `meet_objects`.
 INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask wanted, world w) {
-#if HAS_OBJECTS
-    real number = R(0.0), met = (real)(REAL_LARGEST);
-    __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
-    if (any_lane(wanted)) {
-        const real nearest = objects_met(&r, w.objects, w.planes.planes, w.settings->object_count, w.tables, &number);
-        met = pick(wanted, nearest, met);
+    if (s.q.objects) {
+        __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
+        lanes_store(pick(wanted, r.far, R(-1.0)), at + RAY_OBJECT * s.q.stride);
+        lanes_store(OBJECT_AWAITED, at + RAY_OBJECT_NUMBER * s.q.stride);
+        lanes_store(enough, at + RAY_OBJECT_PLACE * s.q.stride);
     }
-    lanes_store(met, at + RAY_OBJECT * s.q.stride);
-    lanes_store(number, at + RAY_OBJECT_NUMBER * s.q.stride);
-    r.far = fmin(r.far, met);
-    wanted &= less_equal(enough, met);
-#endif
     send_to_set(s, turn, r, free, wanted, w);
 }
 
-#if HAS_OBJECTS
 // Sends a ray that looks for the set alone.
 INLINE void send_past_objects(stage s, int turn, ray r, real free, mask wanted, world w) {
-    lanes_store((real)(REAL_LARGEST), s.q.rays + RAY_OBJECT * s.q.stride + turn * s.q.wave + s.slot);
+    if (s.q.objects) {
+        __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
+        lanes_store((real)(REAL_LARGEST), at + RAY_OBJECT * s.q.stride);
+        lanes_store(R(0.0), at + RAY_OBJECT_NUMBER * s.q.stride);
+    }
     send_to_set(s, turn, r, free, wanted, w);
 }
-#endif
 
 // The ray that finds the next spot: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
 INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {

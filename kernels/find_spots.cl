@@ -40,9 +40,7 @@ STAGE(find_spots) {
         at_first.steps = met.steps;
         found = spot_of_ray(r, met, object, place, w);
     }
-#if HAS_FACES
-    at_first.coverage = pick(spot_on_face(s, r, &found, w), R(1.0), at_first.coverage);
-#endif
+    if (KEEPS(s, STATE_FACE)) at_first.coverage = pick(spot_on_face(s, r, &found, w), R(1.0), at_first.coverage);
     if (bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
     STATE_KEEP(s, cost, STATE_TALLY);
     found.found = pick(mask_of(so_far.on_path), found.found, R(0.0));

@@ -24,7 +24,7 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
-#if HAS_GLASS_SCATTER && HAS_OBJECTS
+#if HAS_GLASS_SCATTER
     far = pick(equal(body_of(with.medium), set_body(w)), far, flight_sought(&so_far, &with, w));
 #endif
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};

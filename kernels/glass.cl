@@ -31,7 +31,7 @@
 #endif
 
 STAGE(march_inside) {
-    const queue q = inside_of(rays, met, wave, queue_stride);
+    const queue q = inside_of(rays, met, wave, queue_stride, settings);
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next >= mine.end || WAS_CANCELLED) return;
 #if HAS_GLASS_SCATTER
@@ -47,7 +47,7 @@ STAGE(march_inside) {
 
 #if LANES == 1
 STAGE(look_inside_set) {
-    const queue q = inside_of(rays, met, wave, queue_stride);
+    const queue q = inside_of(rays, met, wave, queue_stride, settings);
     const int at = ITEM;
     if (at < q.turns * q.wave && !WAS_CANCELLED) look_inside(q, at, settings, orbit, k);
 }

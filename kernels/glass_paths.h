@@ -97,14 +97,10 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     so_far->through = color_pick(over, so_far->through, color_mul(so_far->through, weights));
     with->wave = pick(over, with->wave, wave);
     vec origin = here->seen;
-#if HAS_OBJECTS
     const mask of_set = of_the_set(here->object, w);
     const real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
     origin = vec_pick(of_set, origin, vec_along(here->point, lift, here->normal));
     so_far->origin = vec_pick(stays_out & of_set, so_far->origin, origin);
-#else
-    so_far->origin = vec_pick(stays_out, so_far->origin, origin);
-#endif
     // Nobody asks for light that reaches a spot through its own body.
     with->density = pick(stays_out & ~edge.hidden, with->density, R(-1.0));
     media_leave(with, edge.body, crosses & edge.leaving);

@@ -6,7 +6,7 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < facet_count(s.bounce, w); ++i) {
         const facet f = facet_of(s, here, i, w);
-        const color one = shaded(here->tint, f.normal, to_viewer, in, lit, open, light, l);
+        const color one = shaded(here->tint, f.normal, to_viewer, in, lit, open, light, l, w);
         sum = color_add(sum, color_scale(one, f.weight));
     }
     return sum;
@@ -60,10 +60,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
         const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l, w);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }
-#if HAS_OBJECTS
-    gathered = color_add(gathered, l.emission);
-#endif
-    return gathered;
+    return color_add(gathered, l.emission);
 }
 
 // The first thing that the eye sees here is a light, or a medium: a spot for depth and coverage, without light of others. `object`: -1
@@ -123,10 +120,8 @@ INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);
     so_far->footprint = here->cone;
     so_far->spread = from_eye.spread + (from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone));
-#if HAS_OBJECTS || HAS_FACES
-    const color left = so_far->through;
-    so_far->on_path = number_of(mask_of(so_far->on_path) & less(R(0.0), fmax(fmax(left.r, left.g), left.b)));
-#endif
+    // What mirrors nothing sends no ray.
+    so_far->on_path = number_of(mask_of(so_far->on_path) & less(R(0.0), brightest(so_far->through)));
     STATE_KEEP(s, *so_far, STATE_PATH);
     ray r = {so_far->origin, so_far->direction, R(0.0), (real)(REAL_LARGEST), so_far->footprint, so_far->spread,
              RAY_NOTHING_KNOWN};

@@ -1,5 +1,4 @@
 // How spots look in Phong's light: by the scene's material, or an object's own (see clfractal/renderers/objects.py).
-#if HAS_OBJECTS
 typedef struct {
     real ambient, diffuse, surround, shininess, sharp;
     color specular, mirror, mirror_edge, emission;
@@ -30,21 +29,20 @@ INLINE look look_of_object(real object, world w) {
 
 INLINE look look_of(const spot *here, world w) {
     look found = look_of_object(here->object, w);
-#if JOINS_SMOOTHLY
     if (!any_lane(less(R(0.0), here->share))) return found;
     const look other = look_of_object(here->other, w);
     for (int i = 0; i < NUMBERS_OF(look); ++i) {
         ((real *)&found)[i] += here->share * (((const real *)&other)[i] - ((real *)&found)[i]);
     }
-#endif
     return found;
 }
 
 INLINE real surround_of(look l) { return l.surround; }
 
-// Eq. 5 with a look. What a light with a size shows in a mirror is its picture there, and no highlight.
+// Eq. 5; beside objects with a look. What a light with a size shows in a mirror is its picture there, and no highlight.
 INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
-                    __constant const struct Light *light, look l) {
+                    __constant const struct Light *light, look l, world w) {
+    if (w.settings->object_count == 0) return phong(surface, normal, to_viewer, in, lit, open, light, w.material);
     const attitude a = attitude_to(in, normal, to_viewer, lit);
     const real diffuse = pick(a.front, l.diffuse * a.facing, R(0.0));
     const mask shines = a.front & less(R(0.0), a.toward_viewer);
@@ -57,29 +55,9 @@ INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask
 
 // The part of the surroundings that a spot mirrors sharply, to a ray that came along `direction` (Schlick 1994).
 INLINE color mirrored_at(const spot *here, vec direction, world w) {
+    const real part = (real)(w.material->reflection);
+    if (w.settings->object_count == 0) return color_of(part, part, part);
     const look l = look_of(here, w);
     const real grazing = clamp(R(1.0) + vec_dot(direction, here->normal), R(0.0), R(1.0)), square = grazing * grazing;
     return color_add(l.mirror, color_scale(l.mirror_edge, square * square * grazing));
 }
-#else
-typedef struct {
-    __constant const struct Material *material;
-} look;
-
-INLINE look look_of(const spot *here, world w) {
-    const look found = {w.material};
-    return found;
-}
-
-INLINE real surround_of(look l) { return (real)(l.material->diffuse); }
-
-INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
-                    __constant const struct Light *light, look l) {
-    return phong(surface, normal, to_viewer, in, lit, open, light, l.material);
-}
-
-INLINE color mirrored_at(const spot *here, vec direction, world w) {
-    const real part = (real)(w.material->reflection);
-    return color_of(part, part, part);
-}
-#endif

@@ -66,7 +66,6 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
     numbers_recall(known, 4, surface_beside_at(s, place), s.stride);
     *normal = vec_of(known[0], known[1], known[2]);
     *smooth = known[3];
-#if HAS_OBJECTS
     const mask beside_set = ~of_the_set(there->object, w);
     if (any_lane(beside_set)) {
         const vec down = vec_scale(there->normal, R(-1.0));
@@ -74,7 +73,6 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
         *normal = vec_pick(beside_set, own, *normal);
         *smooth = pick(beside_set, there->smooth, *smooth);
     }
-#endif
 #endif
 }
 #endif

@@ -23,7 +23,7 @@
 
 // Marches all rays of a queue, each work-item its share.
 STAGE(march_rays) {
-    const queue q = STAGE_QUEUE;
+    const queue q = MARCH_QUEUE;
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next >= mine.end || WAS_CANCELLED) return;
     const int waits = march_share(mine, q, goal, settings, orbit, k);
@@ -34,7 +34,7 @@ STAGE(march_rays) {
 
 #if LANES == 1
 STAGE(look_at_surfaces) {
-    const queue q = STAGE_QUEUE;
+    const queue q = MARCH_QUEUE;
     const int at = ITEM;
     if (at < q.turns * q.wave && !WAS_CANCELLED) look_at(q, at, settings, orbit, k);
 }

@@ -103,7 +103,6 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
 }
 #endif
 
-#if HAS_FACES
 // The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut.
 INLINE void pbr_of_face(const spot *here, pbr *p) {
     const mask face = on_face(here);
@@ -122,12 +121,10 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
     p->subsurface_weight = pick(face, none, p->subsurface_weight);
 #endif
 }
-#endif
 
 // What a path meets at a spot: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
 INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
     pbr p = pbr_at(s, here, w);
-#if JOINS_SMOOTHLY
     if (any_lane(less(R(0.0), here->share))) {
         spot one = *here, other = one;
         const real quantity = is_colored_at_once(w.material) ? here->smooth : here->quantity;
@@ -140,10 +137,7 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
         pbr_add(&mix, pbr_at(s, &other, w), here->share);
         p = pbr_mixed(mix);
     }
-#endif
-#if HAS_FACES
-    pbr_of_face(here, &p);
-#endif
+    if (any_lane(on_face(here))) pbr_of_face(here, &p);
     return p;
 }
 

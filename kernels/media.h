@@ -110,11 +110,9 @@ CALLED medium medium_of(real body, world w) {
     found.anisotropy = R(0.0);
 #endif
     if (!any_lane(less(R(0.0), body))) return found;
-#if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
         medium_of_material(w.objects[i].material, equal(body_of(body), (real)((scalar)(i + 1))), body, &found, w);
     }
-#endif
 #if HAS_GLASS_SET
     medium_of_material(SET_MATERIAL, equal(body_of(body), set_body(w)), body, &found, w);
 #endif
@@ -148,11 +146,9 @@ INLINE void media_found(carried *with, medium found, mask here) {
 INLINE void media_begin(carried *with, vec eye, world w) {
     with->medium = with->under = R(0.0);
     with->wave = R(-1.0);
-#if HAS_OBJECTS
     for (int i = 0; i < w.settings->object_count; ++i) {
         if (w.objects[i].glass == THROUGH) media_enter(with, (real)((scalar)(i + 1)), object_holds(w.objects + i, eye));
     }
-#endif
     media_found(with, medium_of(with->medium, w), less(R(0.0), R(1.0)));
 }
 
@@ -169,7 +165,6 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
     mask glass = less(R(0.0), R(1.0)) & (HAS_GLASS_SET ? ~0 : 0);
     found.body = set_body(w);
     found.leaving = equal(body_of(with->medium), found.body) | equal(body_of(with->under), found.body);
-#if HAS_OBJECTS
     // What is joined to the set is one body with it.
     const mask beside = less(R(0.0), here->object) & ~of_the_set(here->object, w);
     found.body = pick(beside, here->object, found.body);
@@ -182,7 +177,6 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
         // The spot's normal is towards the viewer.
         found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen, w.tables), here->normal), R(0.0));
     }
-#endif
     found.around = pick(equal(body_of(with->medium), found.body), with->under, with->medium);
     found.hidden = glass & less(found.body, found.around);
     return found;
@@ -192,9 +186,7 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
 // Whether a path comes from below the boundary of a spot, which it then leaves as if it were seen from outside, straight on.
 INLINE mask path_emerges(int bounce, const carried *with, const spot *here, world w) {
     real body = set_body(w);
-#if HAS_OBJECTS
     body = pick(of_the_set(here->object, w), body, here->object);
-#endif
     return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);
 }
 #endif

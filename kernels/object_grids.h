@@ -106,7 +106,6 @@ INLINE real grid_value(vec p, __global const struct Object *o, __global const fl
     return between_two(low, between_two(between_two(v[4], v[5], x), between_two(v[6], v[7], x), y), z);
 }
 
-#if HAS_LEVELS
 // What the value over the level is along a ray in one cell: a polynomial of the third degree, c[0] + r (c[1] + r (c[2] + r c[3])) at r past
 // a number (Marmitt and others 2004, Fast and accurate ray-voxel intersection techniques).
 INLINE void cell_polynomial(const grid_ray *g, grid_cell cell, real number, real *c) {
@@ -235,4 +234,3 @@ INLINE vec level_normal(__global const struct Object *o, __global const float *t
     const vec flat = vec_of(pick(by_x, own.x, R(0.0)), pick(by_y, own.y, R(0.0)), pick(by_x | by_y, R(0.0), own.z));
     return vec_pick(wall, flat, n);
 }
-#endif

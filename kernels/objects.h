@@ -1,11 +1,8 @@
 // Objects beside the set, met by their equations. A solid is the ball, cube or cylinder of radius 1 in units of its own, into which rays
 // are brought; distances along a ray stay the same there.
-#if HAS_OBJECTS
 // A direction's component as a divisor.
 INLINE real divisor(real a) { return pick(less(fabs(a), R(1e-30)), R(1e-30), a); }
-#if HAS_WATER
 #include "water.h"
-#endif
 
 // The part of a ray's line in a solid: a plane's is all below it. `exit` is below `entry` where there is none.
 typedef struct {
@@ -71,9 +68,7 @@ INLINE real span_first(span s) {
     return pick(less(s.entry, s.exit) & less(R(0.0), first), first, (real)(REAL_LARGEST));
 }
 
-#if HAS_LEVELS || HAS_CLOUDS
 #include "object_grids.h"
-#endif
 
 // Objects with a boundary that an equation tells at once.
 INLINE int is_met_by_span(__global const struct Object *o) {
@@ -81,26 +76,22 @@ INLINE int is_met_by_span(__global const struct Object *o) {
 }
 
 // Where a ray meets the object with index `i`, of which planes may leave a part only. `face`: the plane whose cut it meets there, or -1.
-INLINE real object_met(int i, vec origin, vec direction, __global const struct Object *objects, __global const struct CutPlane *planes,
-                       real *face) {
+INLINE real object_met(int i, vec origin, vec direction, __global const struct Object *objects, plane_set planes, real *face) {
     span s = object_span(objects + i, origin, direction);
-    *face = R(-1.0);
-#if HAS_CUT_OBJECTS
     real begins = R(-1.0), ends = R(-1.0);
-    for (int plane = 0; plane < PLANES; ++plane) {
-        if (!plane_cuts(planes + plane, i)) continue;
+    for (int plane = 0; plane < planes.count; ++plane) {
+        if (!plane_cuts(planes.planes + plane, i)) continue;
         const real exit = s.exit;
-        plane_cut(planes + plane, plane, origin, direction, &s.entry, &s.exit, &begins);
+        plane_cut(planes.planes + plane, plane, origin, direction, &s.entry, &s.exit, &begins);
         ends = pick(less(s.exit, exit), (real)((scalar)plane), ends);
     }
     *face = pick(less(R(0.0), s.entry), begins, ends);
-#endif
     return span_first(s);
 }
 
 // The nearest object that a ray meets before its `far`: how far it is, or the largest number; and its number from 1, or 0.
-CALLED real objects_met(const ray *r, __global const struct Object *objects, __global const struct CutPlane *planes, int count,
-                        __global const float *tables, real *number) {
+CALLED real objects_met(const ray *r, __global const struct Object *objects, plane_set planes, int count, __global const float *tables,
+                        real *number) {
     real nearest = (real)(REAL_LARGEST);
     *number = R(0.0);
     for (int i = 0; i < count; ++i) {
@@ -111,7 +102,6 @@ CALLED real objects_met(const ray *r, __global const struct Object *objects, __g
         nearest = pick(here, t, nearest);
         *number = pick(here, (real)((scalar)(i + 1)), *number);
     }
-#if HAS_WATER
     // Waves are searched: only before all else.
     for (int i = 0; i < count; ++i) {
         if (objects[i].kind != OBJECT_WATER) continue;
@@ -121,8 +111,6 @@ CALLED real objects_met(const ray *r, __global const struct Object *objects, __g
         nearest = pick(here, t, nearest);
         *number = pick(here, (real)((scalar)(i + 1)), *number);
     }
-#endif
-#if HAS_LEVELS
     // So are values on grids.
     for (int i = 0; i < count; ++i) {
         if (objects[i].kind != OBJECT_VOLUME) continue;
@@ -131,7 +119,6 @@ CALLED real objects_met(const ray *r, __global const struct Object *objects, __g
         nearest = pick(here, t, nearest);
         *number = pick(here, (real)((scalar)(i + 1)), *number);
     }
-#endif
     return nearest;
 }
 
@@ -149,17 +136,13 @@ INLINE vec object_normal(__global const struct Object *o, vec point, __global co
         const mask lid = less(own.x * own.x + own.y * own.y, own.z * own.z);
         n = vec_of(pick(lid, R(0.0), own.x), pick(lid, R(0.0), own.y), pick(lid, own.z, R(0.0)));
     }
-#if HAS_WATER
     if (o->kind == OBJECT_WATER) n = water_normal(o, own.x, own.y);
-#endif
-#if HAS_LEVELS
     if (o->kind == OBJECT_VOLUME) {
         // What places are rounded to, in units of the box.
         const real far_out = fmax(fmax(fabs(point.x), fabs(point.y)), fabs(point.z));
         const scalar thinnest = fmin(fmin(o->sides[0], o->sides[1]), o->sides[2]);
         n = level_normal(o, tables, own, R(16.0) * (real)(REAL_EPSILON) * (R(1.0) + far_out / (real)(thinnest)));
     }
-#endif
     // A normal goes from its own units to scene units by the transposed matrix.
     const vec x = vec_scale(vec_splat(o->own_x), n.x), y = vec_scale(vec_splat(o->own_y), n.y);
     return vec_normalize(vec_add(vec_add(x, y), vec_scale(vec_splat(o->own_z), n.z)));
@@ -184,10 +167,8 @@ INLINE vec object_place(__global const struct Object *o, vec point) {
     } else if (o->kind == OBJECT_PLANE) {
         on.z = R(0.0);
     }
-#if HAS_WATER
     real unused;
     if (o->kind == OBJECT_WATER) on.z = water_height(o, own.x, own.y, own, &unused);
-#endif
     // Each of its axes is as long as a side, and its own number is the product with the axis by the side's square.
     const vec off = vec_sub(on, own);
     point = vec_along(point, off.x * (real)(o->sides[0] * o->sides[0]), vec_splat(o->own_x));
@@ -195,7 +176,6 @@ INLINE vec object_place(__global const struct Object *o, vec point) {
     return vec_along(point, off.z * (real)(o->sides[2] * o->sides[2]), vec_splat(o->own_z));
 }
 
-#if HAS_GLASS || HAS_CUT_OBJECTS
 // Whether a place is inside an object, or below a plane.
 INLINE mask object_holds(__global const struct Object *o, vec point) {
     const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
@@ -204,36 +184,31 @@ INLINE mask object_holds(__global const struct Object *o, vec point) {
     if (o->kind == OBJECT_SPHERE) return less(across + own.z * own.z, R(1.0));
     if (o->kind == OBJECT_BOX) return low & less(fabs(own.x), R(1.0)) & less(fabs(own.y), R(1.0));
     if (o->kind == OBJECT_CYLINDER) return low & less(across, R(1.0));
-#if HAS_WATER
     real unused;
     if (o->kind == OBJECT_WATER) return less(own.z, water_height(o, own.x, own.y, own, &unused));
-#endif
     return less(own.z, R(0.0));
 }
-#endif
 
-#if HAS_CUT_OBJECTS
 // What a ray has met of the objects with these numbers: where that is the face of a cut its number, normal and place.
-INLINE real objects_faced(vec origin, vec direction, real number, __global const struct Object *objects, __global const struct CutPlane *planes,
-                          int count, vec *normal, vec point, vec *place) {
+INLINE real objects_faced(vec origin, vec direction, real number, __global const struct Object *objects, plane_set planes, int count,
+                          vec *normal, vec point, vec *place) {
     real thing = number;
     for (int i = 0; i < count; ++i) {
         const mask here = equal(number, (real)((scalar)(i + 1)));
         if (!any_lane(here)) continue;
         real face;
         object_met(i, origin, direction, objects, planes, &face);
-        for (int plane = 0; plane < PLANES; ++plane) {
+        for (int plane = 0; plane < planes.count; ++plane) {
             const mask faced = here & equal(face, (real)((scalar)plane));
-            const vec front = vec_splat(planes[plane].normal);
+            const vec front = vec_splat(planes.planes[plane].normal);
             const real side = pick(less(R(0.0), vec_dot(front, direction)), R(-1.0), R(1.0));
             thing = pick(faced, face_number(face, number), thing);
             *normal = vec_pick(faced, vec_scale(front, side), *normal);
-            *place = vec_pick(faced, place_on_plane(planes + plane, point), *place);
+            *place = vec_pick(faced, place_on_plane(planes.planes + plane, point), *place);
         }
     }
     return thing;
 }
-#endif
 
 // The places of the objects with these numbers, as above.
 CALLED vec objects_place(const vec *point, real number, __global const struct Object *objects, int count) {
@@ -254,11 +229,8 @@ CALLED vec objects_normal(const vec *point, const vec *direction, real number, _
         if (!any_lane(here)) continue;
         normal = vec_pick(here, object_normal(objects + i, *point, tables), normal);
     }
-#if HAS_LEVELS
-    // Where values around a place are the same there is none.
+    // Where values of a grid are the same around a place there is none.
     normal = vec_pick(less(vec_dot(normal, normal), R(0.5)), vec_scale(*direction, R(-1.0)), normal);
-#endif
     const mask away = less(R(0.0), vec_dot(normal, *direction));
     return vec_pick(away, vec_scale(normal, R(-1.0)), normal);
 }
-#endif

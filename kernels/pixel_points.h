@@ -9,10 +9,7 @@ typedef struct {
     real count;                 // points that found the surface
     real nearest;               // of those, the one nearest to the middle: its distance squared, in pixels
     vec point, base, normal;    // base: where it is shaded
-    real smooth, object;
-#if JOINS_SMOOTHLY
-    real other, share;
-#endif
+    real smooth, object, other, share;
     color tint;                 // sum over the points
     vec reference, right, up, toward;
     plane_sums sums;
@@ -37,10 +34,7 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
     p.point = pixel_ray.origin;
     p.base = pixel_ray.origin;
     p.normal = pixel_ray.direction;
-    p.smooth = p.object = R(0.0);
-#if JOINS_SMOOTHLY
-    p.other = p.share = R(0.0);
-#endif
+    p.smooth = p.object = p.other = p.share = R(0.0);
     p.tint = color_of(R(0.0), R(0.0), R(0.0));
     p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
     p.toward = vec_scale(pixel_ray.direction, R(-1.0));
@@ -97,17 +91,13 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
     p->base = vec_pick(nearer, base, p->base);
     p->normal = vec_pick(nearer, met.normal, p->normal);
     p->smooth = pick(nearer, met.smooth, p->smooth);
-#if HAS_OBJECTS
     // The shared march knows nothing of objects: where it ended says nothing of how wide the cone is at one.
     p->cone = pick(nearer & ~of_the_set(object, w), r.footprint + r.spread * met.t, p->cone);
-#endif
     p->object = pick(nearer, object, p->object);
-#if JOINS_SMOOTHLY
     p->other = pick(nearer, met.other, p->other);
     p->share = pick(nearer, met.share, p->share);
-#endif
     if (is_colored_at_once(w.material)) {
-        const color tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
+        const color tint = spot_color(met.normal, met.smooth, object, met.other, met.share, w);
         p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
     }
     if (w.settings->geometric) points_place(p, number, w.settings->point_rows, found, base);
@@ -146,13 +136,12 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     here.seen = p->point;
     here.smooth = p->smooth;
     here.object = p->object;
-    here.other = OTHER_OF(*p);
-    here.share = SHARE_OF(*p);
+    here.other = p->other;
+    here.share = p->share;
     here.cone = p->cone;
     here.tint = color_scale(p->tint, share);
-#if HAS_CUT_OBJECTS
-    if (!is_colored_at_once(w.material)) here.tint = spot_color(p->normal, p->smooth, p->object, OTHER_OF(*p), SHARE_OF(*p), w);
-#endif
+    // (Of the set it is found later; that of a cut object's face only here.)
+    if (!is_colored_at_once(w.material)) here.tint = spot_color(p->normal, p->smooth, p->object, p->other, p->share, w);
     here.normal = p->normal;
     here.residual = R(0.0);
     here.quantity = R(0.0);

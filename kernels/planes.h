@@ -1,15 +1,14 @@
 // Cut planes in the picture of an object: quads coloured by escape counts, composited by depth; and those that cut,
 // which take away what lies in front of them and show the formula's counts on the face.
 //
-// PLANES of them. Each cuts the set, or objects beside it, or both.
+// Each cuts the set, or objects beside it, or both.
 typedef struct {
     __global const struct CutPlane *planes;
     __constant const struct Orbit *orbits;
     __constant const scalar *k;
     __global const float *palettes;   // PALETTE_SIZE colours for each plane
-#if HAS_CUT_OBJECTS
     __global const struct Object *objects;
-#endif
+    int count;
 } plane_set;
 
 // The face of a cut is a thing that is seen, with a number of its own: FACE_OF_PLANE for each plane, the first one once, and the number of
@@ -50,16 +49,14 @@ INLINE vec place_on_plane(__global const struct CutPlane *plane, vec point) {
 // at which a lane now begins, or -1.
 INLINE mask planes_cut(ray *r, real *face, plane_set set) {
     *face = R(-1.0);
-    for (int i = 0; i < PLANES; ++i) {
+    for (int i = 0; i < set.count; ++i) {
         if (set.planes[i].cut) plane_cut(set.planes + i, i, r->origin, r->direction, &r->near, &r->far, face);
     }
     return less(r->near, r->far);
 }
 
-#if HAS_CUT_OBJECTS
 // Whether a plane cuts the object with this index.
 INLINE int plane_cuts(__global const struct CutPlane *plane, int object) { return plane->objects[object / 32] >> (object % 32) & 1; }
-#endif
 
 // Puts the planes into a shot whose radiance is still that of the object alone, not over any background.
 INLINE shot planes_into(shot s, color object, color background, plane_layers layers, real time, __constant const struct View *view) {

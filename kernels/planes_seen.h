@@ -1,4 +1,6 @@
-// What is seen of cut planes in the picture of an object: the formula at places of them.
+// What is seen of cut planes in the picture of an object: the formula at places of them. Who includes it says what planes cut beside the set:
+//   mask cut_objects_hold(int plane, vec point, plane_set set), whether a place is inside an object that a plane cuts.
+
 // Where the formula is evaluated for a point of the picture: elsewhere if a volume is zoomed.
 INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
     return vec_along(vec_splat(plane->zoom_origin), (real)(plane->zoom), point);
@@ -8,12 +10,8 @@ INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
 INLINE escaped plane_look(vec point, mask active, int i, plane_set set) {
     escaped e = plane_escape(plane_place(point, set.planes + i), active, set.planes[i].smooth, 1, set.planes[i].iterations,
                              set.orbits, set.k);
-#if HAS_CUT_OBJECTS
-    for (int object = 0; object < MOST_OBJECTS; ++object) {
-        if (plane_cuts(set.planes + i, object)) e.inside |= active & object_holds(set.objects + object, point);
-    }
+    e.inside |= active & cut_objects_hold(i, point, set);
     e.count = pick(e.inside, (real)((scalar)set.planes[i].iterations), e.count);
-#endif
     return e;
 }
 

@@ -13,12 +13,8 @@ typedef struct {
     vec normal;                    // of a surface: towards the viewer, length 1 ...
     real smooth;                   // ... its escape count ...
     real more_steps, more_count;   // ... and what finding these has cost
-#if SOLIDS > 1
-    real solid;                     // the number of the object that the surface belongs to, or 0
-#endif
-#if JOINS_SMOOTHLY
-    real other, share;              // where two flow together: likewise of the other one, and its part of the colour
-#endif
+    real solid;                    // the number of the object that the surface belongs to, or 0
+    real other, share;             // where two flow together: likewise of the other one, and its part of the colour
 } encounter;
 
 // Places of numbers in these structs.
@@ -29,14 +25,20 @@ typedef struct {
 // where it began before a cone took it farther.
 #define RAY_STRENGTH NUMBERS_OF(ray)
 #define RAY_START NUMBERS_OF(ray)
-// With objects two more: how far the first one on the ray is, or the largest number; and which one, see objects.h.
+// With objects beside the set five more: how far the first one on the ray is, or the largest number; which one, or 0, see objects.h; and
+// where it is shaded. Until objects are met: how long the ray may be, below 0 where it is not wanted; OBJECT_AWAITED; and at what
+// distance an object is near enough for nothing else to matter.
 #define RAY_OBJECT (NUMBERS_OF(ray) + 1)
 #define RAY_OBJECT_NUMBER (NUMBERS_OF(ray) + 2)
+#define RAY_OBJECT_PLACE (NUMBERS_OF(ray) + 3)
+#define OBJECT_AWAITED R(-1.0)
 #define ENCOUNTER_STEPS 1
 #define ENCOUNTER_COUNT 2
 #define ENCOUNTER_T 3
 #define ENCOUNTER_SURFACE 3
 #define ENCOUNTER_NORMAL 7  // what a march finds itself ends there
+#define ENCOUNTER_SOLID 13  // from here on only where solids are joined, and then where they are joined smoothly
+#define ENCOUNTER_OTHER 14
 // What is found of a shadow: not how often a march was surprised.
 #define SHADOW_NUMBERS 4
 
@@ -44,6 +46,8 @@ typedef struct {
     __global scalar *rays, *met;
     int wave, turns;   // pixels of the wave, and rays of each that were marched
     int stride;        // from one number of a ray to its next
+    int numbers;       // that are kept of what a ray met
+    int objects;       // whether rays meet objects beside the set, too
 } queue;
 
 // Sends one ray of each pixel of a packet, whose first pixel is number `first` of the wave. Those that are not wanted have no
@@ -58,9 +62,9 @@ INLINE void queue_skip(queue q, int turn, int first) {
     __global scalar *at = q.rays + turn * q.wave + first;
     lanes_store(R(0.0), at + RAY_NEAR * q.stride);
     lanes_store(R(-1.0), at + RAY_FAR * q.stride);
-#if HAS_OBJECTS
+    if (!q.objects) return;
     lanes_store((real)(REAL_LARGEST), at + RAY_OBJECT * q.stride);
-#endif
+    lanes_store(R(0.0), at + RAY_OBJECT_NUMBER * q.stride);
 }
 
 INLINE ray queue_ray(queue q, int turn, int first) {
@@ -70,31 +74,55 @@ INLINE ray queue_ray(queue q, int turn, int first) {
     return r;
 }
 
-INLINE encounter queue_met(queue q, int turn, int first) {
-    encounter e;
-    RECALL(e, q.met + turn * q.wave + first, q.stride);
-    const ray r = queue_ray(q, turn, first);
-    const mask sent = less(r.near, r.far);
-    // What nobody has written may be any bits, and lanes are not quite alone: some functions of the libraries take another way for
-    // all of them where one has a large argument.
-    const mask lands = sent & mask_of(e.hit);
-    real *numbers = (real *)&e;
-#define WRITTEN_NUMBER(i) numbers[i] = pick(i < ENCOUNTER_NORMAL ? sent : lands, numbers[i], R(0.0));
-    WRITTEN_OUT(NUMBERS_OF(encounter), WRITTEN_NUMBER)
-#if HAS_OBJECTS
-    const real object = lanes_load(q.rays + RAY_OBJECT * q.stride + turn * q.wave + first);
-    const mask nearer = less(object, pick(mask_of(e.hit), e.t, (real)(REAL_LARGEST)));
-    e.hit = pick(nearer, R(1.0), e.hit);
-    e.t = pick(nearer, object, e.t);
-#endif
+// What is kept of it; lanes that have met nothing hold anything.
+INLINE encounter encounter_kept(queue q, int at) {
+    encounter e = {0};
+    numbers_recall((real *)&e, ENCOUNTER_SOLID, q.met + at, q.stride);
+    if (q.numbers > ENCOUNTER_SOLID) e.solid = lanes_load(q.met + ENCOUNTER_SOLID * q.stride + at);
+    if (q.numbers > ENCOUNTER_OTHER) {
+        e.other = lanes_load(q.met + ENCOUNTER_OTHER * q.stride + at);
+        e.share = lanes_load(q.met + (ENCOUNTER_OTHER + 1) * q.stride + at);
+    }
     return e;
 }
 
-#if HAS_OBJECTS
+// Keeps what has been found out about a surface.
+INLINE void encounter_keep_surface(queue q, int at, const encounter *e) {
+    numbers_keep((const real *)e + ENCOUNTER_SURFACE, ENCOUNTER_SOLID - ENCOUNTER_SURFACE, q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
+    if (q.numbers > ENCOUNTER_SOLID) lanes_store(e->solid, q.met + ENCOUNTER_SOLID * q.stride + at);
+    if (q.numbers > ENCOUNTER_OTHER) {
+        lanes_store(e->other, q.met + ENCOUNTER_OTHER * q.stride + at);
+        lanes_store(e->share, q.met + (ENCOUNTER_OTHER + 1) * q.stride + at);
+    }
+}
+
+INLINE encounter queue_met(queue q, int turn, int first) {
+    const int at = turn * q.wave + first;
+    encounter e = encounter_kept(q, at);
+    const mask sent = less(lanes_load(q.rays + RAY_NEAR * q.stride + at), lanes_load(q.rays + RAY_FAR * q.stride + at));
+    mask nearer = sent & ~sent;
+    real object = R(0.0);
+    if (q.objects) {
+        object = lanes_load(q.rays + RAY_OBJECT * q.stride + at);
+        nearer = less(object, pick(sent & mask_of(e.hit), e.t, (real)(REAL_LARGEST)));
+    }
+    // What nobody has written may be any bits, and lanes are not quite alone: some functions of the libraries take another way for
+    // all of them where one has a large argument.
+    const mask lands = (sent & mask_of(e.hit)) | nearer;
+    real *numbers = (real *)&e;
+#define WRITTEN_NUMBER(i) numbers[i] = pick(i < ENCOUNTER_NORMAL ? sent : lands, numbers[i], R(0.0));
+    WRITTEN_OUT(NUMBERS_OF(encounter), WRITTEN_NUMBER)
+    e.hit = pick(nearer, R(1.0), e.hit);
+    e.t = pick(nearer, object, e.t);
+    e.touch = pick(nearer, object, e.touch);
+    e.share = pick(nearer, R(0.0), e.share);
+    return e;
+}
+
 // The object that a ray has met, or 0.
 INLINE real queue_object(queue q, int turn, int first, encounter met) {
+    if (!q.objects) return R(0.0);
     __global const scalar *at = q.rays + turn * q.wave + first;
     const mask here = mask_of(met.hit) & equal(met.t, lanes_load(at + RAY_OBJECT * q.stride));
     return pick(here, lanes_load(at + RAY_OBJECT_NUMBER * q.stride), R(0.0));
 }
-#endif

@@ -17,9 +17,17 @@
 #include "stage.h"
 #include "state.h"
 #include "eye.h"
+
+// Whether a place is inside an object that a plane cuts.
+INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
+    mask held = less(R(1.0), R(0.0));
+    for (int object = 0; object < MOST_OBJECTS; ++object) {
+        if (plane_cuts(set.planes + plane, object)) held |= object_holds(set.objects + object, point);
+    }
+    return held;
+}
 #include "planes_seen.h"
 
-#if HAS_FACES
 // Finds where a plane opens the set on the ray that was sent for the next spot: there its face is met, and no ray goes on. (Of objects
 // beside the set stages know that by themselves, see `surface_met`.)
 STAGE(find_faces) {
@@ -28,8 +36,7 @@ STAGE(find_faces) {
     const world w = WORLD;
     const aim a = aim_kept(s);
     path so_far;
-    const ray whole = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
-    ray r = whole;
+    ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     real from;
     plane_face face;
     const mask left = planes_cut(&r, &from, w.planes) & mask_of(so_far.on_path);
@@ -38,16 +45,12 @@ STAGE(find_faces) {
     face.tint = color_of(R(0.0), R(0.0), R(0.0));
     face.normal = vec_of(R(0.0), R(0.0), R(0.0));
     mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
-#if HAS_OBJECTS
-    real number;
-    if (any_lane(bare)) bare &= less(face.t, objects_met(&whole, w.objects, w.planes.planes, settings->object_count, w.tables, &number));
-#endif
+    if (s.q.objects) bare &= less(face.t, lanes_load(s.q.rays + RAY_OBJECT * s.q.stride + s.slot));
     face.number = pick(bare, face_number(from, R(0.0)), R(0.0));
     STATE_KEEP(s, face, STATE_FACE);
     __global scalar *far = s.q.rays + RAY_FAR * s.q.stride + s.slot;
     lanes_store(pick(bare, R(-1.0), lanes_load(far)), far);
 }
-#endif
 
 // Finds the planes in front of and behind the first spots. Along paths faces have light, and quads have none: there a face hides the
 // part of its own quad that is at the same place.

@@ -33,7 +33,7 @@ INLINE int share_next(share *left, queue q) {
 // What a march has found, as the stages after it read it.
 INLINE encounter encounter_of(crossing c) {
     const vec none = {R(0.0), R(0.0), R(0.0)};
-    const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0)};
+    const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
     return e;
 }
 

@@ -40,9 +40,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     spot found = *here;
     if (s.bounce > 0) found = spot_kept(s, 0);
     const color in_all = seen;
-#if CLOUDS_SHINE
     const color on_the_way = color_pick(mask_of(found.found), color_of(R(0.0), R(0.0), R(0.0)), seen);
-#endif
     shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
     result.thing = pick(result.hit, thing_cut(found.object) + R(1.0), R(0.0));
     result.covers = result.coverage;
@@ -66,24 +64,23 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
     if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
     background = color_add(background, air);
-#if CLOUDS_SHINE
     // What clouds have added to a ray that went through all of them.
-    background = color_add(background, on_the_way);
-#endif
+    if (HAS(w, SHINING_CLOUDS)) background = color_add(background, on_the_way);
     background = color_add(background, glow);
     seen = color_pick(result.hit, seen, background);
     result.radiance = color_mix(background, seen, result.coverage);
     // The part of the light on rays' ways that comes: to surfaces, and past all.
     real of_ways = result.coverage, of_past = R(1.0) - result.coverage;
-#if PLANES > 0
-    plane_layers layers;
-    STATE_RECALL(s, layers, STATE_LAYERS);
-    comes *= layers.front_through;
-    of_ways *= layers.front_through;
-    of_past *= layers.front_through * layers.behind_through;
-    const color beside = color_scale(layers.behind, layers.front_through * (R(1.0) - result.coverage));
-    result = planes_into(result, seen, background, layers, a.time, w.view);
-#endif
+    plane_layers layers = {color_of(R(0.0), R(0.0), R(0.0))};
+    color beside = layers.front;
+    if (KEEPS(s, STATE_LAYERS)) {
+        STATE_RECALL(s, layers, STATE_LAYERS);
+        comes *= layers.front_through;
+        of_ways *= layers.front_through;
+        of_past *= layers.front_through * layers.behind_through;
+        beside = color_scale(layers.behind, layers.front_through * (R(1.0) - result.coverage));
+        result = planes_into(result, seen, background, layers, a.time, w.view);
+    }
     if (!KEEPS(s, STATE_GLANCE)) return result;
     glance look;
     STATE_RECALL(s, look, STATE_GLANCE);
@@ -91,10 +88,9 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     // Rays that meet nothing have seen what shines before it.
     const color past = color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past));
     result.of_light.emission = color_add(color_add(result.of_light.emission, past), color_scale(glow, of_ways + of_past));
-#if PLANES > 0
+    if (!KEEPS(s, STATE_LAYERS)) return result;
     result.of_light.albedo = color_add(color_add(layers.front, beside), result.of_light.albedo);
     result.of_light.normal = vec_pick(less(layers.nearest, (real)(REAL_LARGEST)), layers.normal, result.of_light.normal);
-#endif
     return result;
 }
 

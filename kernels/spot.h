@@ -23,25 +23,19 @@ INLINE mask faces(stage s, const spot *here, vec direction, world w) {
 // insides; what that of the set's shows only the formula knows.
 INLINE color object_color(vec normal, real quantity, real object, world w) {
     color found = surface_color(normal, quantity, w.material, w.palette);
-#if HAS_CUT_OBJECTS
     const real plane = plane_of_face(object);
-    for (int i = 0; i < PLANES; ++i) found = color_pick(equal(plane, (real)((scalar)i)), color_splat(w.planes.planes[i].inside), found);
-#endif
-#if HAS_OBJECTS
+    for (int i = 0; i < w.planes.count; ++i) found = color_pick(equal(plane, (real)((scalar)i)), color_splat(w.planes.planes[i].inside), found);
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask here = equal(object, (real)((scalar)(i + 1)));
         if (w.objects[i].colored && any_lane(here)) found = color_pick(here, color_splat(w.objects[i].color), found);
     }
-#endif
     return found;
 }
 
 // The colour of a spot: where two solids flow together, a blend of theirs.
 INLINE color spot_color(vec normal, real quantity, real object, real other, real share, world w) {
     const color own = object_color(normal, quantity, object, w);
-#if JOINS_SMOOTHLY
     if (any_lane(less(R(0.0), share))) return color_mix(own, object_color(normal, quantity, other, w), share);
-#endif
     return own;
 }
 
@@ -51,46 +45,19 @@ INLINE color tint_of(const spot *here, world w) {
     return color_pick(on_face(here), here->tint, found);
 }
 
-#if HAS_OBJECTS
-// The count on the face of an object's cut: all that the plane takes. Of other things that are no formulas it is 0.
-INLINE real face_count(real thing, world w) {
-    real count = R(0.0);
-#if HAS_CUT_OBJECTS
-    const real plane = plane_of_face(thing);
-    for (int i = 0; i < PLANES; ++i) count = pick(equal(plane, (real)((scalar)i)), (real)((scalar)w.planes.planes[i].iterations), count);
-#endif
-    return count;
-}
-#endif
-
 // What a ray for a spot has met: the set, or the object with this number, or the face of an object's cut; and the place where it is shaded.
 INLINE encounter surface_met(stage s, int turn, ray r, real *object, vec *place, world w) {
-    encounter met = queue_met(s.q, turn, s.slot);
-    *object = R(0.0);
+    const encounter met = queue_met(s.q, turn, s.slot);
     *place = vec_along(r.origin, met.touch, r.direction);
-#if HAS_OBJECTS
-    *object = queue_object(s.q, turn, s.slot, met);
-    const mask here = less(R(0.0), *object);
-    if (any_lane(here)) {
-        const vec point = vec_along(r.origin, met.t, r.direction);
-        *place = vec_pick(here, objects_place(&point, *object, w.objects, w.settings->object_count), *place);
-        vec normal = objects_normal(&point, &r.direction, *object, w.objects, w.settings->object_count, w.tables);
-#if HAS_CUT_OBJECTS
-        *object = objects_faced(r.origin, r.direction, *object, w.objects, w.planes.planes, w.settings->object_count, &normal, point, place);
-#endif
-        met.normal = vec_pick(here, normal, met.normal);
-        met.touch = pick(here, met.t, met.touch);
-        met.smooth = pick(here, face_count(*object, w), met.smooth);
-        met.more_steps = pick(here, R(0.0), met.more_steps);
-        met.more_count = pick(here, R(0.0), met.more_count);
-#if JOINS_SMOOTHLY
-        met.share = pick(here, R(0.0), met.share);
-#endif
-    }
-#if SOLIDS > 1
-    *object = pick(mask_of(met.hit) & ~here, met.solid, *object);
-#endif
-#endif
+    *object = pick(mask_of(met.hit), met.solid, R(0.0));
+    if (!s.q.objects) return met;
+    const real beside = queue_object(s.q, turn, s.slot, met);
+    const mask here = less(R(0.0), beside);
+    if (!any_lane(here)) return met;
+    vec found;
+    RECALL(found, s.q.rays + RAY_OBJECT_PLACE * s.q.stride + turn * s.q.wave + s.slot, s.q.stride);
+    *place = vec_pick(here, found, *place);
+    *object = pick(here, beside, *object);
     return met;
 }
 
@@ -102,21 +69,18 @@ INLINE real largest_of(vec a) { return fmax(fmax(fabs(a.x), fabs(a.y)), fabs(a.z
 // has a face: from those rays leave as near as numbers are sure to be on the right side (Pharr, Jakob, Humphreys 2023, sec. 6.8).
 INLINE real lift_of(const spot *here, world w) {
     real lift = here->cone * (real)(w.settings->shadow_lift);
-#if HAS_OBJECTS || HAS_FACES
+    if (w.settings->object_count + w.planes.count == 0) return lift;
     const real own = largest_of(here->point), each = LIFT_ERRORS * (real)(REAL_EPSILON);
     for (int i = 0; i < w.settings->object_count; ++i) {
         __global const struct Object *o = w.objects + i;
         const mask on = o->kind == OBJECT_JOINED ? less(R(1.0), R(0.0)) : equal(here->object, (real)((scalar)(i + 1)));
         lift = pick(on, (real)(o->lift) * here->cone + each * ((real)(o->error_share) * own + (real)(o->error)), lift);
     }
-#if HAS_FACES
     const real plane = plane_of_face(here->object);
-    for (int i = 0; i < PLANES; ++i) {
+    for (int i = 0; i < w.planes.count; ++i) {
         const mask on = equal(plane, (real)((scalar)i));
         lift = pick(on, each * (own + largest_of(vec_splat(w.planes.planes[i].center))), lift);
     }
-#endif
-#endif
     return lift;
 }
 
@@ -131,14 +95,13 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, vec place, world w) {
     here.smooth = met.smooth;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-    here.tint = spot_color(met.normal, met.smooth, object, OTHER_OF(met), SHARE_OF(met), w);
+    here.tint = spot_color(met.normal, met.smooth, object, met.other, met.share, w);
     here.object = object;
-    here.other = OTHER_OF(met);
-    here.share = SHARE_OF(met);
+    here.other = met.other;
+    here.share = met.share;
     return here;
 }
 
-#if HAS_FACES
 // Where the ray for a spot meets a face of the set before all else, that is the spot: such lanes are the result.
 INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
     plane_face face;
@@ -148,7 +111,7 @@ INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
     here->found = pick(bare, R(1.0), here->found);
     here->seen = vec_pick(bare, vec_along(r.origin, face.t, r.direction), here->seen);
     const real number = plane_of_face(face.number);
-    for (int i = 0; i < PLANES; ++i) {
+    for (int i = 0; i < w.planes.count; ++i) {
         const mask on = bare & equal(number, (real)((scalar)i));
         here->point = vec_pick(on, place_on_plane(w.planes.planes + i, here->seen), here->point);
     }
@@ -160,7 +123,6 @@ INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
     here->share = pick(bare, R(0.0), here->share);
     return bare;
 }
-#endif
 
 #if HAS_GLASS_SET
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.

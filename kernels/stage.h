@@ -21,11 +21,7 @@ typedef struct {
     __global const scalar *set_lights;
     __global const struct Object *objects;
 } world;
-#if HAS_CUT_OBJECTS
-#define PLANE_SET {planes, orbit, k, plane_palettes, objects}
-#else
-#define PLANE_SET {planes, orbit, k, plane_palettes}
-#endif
+#define PLANE_SET {planes, orbit, k, plane_palettes, objects, settings->plane_count}
 #define WORLD {view, settings, material, lights, palette, environment, PLANE_SET, materials, albedos, maps, tables, set_lights, objects}
 
 // Whether a scene has something of which kernels need not know more.

@@ -7,14 +7,6 @@ INLINE mask on_face(const spot *here) { return is_face(here->object); }
 #define BUMP_PLACES 3
 #define BESIDE_NUMBERS (BUMP_ASKED + (BUMP_SURFACE ? 4 : 0))
 
-#if JOINS_SMOOTHLY
-#define OTHER_OF(here) ((here).other)
-#define SHARE_OF(here) ((here).share)
-#else
-#define OTHER_OF(here) R(0.0)
-#define SHARE_OF(here) R(0.0)
-#endif
-
 #define FEW(type) (NUMBERS_OF(type) <= MOST_NUMBERS)
 typedef char structs_are_small[FEW(aim) && FEW(spot) && FEW(path) && FEW(carried) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
 

@@ -159,8 +159,7 @@ INLINE void look_at(queue q, int at, __constant const struct March *settings, __
     const mask hit = mask_of(e.hit);
     if (!any_lane(hit)) return;
     surface_at(queue_ray(q, 0, at), &e, hit, settings, orbit, k);
-    numbers_keep((const real *)&e + ENCOUNTER_SURFACE, NUMBERS_OF(encounter) - ENCOUNTER_SURFACE,
-                 q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
+    encounter_keep_surface(q, at, &e);
 }
 
 // Looks at the surfaces of a share that was marched. A single lane looks in a kernel of its own, which leaves it more registers for

@@ -21,6 +21,7 @@
 #include "escape.h"
 #include "escape_colors.h"
 #include "planes.h"
+INLINE mask cut_objects_hold(int plane, vec point, plane_set set) { return less(R(1.0), R(0.0)); }
 #include "planes_seen.h"
 #endif
 
@@ -84,7 +85,7 @@ __kernel void volume(PASS_BUFFERS, __constant const struct Volume *settings, __c
                      , bounds, environment
 #endif
 #if PLANES > 0
-                     , {planes, orbits, k, plane_palettes}
+                     , {planes, orbits, k, plane_palettes, 0, PLANES}
 #endif
     };
     const pass span = PASS;

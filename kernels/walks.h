@@ -41,14 +41,12 @@ INLINE void walk_flies(march *m, walk *a, mask here, world w) {
     m->high = pick(here, R(0.0), m->high);
     m->r.near = pick(here, NEVER_A_SHEET, m->r.near);
     real stop = a->with.flight;
-#if HAS_OBJECTS
     m->r.far = pick(here, stop, m->r.far);
     real number;
-    const real met = objects_met(&m->r, w.objects, w.planes.planes, w.settings->object_count, w.tables, &number);
+    const real met = objects_met(&m->r, w.objects, w.planes, w.settings->object_count, w.tables, &number);
     a->object = pick(here, met, a->object);
     a->number = pick(here, number, a->number);
     stop = fmin(stop, met);
-#endif
     color unused;
     real density, weight;
     nearest_light(m->r.origin, m->r.direction, 0, &stop, &unused, &density, &weight, w);
@@ -189,10 +187,9 @@ INLINE void walk_puts(const march *m, const walk *a, const int *places, uint end
     lanes_put((real)(REAL_LARGEST), state + flight * stride, places, ended);
 #define PUT_OF_RAY(i) lanes_put(((const real *)&m->r)[i], q.rays + i * q.stride, places, ended);
     WRITTEN_OUT(RAY_FAR + 1, PUT_OF_RAY)
-#if HAS_OBJECTS
+    if (!q.objects) return;
     lanes_put(a->object, q.rays + RAY_OBJECT * q.stride, places, ended);
     lanes_put(a->number, q.rays + RAY_OBJECT_NUMBER * q.stride, places, ended);
-#endif
 }
 
 // Walks the paths of a share of the queue; the result is how many lanes have waited, in steps.

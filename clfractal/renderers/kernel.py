@@ -25,7 +25,7 @@ KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 
 
 # Numbers of a sent ray, of what it met, and of the object that it met (`kernels/queue.h`).
-RAY_NUMBERS, MET_NUMBERS, OBJECT_NUMBERS = 12, 13, 2
+RAY_NUMBERS, MET_NUMBERS, OBJECT_NUMBERS = 12, 13, 5
 # Numbers between two columns of what is kept between stages: a power of 2 apart, all would lie in one place of a cache.
 STATE_PADDING = 80
 BLOCK = 8

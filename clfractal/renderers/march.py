@@ -13,6 +13,8 @@ from clfractal.renderers.environment import PackedEnvironment
 from clfractal.renderers.fineness import Fineness
 from clfractal.renderers.kinds import FEATURES, NORMALS
 from clfractal.renderers.maps import has_bump
+from clfractal.renderers.object_grids import clouds_of
+from clfractal.renderers.planes import plane_count
 from clfractal.renderers.records import (
     bounces,
     environment_weight,
@@ -22,6 +24,7 @@ from clfractal.renderers.records import (
 )
 from clfractal.renderers.set_lights import SetLights, march_fields, single_lights
 from clfractal.renderers.state import PARTS, along_paths, normal_count
+from clfractal.renderers.waves import meets_objects, met_numbers
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 
@@ -60,6 +63,9 @@ MARCH = Struct(
         Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
         Field("object_count", "int", 0, "number of objects"),
+        Field("meets_objects", "int", 0, "1: rays meet objects beside the set"),
+        Field("met_numbers", "int", 0, "numbers that are kept of what a ray met"),
+        Field("plane_count", "int", 0, "number of cut planes in the picture"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
         Field("set_count", "int", 0, "number of balls of lights on the set"),
         Field("set_cells", "int", 0, "cells of their probabilities along an edge of their cube"),
@@ -108,7 +114,12 @@ def step_scale(scene: Scene) -> float:
 
 def features_of(scene: Scene) -> int:
     """What a scene has, as bits of FEATURES."""
-    has = {"fog": scene.fog is not None, "bump": has_bump(scene), "paths": along_paths(scene)}
+    has = {
+        "fog": scene.fog is not None,
+        "bump": has_bump(scene),
+        "paths": along_paths(scene),
+        "shining_clouds": any(each.transfer.emission is not None for each in clouds_of(scene)),
+    }
     return sum(FEATURES[name] for name, there in has.items() if there)
 
 
@@ -177,6 +188,9 @@ def march_record(
         "light_count": len(single_lights(scene)),
         **march_fields(on_set),
         "object_count": len(scene.objects),
+        "meets_objects": int(meets_objects(scene)),
+        "met_numbers": met_numbers(scene),
+        "plane_count": plane_count(scene),
         "light_rays": light_rays(scene),
         "cosine_rays": rays.cosine,
         "map_rays": rays.map,

@@ -136,11 +136,9 @@ _PLAIN = Transfer.model_validate({})
 
 def grid_defines(scene: Scene) -> dict[str, object]:
     """The defines of programs that send rays past volumes."""
-    volumes, clouds = volumes_of(scene.objects), clouds_of(scene)
+    clouds = clouds_of(scene)
     return {
-        "HAS_LEVELS": int(len(volumes) > len(clouds)),
         "HAS_CLOUDS": int(bool(clouds)),
-        "CLOUDS_SHINE": int(any(each.transfer.emission is not None for each in clouds)),
         "TRANSFER_SIZE": TRANSFER_SIZE,
         "TRANSFER_COLUMNS": cloud_columns(scene),
     }

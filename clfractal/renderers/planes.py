@@ -58,16 +58,7 @@ def plane_defines(scene: Scene) -> dict[str, object]:
     """What the text of `kernels/planes.h` depends on."""
     return {
         "PLANES": plane_count(scene),
-        **face_defines(scene),
         "ESCAPE_COLORS": "__global const struct CutPlane",
-    }
-
-
-def face_defines(scene: Scene) -> dict[str, object]:
-    """The defines of all programs that send rays, or read what is kept between stages."""
-    return {
-        "HAS_FACES": int(has_faces(scene)),
-        "HAS_CUT_OBJECTS": int(any(any(_cut_objects(scene, plane)) for plane in scene.cut_planes)),
     }
 
 

@@ -15,7 +15,6 @@ from clfractal.renderers.environment import packed_map
 from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
-    MET_NUMBERS,
     OBJECT_NUMBERS,
     RAY_NUMBERS,
     STATE_PADDING,
@@ -44,8 +43,6 @@ from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
-    face_defines,
-    plane_count,
     plane_defines,
     plane_palettes,
     plane_records,
@@ -54,13 +51,15 @@ from clfractal.renderers.scattering import albedo_tables
 from clfractal.renderers.set_lights import set_light_data, set_lights_of
 from clfractal.renderers.state import state_numbers, state_places, state_text
 from clfractal.renderers.waves import (
+    meets_objects,
+    met_numbers,
     most_turns,
     surface_stages,
 )
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
-from clfractal.solids import Body, joins_smoothly
+from clfractal.solids import Body
 
 PALETTE_SIZE = 256
 # Entries that ask how near orbits come to traps.
@@ -84,7 +83,6 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "POINTS": several_points(scene),
         # A binary search ends where the surface is; a march, somewhere within the point's footprint.
         "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
-        "HAS_OBJECTS": 0,
         **Body.of(scene).defines,
     }
 
@@ -117,10 +115,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "PALETTE_SIZE": PALETTE_SIZE,
         "POINTS": several_points(scene),
         "STATE_PADDING": STATE_PADDING,
-        "PLANES": plane_count(scene),
-        **face_defines(scene),
         **object_defines(scene),
-        **Body.of(scene).defines,
         **map_defines(scene),
         "HAS_GLASS": int(has_glass(scene)),
         "HAS_GLASS_SET": int(has_glass_set(scene)),
@@ -135,14 +130,14 @@ def path_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {**state_defines(scene, plan), **scattering_defines()}
 
 
-def color_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """The defines of `kernels/color_spots.cl`, for which planes are nothing."""
-    return {**state_defines(scene, plan), "PLANES": 0}
+def formula_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The defines of stages that ask the formula."""
+    return {**state_defines(scene, plan), **Body.of(scene).defines}
 
 
 def face_and_plane_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """The defines of `kernels/see_planes.cl`."""
-    return {**state_defines(scene, plan), **plane_defines(scene)}
+    return {**formula_defines(scene, plan), **plane_defines(scene)}
 
 
 class SurfaceKernel(TileKernel):
@@ -158,9 +153,10 @@ class SurfaceKernel(TileKernel):
         return surface_stages(self.scene, self.plan, samples)
 
     def wave_needs(self) -> WaveNeeds:
-        ray = RAY_NUMBERS + OBJECT_NUMBERS * bool(self.scene.objects)
-        met = MET_NUMBERS + bool(self.scene.joined) + 2 * joins_smoothly(self.scene)
-        return WaveNeeds(state_numbers(self.scene, self.plan), most_turns(self.scene), ray, met)
+        ray = RAY_NUMBERS + OBJECT_NUMBERS * meets_objects(self.scene)
+        return WaveNeeds(
+            state_numbers(self.scene, self.plan), most_turns(self.scene), ray, met_numbers(self.scene)
+        )
 
     def own_arguments(self) -> list[KernelArgument]:
         scene, precision, once = self.scene, self.precision, self.resources.once
@@ -229,12 +225,13 @@ _PROGRAMS: tuple[tuple[str, str, tuple[str, ...], Callable[[Scene, Plan], dict[s
     ("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
     ("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
     ("spots", "find_spots.cl", ("find_spots",), state_defines),
+    ("objects", "objects.cl", ("meet_objects", "look_at_objects"), state_defines),
     ("light", "light_spots.cl", ("light_spots",), state_defines),
     ("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
     ("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
     ("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines),
-    ("colors", "color_spots.cl", ("color_spots",), color_defines),
-    ("glow", "glow.cl", ("add_glow",), state_defines),
+    ("colors", "color_spots.cl", ("color_spots",), formula_defines),
+    ("glow", "glow.cl", ("add_glow",), formula_defines),
     ("planes", "see_planes.cl", ("find_faces", "find_planes"), face_and_plane_defines),
 )
 

@@ -6,7 +6,8 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  [send_points  march  join_points]  find_spots  [color_spots]  march  light_spots
 
-with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look
+with `[meet_objects]` before each march and `[look_at_objects]` after those that look for a spot, with `[find_planes]` and
+`[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look
 for a spot; each mirror adds what follows `begin_shots` but for the points.
 With `lighting.mode: path` in the place of the last two
 
@@ -20,8 +21,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from clfractal.renderers.kernel import Stage
+from clfractal.renderers.kernel import MET_NUMBERS, Stage
 from clfractal.renderers.maps import asked_maps, bump_numbers, has_glass_set
+from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
@@ -30,6 +32,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.solids import joins_smoothly
 
 # What a march is after, as in `kernels/rays.h`.
 GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(5)
@@ -63,6 +66,17 @@ def has_cones(scene: Scene, plan: Plan) -> bool:
     common one."""
     lens = isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0
     return scene.surface.search == "distance" and not lens and not plan.moving
+
+
+def meets_objects(scene: Scene) -> bool:
+    """Whether rays meet objects beside the set."""
+    clouds = clouds_of(scene)
+    return any(name not in scene.joined and each not in clouds for name, each in scene.objects.items())
+
+
+def met_numbers(scene: Scene) -> int:
+    """Numbers that are kept of what a ray met (`kernels/queue.h`)."""
+    return MET_NUMBERS + bool(scene.joined) + 2 * joins_smoothly(scene)
 
 
 def light_turns(scene: Scene) -> int:
@@ -118,20 +132,31 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
         return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
 
+    beside = meets_objects(scene)
+    met, looked = (("meet_objects",), ("look_at_objects",)) if beside else ((), ())
+
+    def of_objects(kernels: tuple[str, ...], turns: int) -> Iterator[Stage]:
+        return (Stage(kernel, "packets of rays", turns) for kernel in kernels)
+
     yield stage("begin_shots", int(cones))
     for bounce in range(bounces(scene) + 1):
         turns = 1
+        within = bounce > 0 and has_glass_set(scene)
+        if points == 1 or bounce > 0:
+            yield from of_objects(met, 1 + within)
         if has_faces(scene):
             yield stage("find_faces", bounce=bounce)
         if points > 1 and bounce == 0:
             yield from _marched(marching, 1, GOAL_TOUCH)
             turns = points
             yield stage("send_points", 1)
+            yield from of_objects(met, turns)
             yield from _marched(marching, turns, GOAL_POINT if steps else GOAL_SURFACE)
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
-            if bounce > 0 and has_glass_set(scene):
+            if within:
                 yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE, bounce)
+        yield from of_objects(looked, turns + within)
         if points > 1 and bounce == 0:
             yield stage("join_points", turns)
         yield stage("find_spots", turns, bounce=bounce, next_turns=after)
@@ -147,13 +172,16 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield stage("scatter_paths", 1, bounce=bounce)
             if scene.cut_planes and bounce == 0:
                 yield stage("find_planes")
+            yield from of_objects(met, 1 + air)
             yield from _marched(marching, 1 + air, GOAL_SHADOW)
             yield stage("gather_paths", 1 + air, bounce=bounce)
             continue
         if after + air > 0:
+            yield from of_objects(met, after + air)
             yield from _marched(marching, after + air, GOAL_SHADOW)
         yield stage("light_spots", after + air, bounce=bounce)
     if isinstance(scene.lighting, PathLighting):
+        yield from of_objects(met, 1)
         yield from _marched(marching, 1, GOAL_SHADOW)
         yield stage("end_paths", 1, bounce=bounces(scene) + 1)
 
