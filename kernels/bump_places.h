@@ -2,7 +2,7 @@
 
 // The number of an object's material, or the set's.
 INLINE real object_material(real object, world w) {
-    real number = (real)((scalar)SET_MATERIAL);
+    real number = (real)((scalar)w.settings->set_material);
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask there = equal(object, (real)((scalar)(i + 1)));
         number = pick(there, (real)((scalar)w.objects[i].material), number);
@@ -21,21 +21,18 @@ INLINE real material_share(const spot *here, int number, world w) {
     return own + here->share * (other - own);
 }
 
-#if HAS_BUMP
 // How far apart these places are: a pixel's footprint, so that details which a pixel cannot show are no noise, or what the material
 // asks for. Below 0 where there is no relief, as on the faces of cuts.
 INLINE real bump_width(const spot *here, world w) {
     real width = (real)(w.materials->bump_width);
-#if MATERIALS > 1
     const real root = spot_material(here, w);
-    for (int i = 1; i < MATERIALS; ++i) width = pick(equal(root, (real)((scalar)i)), (real)(w.materials[i].bump_width), width);
+    for (int i = 1; i < w.settings->material_count; ++i) width = pick(equal(root, (real)((scalar)i)), (real)(w.materials[i].bump_width), width);
     // Where two flow together, as either of them has.
-    for (int i = 0; i < MATERIALS; ++i) {
+    for (int i = 0; i < w.settings->material_count; ++i) {
         if (!any_lane(less(R(0.0), here->share))) break;
         const mask has = less(R(0.0), material_share(here, i, w));
         width = pick(has, fmax(width, (real)(w.materials[i].bump_width)), width);
     }
-#endif
     return pick(less(width, R(0.0)) | on_face(here), R(-1.0), fmax(width, here->cone));
 }
 
@@ -57,4 +54,3 @@ INLINE spot bump_spot(const spot *here, real width, int place) {
     there.cone = width;
     return there;
 }
-#endif

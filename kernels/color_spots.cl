@@ -16,29 +16,21 @@
 #include "stage.h"
 #include "state.h"
 #include "eye.h"
-#if ASKED > 0
 #include "asked.h"
-#endif
-#if HAS_MAPS
 #include "bump_places.h"
-#endif
 
-#if ASKED > 0 || BUMP_SURFACE
 // Keeps what the formula answers at spots, or at a place around them. On objects beside the set it has an answer for traps only.
 INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask of_set, __constant const struct Material *questions,
-                         __constant const struct Orbit *orbit, __constant const scalar *k) {
-#if ASKED > 0
+                         __constant const struct Orbit *orbit, __constant const scalar *k, world w) {
     // After the scene's own record.
-    const int count = place == AT_SPOT ? ASKED : BUMP_ASKED;
+    const int count = place == AT_SPOT ? w.settings->asked_count : w.settings->bump_asked;
     for (int i = 0; i < count; ++i) {
         __constant const struct Material *m = questions + i;
         const mask answered = m->asks == MAP_TRAP ? asks : of_set;
         const real answer = pick(answered, asked_quantity(there, answered, m, orbit, k), R(0.0));
-        lanes_store(answer, asked_at(s, place, i));
+        lanes_store(answer, asked_at(s, place, i, w));
     }
-#endif
-#if BUMP_SURFACE
-    if (place == AT_SPOT) return;
+    if (place == AT_SPOT || !w.settings->bump_surface) return;
     surface_point surface;
     const clearance here = orbit_dual_distance(there->point, of_set, OF_SURFACE, orbit, k, &surface);
     const vec normal = vec_normalize(surface.gradient);
@@ -46,10 +38,8 @@ INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask 
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | here.end.inside;
     const vec known = vec_pick(flat, there->normal, normal);
     const real numbers[4] = {known.x, known.y, known.z, smooth_count(here.end, surface, orbit)};
-    numbers_keep(numbers, 4, surface_beside_at(s, place), s.stride);
-#endif
+    numbers_keep(numbers, 4, surface_beside_at(s, place, w), s.stride);
 }
-#endif
 
 STAGE(color_spots) {
     if (IS_BEYOND) return;
@@ -57,31 +47,23 @@ STAGE(color_spots) {
     const world w = WORLD;
     spot here = spot_kept(s, bounce);
     const mask seen = mask_of(here.found), found = seen & of_the_set(here.object, w);
-    if (!any_lane(ASKED > 0 ? seen : found)) return;
+    if (!any_lane(settings->asked_count > 0 ? seen : found)) return;
     path so_far;
     const aim a = aim_kept(s);
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
-#if ASKED > 0 || BUMP_SURFACE
     spot there = here;
-#if HAS_BUMP
-    const real width = bump_width(&here, w);
+    const real width = HAS(w, BUMP) ? bump_width(&here, w) : R(-1.0);
     const mask rises = less(R(0.0), width);
     const int around = any_lane(seen & rises) ? BUMP_PLACES : 0;
-#else
-    const int around = 0;
-#endif
     // At the spot, then around it.
     for (int place = AT_SPOT; place < around; ++place) {
         mask asks = seen;
-#if HAS_BUMP
         if (place != AT_SPOT) {
             there = bump_spot(&here, width, place);
             asks &= rises;
         }
-#endif
-        answers_keep(s, &there, place, asks, asks & found, material + 1, orbit, k);
+        answers_keep(s, &there, place, asks, asks & found, material + 1, orbit, k, w);
     }
-#endif
     if (material->coloring <= COLORING_RESIDUAL) return;
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);

@@ -56,14 +56,13 @@ INLINE color picture_at(vec point, vec normal, real cone, __global const struct 
     return color_add(mixed, color_scale(picture_color(point.x * wide, -point.y * high, level, m, tables), z / sum));
 }
 
-#if HAS_BUMP
 // What the surface is around a spot: its normal and its escape count. On objects beside the set these are the object's.
 INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, real *smooth, world w) {
     *normal = there->normal;
     *smooth = there->smooth;
-#if BUMP_SURFACE
+    if (!w.settings->bump_surface) return;
     real known[4];
-    numbers_recall(known, 4, surface_beside_at(s, place), s.stride);
+    numbers_recall(known, 4, surface_beside_at(s, place, w), s.stride);
     *normal = vec_of(known[0], known[1], known[2]);
     *smooth = known[3];
     const mask beside_set = ~of_the_set(there->object, w);
@@ -73,29 +72,21 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
         *normal = vec_pick(beside_set, own, *normal);
         *smooth = pick(beside_set, there->smooth, *smooth);
     }
-#endif
 }
-#endif
 
 // At a spot, where `place` is AT_SPOT, or at a place around it.
 INLINE real map_quantity(stage s, const spot *here, int place, __global const struct Map *m, world w) {
     const vec given = vec_splat(m->vector);
     vec normal = here->normal;
     real smooth = here->smooth;
-#if HAS_BUMP
     if (place != AT_SPOT && (m->by == MAP_NORMAL || m->by == MAP_ITERATIONS)) surface_beside(s, here, place, &normal, &smooth, w);
-#endif
     if (m->by == MAP_NORMAL) return vec_dot(normal, given);
     if (m->by == MAP_HEIGHT) return vec_dot(here->point, given);
     if (m->by == MAP_DISTANCE) {
         const vec way = vec_sub(here->point, given);
         return sqrt(vec_dot(way, way));
     }
-#if ASKED > 0
-    if (m->by >= MAP_CURVATURE) {
-        return lanes_load(asked_at(s, place, m->asked));
-    }
-#endif
+    if (m->by >= MAP_CURVATURE) return lanes_load(asked_at(s, place, m->asked, w));
     return smooth;
 }
 

@@ -114,7 +114,7 @@ CALLED medium medium_of(real body, world w) {
         medium_of_material(w.objects[i].material, equal(body_of(body), (real)((scalar)(i + 1))), body, &found, w);
     }
 #if HAS_GLASS_SET
-    medium_of_material(SET_MATERIAL, equal(body_of(body), set_body(w)), body, &found, w);
+    medium_of_material(w.settings->set_material, equal(body_of(body), set_body(w)), body, &found, w);
 #endif
     return found;
 }

@@ -1,5 +1,7 @@
 // Objects beside the set, met by their equations. A solid is the ball, cube or cylinder of radius 1 in units of its own, into which rays
 // are brought; distances along a ray stay the same there.
+#include "plane_cuts.h"
+
 // A direction's component as a divisor.
 INLINE real divisor(real a) { return pick(less(fabs(a), R(1e-30)), R(1e-30), a); }
 #include "water.h"

@@ -5,7 +5,6 @@ INLINE mask on_face(const spot *here) { return is_face(here->object); }
 // Around a spot are places where the heights of its material's relief are compared, see bump_places.h.
 #define AT_SPOT (-1)
 #define BUMP_PLACES 3
-#define BESIDE_NUMBERS (BUMP_ASKED + (BUMP_SURFACE ? 4 : 0))
 
 #define FEW(type) (NUMBERS_OF(type) <= MOST_NUMBERS)
 typedef char structs_are_small[FEW(aim) && FEW(spot) && FEW(path) && FEW(carried) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
@@ -21,11 +20,11 @@ INLINE __global scalar *state_part(stage s, int part) { return s.state + s.at[pa
 #define STATE_RECALL_ONE(s, thing, part, i) RECALL(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
 
 // What the formula answers for the spot's material, or at a place around it; and the normal and escape count there.
-INLINE __global scalar *asked_at(stage s, int place, int i) {
+INLINE __global scalar *asked_at(stage s, int place, int i, world w) {
     if (place == AT_SPOT) return state_part(s, STATE_ASKED) + i * s.stride;
-    return state_part(s, STATE_BESIDE) + (place * BESIDE_NUMBERS + i) * s.stride;
+    return state_part(s, STATE_BESIDE) + (place * (w.settings->bump_asked + 4 * w.settings->bump_surface) + i) * s.stride;
 }
-INLINE __global scalar *surface_beside_at(stage s, int place) { return asked_at(s, place, BUMP_ASKED); }
+INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return asked_at(s, place, w.settings->bump_asked, w); }
 
 INLINE aim aim_kept(stage s) {
     aim a;

@@ -17,6 +17,7 @@ from clfractal.errors import KernelBuildError, Where, nearest
 from clfractal.resources import folder
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))')
+_NAME = re.compile(r"[A-Za-z_]\w*")
 _ENDIF = re.compile(r"^[ \t]*#[ \t]*endif\b")
 _LINE = re.compile(r'^#line (?P<line>\d+) "(?P<name>[^"]*)"')
 
@@ -78,7 +79,7 @@ def flatten(
         entry: a file of the kernels folder (`surface.cl`) or the name of a generated text.
         generated: texts that may be included by their names (`formula.h`); they go before files of the same
             name.
-        defines: names and values written as `#define` lines at the head of the text.
+        defines: names and values written as `#define` lines at the head of the text, of those that the text names.
         user: the generated texts that come from the user's formula.
         kernels: another folder than the one that travels with the program.
 
@@ -113,10 +114,12 @@ def _flatten(
     kernels: Path,
 ) -> FlatText:
     flattener = _Flattener(kernels, dict(generated))
-    for name, value in defines:
-        flattener.lines.append(f"#define {name} {value}")
     flattener.add(entry, Where())
-    return FlatText("\n".join(flattener.lines) + "\n", SourceMap(flattener.texts, frozenset(user)))
+    text = "\n".join(flattener.lines) + "\n"
+    # What a text never names makes no other program of it.
+    named = set(_NAME.findall(text))
+    head = "".join(f"#define {name} {value}\n" for name, value in defines if name in named)
+    return FlatText(head + text, SourceMap(flattener.texts, frozenset(user)))
 
 
 class _Flattener:

@@ -265,20 +265,30 @@ def glass_bodies(scene: Scene) -> list[bool]:
     ]
 
 
+def material_counts(scene: Scene) -> dict[str, object]:
+    """How many materials and questions about them there are, as fields of a March."""
+    if not isinstance(scene.lighting, PathLighting):
+        none = dict.fromkeys(("asked_count", "bump_asked", "bump_surface", "set_material"), 0)
+        return {**none, "material_count": 1}
+    found = MappedMaterials(scene)
+    return {
+        "asked_count": len(found.asked),
+        "bump_asked": found.relief_asked,
+        "bump_surface": int(found.relief_of_surface),
+        "material_count": len(found.blends.materials),
+        "set_material": found.blends.roots[0],
+    }
+
+
 def map_defines(scene: Scene) -> dict[str, object]:
     """The defines of programs that may read maps."""
     if not isinstance(scene.lighting, PathLighting):
-        none = dict.fromkeys(("HAS_MAPS", "ASKED", "HAS_BUMP", "BUMP_ASKED", "BUMP_SURFACE"), 0)
-        return {**none, "MATERIALS": 1, "SET_MATERIAL": 0}
+        return {"HAS_MAPS": 0, "HAS_BUMP": 0, "MATERIALS": 1, **MAP_DEFINES}
     found = MappedMaterials(scene)
     return {
         "HAS_MAPS": int(bool(found.maps)),
-        "ASKED": len(found.asked),
         "HAS_BUMP": int(found.has_bump),
-        "BUMP_ASKED": found.relief_asked,
-        "BUMP_SURFACE": int(found.relief_of_surface),
         "MATERIALS": len(found.blends.materials),
-        "SET_MATERIAL": found.blends.roots[0],
         **MAP_DEFINES,
     }
 

@@ -12,7 +12,7 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.environment import PackedEnvironment
 from clfractal.renderers.fineness import Fineness
 from clfractal.renderers.kinds import FEATURES, NORMALS
-from clfractal.renderers.maps import has_bump
+from clfractal.renderers.maps import has_bump, material_counts
 from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.planes import plane_count
 from clfractal.renderers.records import (
@@ -78,6 +78,11 @@ MARCH = Struct(
         Field("ambient_far", "real", 0, "how long these rays are, scene units"),
         Field("occlusion_distance", "real", 0, "how far an obstacle counts as occlusion, scene units"),
         Field("occlusion_share", "real", 0, "what one ray adds to the open part; 0: no ambient occlusion"),
+        Field("asked_count", "int", 0, "quantities of materials for which the formula is asked"),
+        Field("bump_asked", "int", 0, "of those, from the first on: around spots too"),
+        Field("bump_surface", "int", 0, "1: so are normals and escape counts"),
+        Field("material_count", "int", 0, "materials, and blends of them"),
+        Field("set_material", "int", 0, "the set's"),
         Field("features", "int", 0, "bits FEATURE_"),
         Field("point_count", "int", 0, "points of a pixel"),
         Field("point_rows", "int", 0, "rows of their grid; 0: they are stochastic"),
@@ -197,6 +202,7 @@ def march_record(
         "ambient_far": distance if not rays.lit else largest,
         "occlusion_distance": distance,
         "occlusion_share": 1 / rays.cosine if occlusion is not None and rays.cosine else 0.0,
+        **material_counts(scene),
         "features": features_of(scene),
         "point_count": points,
         "point_rows": math.isqrt(points) if renderer.used_points.pattern == "grid" else 0,

@@ -62,13 +62,15 @@ def test_generated_texts_and_defines(kernels: Path) -> None:
     flat = flatten(
         "entry",
         kernels=kernels,
-        generated={"entry": '#include "a.h"\n', "a.h": "mine"},
-        defines={"LANES": 8},
+        generated={"entry": '#include "a.h"\n', "a.h": "mine[LANES]"},
+        defines={"LANES": 8, "NEVER_NAMED": 1},
         user=["a.h"],
     )
     assert flat.text.splitlines()[0] == "#define LANES 8"
-    assert "mine" in flat.text.splitlines()
-    assert flat.sources.texts["generated/a.h"] == "mine"
+    assert "mine[LANES]" in flat.text.splitlines()
+    # It would make another program of the same text.
+    assert "NEVER_NAMED" not in flat.text
+    assert flat.sources.texts["generated/a.h"] == "mine[LANES]"
     assert flat.sources.user == {"a.h"}
 
 

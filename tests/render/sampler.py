@@ -95,7 +95,7 @@ __kernel void turns(__global const scalar *numbers, __global scalar *result, int
 """
 
 _POINTS = """
-__kernel void points(__global const int *pixels, __global scalar *result, int n, int count, uint seed) {
+__kernel void points(__global const int *pixels, __global scalar *result, int n, int count, int rows, uint seed) {
     const int at = (int)get_global_id(0) * LANES;
     int x[LANES], y[LANES];
     for (int lane = 0; lane < LANES; ++lane) {
@@ -105,7 +105,7 @@ __kernel void points(__global const int *pixels, __global scalar *result, int n,
     const bits seeds = pixel_seed(x, y, seed, PURPOSE_POINTS);
     for (int point = 0; point < count; ++point) {
         real across, below;
-        point_offset(point, seeds, &across, &below);
+        point_offset(point, count, rows, seeds, &across, &below);
         store_lanes(result + 2 * point * n + at, across);
         store_lanes(result + (2 * point + 1) * n + at, below);
     }
@@ -114,12 +114,11 @@ __kernel void points(__global const int *pixels, __global scalar *result, int n,
 
 
 class Sampler:
-    """The program for one precision and lane count; with `defines`, of a pixel's points, `points` too."""
+    """The program for one precision and lane count."""
 
-    def __init__(self, device: Device, precision: Precision, lanes: int, defines: str = "") -> None:
+    def __init__(self, device: Device, precision: Precision, lanes: int) -> None:
         self.device, self.precision, self.lanes = device, precision, lanes
-        text = defines + _TEXT + (_POINTS if defines else "")
-        self.program = compile_text(device, text, precision, lanes)
+        self.program = compile_text(device, _TEXT + _POINTS, precision, lanes)
 
     def squares(
         self, x: Array, y: Array, index: Array, seed: int = 0, purpose: int = 0
@@ -143,10 +142,10 @@ class Sampler:
         planes = self._run("turns", numbers, 5)
         return planes[0], planes[1], planes[2:]
 
-    def points(self, x: Array, y: Array, count: int, seed: int = 0) -> Array:
-        """Offsets of each pixel's points, shape (count, 2, n)."""
+    def points(self, x: Array, y: Array, count: int, seed: int = 0, rows: int = 0) -> Array:
+        """Offsets of each pixel's points, shape (count, 2, n): on a grid of so many rows, or stochastic ones."""
         pixels = np.stack(np.broadcast_arrays(x, y)).astype(np.int32)
-        planes = self._run("points", pixels, 2 * count, np.int32(count), np.uint32(seed))
+        planes = self._run("points", pixels, 2 * count, np.int32(count), np.int32(rows), np.uint32(seed))
         return planes.reshape(count, 2, -1)
 
     def _run(self, name: str, given: Array, planes: int, *settings: Any) -> Array:

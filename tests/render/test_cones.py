@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.pictures.film import Film
-from clfractal.renderers import march, surface, waves
+from clfractal.renderers import march, waves
 from clfractal.renderers.kernel import BLOCK
 from clfractal.renderers.plan import make_plan
 from clfractal.scene.model import Scene
@@ -68,8 +68,7 @@ def rendered(scene: Scene, device: Device) -> tuple[Film, int]:
 
 
 def without_cones(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (surface, waves):
-        monkeypatch.setattr(module, "has_cones", lambda scene, plan: False)
+    monkeypatch.setattr(waves, "has_cones", lambda scene, plan: False)
 
 
 @pytest.mark.parametrize(("formula", "camera"), MOST_STEPS)

@@ -17,6 +17,7 @@ from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.objects import object_defines, object_records
+from clfractal.renderers.planes import CUT_PLANE
 from clfractal.scene.model import Scene
 from tests.render.material_kernel import LOADS
 from tests.render.objects_oracle import NOWHERE, met
@@ -99,10 +100,9 @@ def look(shape: str, point: Floats, precision: Precision, lanes: int, count: int
         "LANES": lanes,
         "REAL_IS_DOUBLE": int(precision == "float64"),
         "PALETTE_SIZE": 256,
-        "HAS_MOTION": 0,
         **object_defines(lit),
     }
-    generated = {"look.cl": _TEXT, "structs.h": struct_text()}
+    generated = {"look.cl": _TEXT, "structs.h": struct_text() + CUT_PLANE.c_text()}
     flat = flatten("look.cl", generated=generated, defines=defines)
     kernel = cl.Kernel(compiler.compile_source(device, flat.text, program.math_flags(precision)), "look")
     given = np.clip(qmc.Sobol(3, seed=3).random(count), 1e-6, 1 - 1e-6).T

@@ -35,10 +35,8 @@ def samplers() -> list[Sampler]:
     return found
 
 
-@lru_cache
-def points_sampler(defines: str) -> Sampler:
-    device = choose()
-    return Sampler(device, "float32", accepted_lanes(device, "float32")[-1], defines)
+def points_sampler() -> Sampler:
+    return next(each for each in samplers() if each.precision == "float32" and each.lanes > 1)
 
 
 def grid_of_pixels(side: int) -> tuple[Array, Array]:
@@ -239,11 +237,8 @@ def test_filter_offsets_have_the_filters_distribution(name: str) -> None:
 
 @pytest.mark.parametrize("side", [1, 3, 8])
 def test_grid_is_exact(side: int) -> None:
-    sampler = points_sampler(
-        f"#define POINT_PATTERN 0\n#define POINTS {side**2}\n#define POINT_SIDE {side}\n"
-    )
     x, y = grid_of_pixels(4)
-    got = sampler.points(x, y, side * side)
+    got = points_sampler().points(x, y, side * side, rows=side)
     steps = ((2 * np.arange(side) + 1 - side) / np.float32(2 * side)).astype(np.float32)
     below, across = np.meshgrid(steps, steps, indexing="ij")
     for pixel in range(16):
@@ -251,10 +246,6 @@ def test_grid_is_exact(side: int) -> None:
         np.testing.assert_array_equal(got[:, 1, pixel], below.ravel())
     if side == 3:
         np.testing.assert_array_equal(steps, np.array([-1, 0, 1], np.float32) / np.float32(3))
-
-
-def stochastic(count: int) -> Sampler:
-    return points_sampler(f"#define POINT_PATTERN 1\n#define POINTS {count}\n")
 
 
 def nearest(points: Array) -> Array:
@@ -274,7 +265,7 @@ def jittered(side: int, pixels: int) -> Array:
 def test_stochastic_points_are_spread_better_than_jittered_ones(side: int) -> None:
     x, y = grid_of_pixels(32)
     count = side * side
-    points, jitter = stochastic(count).points(x, y, count), jittered(side, 1024)
+    points, jitter = points_sampler().points(x, y, count), jittered(side, 1024)
     # A hexagonal lattice has 1.07.
     assert nearest(points).min() * side > 0.65
     assert nearest(points).mean() > 1.25 * nearest(jitter).mean()
@@ -286,7 +277,7 @@ def test_stochastic_points_are_spread_better_than_jittered_ones(side: int) -> No
 @pytest.mark.parametrize("count", [4, 7, 64])
 def test_stochastic_points_are_everywhere_alike_and_unlike_in_neighbours(count: int) -> None:
     x, y = grid_of_pixels(64)
-    sampler = stochastic(count)
+    sampler = points_sampler()
     points = sampler.points(x, y, count)
     assert np.abs(points).max() < 0.5
     # Over many pixels every part of a pixel gets its share: no picture is brighter for where its points lie.
@@ -302,7 +293,7 @@ def test_stochastic_points_are_everywhere_alike_and_unlike_in_neighbours(count: 
 
 def test_stochastic_points_are_laid_out_in_four_ways() -> None:
     x, y = grid_of_pixels(64)
-    strips = (stochastic(7).points(x, y, 7) + 0.5) * 7
+    strips = (points_sampler().points(x, y, 7) + 0.5) * 7
     order = np.arange(7)[:, None, None]
     upward, downward = (np.floor(strips) == order).all(0), (np.floor(strips) == 6 - order).all(0)
     ways = np.concatenate([upward, downward])
@@ -315,11 +306,11 @@ def test_stochastic_points_are_laid_out_in_four_ways() -> None:
 
 
 def test_points_do_not_depend_on_the_packet() -> None:
-    device, defines = choose(), "#define POINT_PATTERN 1\n#define POINTS 9\n"
     x, y = grid_of_pixels(8)
-    wide = stochastic(9).points(x, y, 9)
-    narrow = Sampler(device, "float32", accepted_lanes(device, "float32")[0], defines).points(x, y, 9)
-    np.testing.assert_array_equal(wide, narrow)
+    wide, *others = [each.points(x, y, 9) for each in samplers() if each.precision == "float32"]
+    assert others
+    for narrow in others:
+        np.testing.assert_array_equal(wide, narrow)
 
 
 # Directions.
