@@ -33,9 +33,5 @@ STAGE(begin_shots) {
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
     // A pixel's points look for objects on their own rays.
-    if (settings->point_count > 1) {
-        send_past_objects(s, 0, r, begin.t, mask_of(a.wanted), w);
-        return;
-    }
-    send_clipped(s, 0, r, begin.t, WHICH, mask_of(a.wanted), w);
+    send_clipped(s, 0, r, begin.t, settings->point_count > 1 ? GOES_PAST : WHICH, mask_of(a.wanted), w);
 }

@@ -48,25 +48,16 @@ INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world 
 // What has to be known of a ray: which surface it meets, or only whether it meets one.
 #define WHICH R(0.0)
 #define WHETHER ((real)(REAL_LARGEST))
+#define GOES_PAST R(-1.0)
 
-// Sends a ray for all that it may meet. Its march ends at the nearest object, and is left out where that is nearer than `enough`: see
-// `meet_objects`.
+// Sends a ray for all that it may meet. Its march ends at the nearest object, and is left out where that is nearer than `enough`, unless the
+// ray GOES_PAST: see `meet_objects`.
 INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask wanted, world w) {
     if (s.q.objects) {
         __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
         lanes_store(pick(wanted, r.far, R(-1.0)), at + RAY_OBJECT * s.q.stride);
         lanes_store(OBJECT_AWAITED, at + RAY_OBJECT_NUMBER * s.q.stride);
         lanes_store(enough, at + RAY_OBJECT_PLACE * s.q.stride);
-    }
-    send_to_set(s, turn, r, free, wanted, w);
-}
-
-// Sends a ray that looks for the set alone.
-INLINE void send_past_objects(stage s, int turn, ray r, real free, mask wanted, world w) {
-    if (s.q.objects) {
-        __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
-        lanes_store((real)(REAL_LARGEST), at + RAY_OBJECT * s.q.stride);
-        lanes_store(R(0.0), at + RAY_OBJECT_NUMBER * s.q.stride);
     }
     send_to_set(s, turn, r, free, wanted, w);
 }

@@ -21,7 +21,8 @@ STAGE(meet_objects) {
     }
     lanes_store(pick(waits, nearest, longest), numbers + RAY_OBJECT * q.stride);
     lanes_store(pick(waits, number, before), numbers + RAY_OBJECT_NUMBER * q.stride);
-    lanes_store(pick(waits, pick(less_equal(enough, nearest), fmin(far, nearest), R(-1.0)), far), numbers + RAY_FAR * q.stride);
+    const mask ends = waits & less_equal(R(0.0), enough);
+    lanes_store(pick(ends, pick(less_equal(enough, nearest), fmin(far, nearest), R(-1.0)), far), numbers + RAY_FAR * q.stride);
 }
 
 // The count on the face of an object's cut: all that the plane takes. Of other things that are no formulas it is 0.

@@ -11,7 +11,9 @@ STAGE(send_points) {
     const world w = WORLD;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s);
-    const encounter end_of_cone = queue_met(s.q, 0, s.slot);
+    queue of_set = s.q;
+    of_set.objects = 0;
+    const encounter end_of_cone = queue_met(of_set, 0, s.slot);
     tally cost;
     STATE_RECALL(s, cost, STATE_TALLY);
     tally_met(&cost, end_of_cone, 0);

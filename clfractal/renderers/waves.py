@@ -142,7 +142,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     for bounce in range(bounces(scene) + 1):
         turns = 1
         within = bounce > 0 and has_glass_set(scene)
-        if points == 1 or bounce > 0:
+        # (Of a pixel with points only a face asks whether an object is before it.)
+        if points == 1 or bounce > 0 or has_faces(scene):
             yield from of_objects(met, 1 + within)
         if has_faces(scene):
             yield stage("find_faces", bounce=bounce)

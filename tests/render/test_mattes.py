@@ -18,7 +18,9 @@ from clfractal.errors import SceneError
 from clfractal.files.channels import MATERIAL_MATTES, MATTES, NUMBERED, OBJECT_MATTES
 from clfractal.files.exr import read_exr
 from clfractal.pictures.film import Film
+from clfractal.renderers import carried
 from clfractal.renderers.mattes import bits_of, identifier, murmur3, ranked
+from clfractal.renderers.state import state_numbers
 from clfractal.renderers.surface import program_texts
 from tests.render.shots import plan_of, repeated
 from tests.render.test_paths import path, scene_of
@@ -182,9 +184,14 @@ def test_ranks_join_what_has_the_same_name() -> None:
     np.testing.assert_allclose(made, [10, 0.3, 20, 0.3, 30, 0.05, 0, 0, 0, 0, 0, 0], rtol=1e-6)
 
 
-def test_pictures_without_them_do_not_know_them(device: Device) -> None:
-    texts = program_texts(scene_of(**SECTIONS), plan_of(scene_of(**SECTIONS), device, channels=("R", "A")))
-    assert all("#define HAS_MATTES 0" in text.flat.text for text in texts)
+def test_pictures_without_them_keep_nothing_for_them(device: Device) -> None:
+    """The programs are the same, and what pixels carry is less."""
+    scene = scene_of(**SECTIONS)
+    without, with_them = (
+        plan_of(scene, device, channels=names) for names in (("R", "A"), ("R", "A", "object"))
+    )
+    assert program_texts(scene, without) == program_texts(scene, with_them)
+    assert state_numbers(scene, without) + carried.MATTES.numbers == state_numbers(scene, with_them)
 
 
 @pytest.mark.parametrize(
