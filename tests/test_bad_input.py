@@ -367,7 +367,7 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
     monkeypatch.setattr(program, "_REMARK_SECONDS", 600.0)
     monkeypatch.setattr(progress, "SILENT_SECONDS", 600.0)
     ended = shell("render", "scene.yaml", "-o", "old.png")
-    assert ended.is_one_line(3, "surface.cl:", "vod")
+    assert ended.is_one_line(3, "find_spots.cl:", "vod")
     told = shell("render", "scene.yaml", "-o", "old.png", "--verbose")
     assert told.status == 3
     assert " | STAGE(find_spots)" in told.err.split("\n", 1)[1]

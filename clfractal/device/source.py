@@ -76,7 +76,7 @@ def flatten(
     """Put `entry` and all it includes into one text.
 
     Args:
-        entry: a file of the kernels folder (`surface.cl`) or the name of a generated text.
+        entry: a file of the kernels folder (`march.cl`) or the name of a generated text.
         generated: texts that may be included by their names (`formula.h`); they go before files of the same
             name.
         defines: names and values written as `#define` lines at the head of the text, of those that the text names.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from itertools import combinations
 
-from clfractal.renderers.surface import COLORINGS, NORMALS
 from tests.gpu import listing
 from tests.gpu.pairs import Pair, covering
 
@@ -40,13 +39,6 @@ def test_all_pairs_meet_in_few_choices() -> None:
 def test_what_must_not_meet_does_not() -> None:
     apart = {frozenset({("a", "1"), ("c", "2")}), frozenset({("b", "2"), ("d0", "yes")})}
     assert met(covering(FACTORS, apart)) == every_pair() - apart
-
-
-def test_every_kind_of_color_and_normal_is_in_some_program() -> None:
-    texts = [each.text.text for each in listing.paired() if each.name.startswith("surface")]
-    for define, numbers in (("COLORING", COLORINGS.values()), ("NORMAL", range(len(NORMALS)))):
-        for number in numbers:
-            assert any(f"#define {define} {number}\n" in text for text in texts), (define, number)
 
 
 def test_names_tell_programs_apart() -> None:
