@@ -35,7 +35,7 @@
 #define ROW ((int)get_global_id(1))
 #define STAGE(name) __kernel void name(STAGE_ARGUMENTS)
 #endif
-#define STAGE_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, settings->meets_objects}
+#define STAGE_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, settings->meets_objects, settings->point_count > 1}
 // That of a march, which knows nothing of objects beside the set.
-#define MARCH_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, 0}
+#define MARCH_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, 0, settings->point_count > 1}
 #define WAS_CANCELLED (*(volatile __constant const int *)&sampling->cancelled)

@@ -18,7 +18,7 @@ STAGE(begin_shots) {
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const pixel p = sums_before(s, &here);
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
-    STATE_KEEP(s, a, STATE_AIM);
+    aim_keep(s, &a);
     if (sample == first) count_waits_from(s.span, &here);
     tally cost = {R(0.0), R(0.0), R(0.0)};
     start_of_rays begin = {R(0.0)};

@@ -4,7 +4,7 @@
 
 // The rays within: each pixel's second one.
 INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride, __constant const struct March *settings) {
-    const queue q = {rays + wave, met + wave, wave, 1, stride, settings->met_numbers, HAS_GLASS_SCATTER ? settings->meets_objects : 0};
+    const queue q = {rays + wave, met + wave, wave, 1, stride, settings->met_numbers, HAS_GLASS_SCATTER ? settings->meets_objects : 0, 0};
     return q;
 }
 

@@ -83,7 +83,7 @@ INLINE int paths_are_over(stage s) {
     // Of whole structs too much would be read.
     path so_far;
     const int on_path = s.at[STATE_PATH] + (int)(&so_far.on_path - (real *)&so_far);
-    const int found = s.at[STATE_SPOT] + NUMBERS_OF(spot), awaited = s.at[STATE_ASKED_LIGHT];
+    const int found = s.at[STATE_SPOT_SEEN] + SPOT_SEEN_NUMBERS, awaited = s.at[STATE_ASKED_LIGHT];
     const int numbers[5] = {on_path, found, awaited, awaited + 1, awaited + 2};
     mask left = less(R(1.0), R(0.0));
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));

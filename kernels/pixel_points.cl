@@ -1,7 +1,7 @@
 // Entry points: the points of a pixel, where it has several. They know no formula.
 #include "stages.h"
 #include "normals.h"
-#include "spot.h"
+#include "spot_found.h"
 #include "pixel_points.h"
 
 // Sends the rays of a pixel's points, from where its cone touched.
@@ -24,7 +24,7 @@ STAGE(send_points) {
     points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
 }
 
-// Makes spots of what a pixel's points have met.
+// Makes spots of what a pixel's points have met, in the place of `find_spots`.
 STAGE(join_points) {
     if (IS_BEYOND) return;
     STAGE_OF(s);
@@ -36,19 +36,17 @@ STAGE(join_points) {
     STATE_RECALL(s, cost, STATE_TALLY);
     STATE_RECALL(s, touched, STATE_TOUCH);
     sighting at_first = {R(0.0), cost.steps};
-    pixel_points points = points_begin(eye_ray(&a, view), a.time, touched, points_seed(&here.at, sample, w), w);
+    const ray r = eye_ray(&a, view);
+    pixel_points points = points_begin(r, a.time, touched, points_seed(&here.at, sample, w), w);
     for (int turn = 0; turn < settings->point_count; ++turn) {
-        const ray r = queue_ray(s.q, turn, s.slot);
+        const ray each = queue_ray(s.q, turn, s.slot);
         real object;
         vec place;
-        const encounter met = surface_met(s, turn, r, &object, &place, w);
+        const encounter met = surface_met(s, turn, each, &object, &place, w);
         tally_met(&cost, met, 1);
         at_first.steps += met.steps;
-        points_add(s, &points, turn, r, met, object, place, w);
+        points_add(s, &points, turn, each, met, object, place, w);
     }
     at_first.coverage = points.count * (R(1.0) / (real)((scalar)settings->point_count));
-    const spot found = points_spot(s, &points, w);
-    STATE_KEEP(s, cost, STATE_TALLY);
-    STATE_KEEP(s, at_first, STATE_SIGHTING);
-    spot_keep(s, &found, 0);
+    spot_found(s, &here.at, a, r, a.wanted, points_spot(s, &points, w), at_first, cost, next_turns, w);
 }

@@ -20,7 +20,8 @@ typedef struct {
 // Places of numbers in these structs.
 #define RAY_NEAR 6
 #define RAY_FAR 7
-#define RAY_NUMBERS NUMBERS_OF(ray)
+#define RAY_SENT (NUMBERS_OF(ray) - 1)
+#define RAY_KNOWN RAY_SENT   // only where pixels have points
 // Beside a ray stands one number more: of a ray of ambient light the weight of what it brings; of one that looks for a surface
 // where it began before a cone took it farther.
 #define RAY_STRENGTH NUMBERS_OF(ray)
@@ -48,13 +49,16 @@ typedef struct {
     int stride;        // from one number of a ray to its next
     int numbers;       // that are kept of what a ray met
     int objects;       // whether rays meet objects beside the set, too
+    int known;         // whether something is known of rays
 } queue;
 
 // Sends one ray of each pixel of a packet, whose first pixel is number `first` of the wave. Those that are not wanted have no
 // length: nobody marches them, and they meet nothing.
 INLINE void queue_send(queue q, int turn, int first, ray r, mask wanted) {
     r.far = pick(wanted, r.far, R(-1.0));
-    numbers_keep((const real *)&r, RAY_NUMBERS, q.rays + turn * q.wave + first, q.stride);
+    __global scalar *at = q.rays + turn * q.wave + first;
+    numbers_keep((const real *)&r, RAY_SENT, at, q.stride);
+    if (q.known) lanes_store(r.known, at + RAY_KNOWN * q.stride);
 }
 
 // Sends none for any pixel of a packet.
@@ -70,7 +74,9 @@ INLINE void queue_skip(queue q, int turn, int first) {
 INLINE ray queue_ray(queue q, int turn, int first) {
     ray r;
     r.known = RAY_NOTHING_KNOWN;
-    numbers_recall((real *)&r, RAY_NUMBERS, q.rays + turn * q.wave + first, q.stride);
+    __global const scalar *at = q.rays + turn * q.wave + first;
+    numbers_recall((real *)&r, RAY_SENT, at, q.stride);
+    if (q.known) r.known = lanes_load(at + RAY_KNOWN * q.stride);
     return r;
 }
 

@@ -72,7 +72,7 @@ INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q,
         if (next_place < 0) continue;
         const mask here = lanes_of_bits(1u << lane);
 #define TAKE_NUMBER(i) ((real *)&next)[i] = pick(here, (real)(q.rays[i * q.stride + next_place]), ((real *)&next)[i]);
-        WRITTEN_OUT(RAY_NUMBERS, TAKE_NUMBER)
+        WRITTEN_OUT(POINTS > 1 ? NUMBERS_OF(ray) : RAY_SENT, TAKE_NUMBER)
         fresh |= 1u << lane;
     }
     march_begin(m, next, lanes_of_bits(fresh), goal, settings);

@@ -26,29 +26,55 @@ INLINE __global scalar *asked_at(stage s, int place, int i, world w) {
 }
 INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return asked_at(s, place, w.settings->bump_asked, w); }
 
+// A slice of a thing: numbers from `first` on.
+INLINE void slice_keep(stage s, const void *thing, int first, int count, int part, int i) {
+    numbers_keep((const real *)thing + first, count, state_part(s, part) + i * count * s.stride, s.stride);
+}
+INLINE void slice_recall(stage s, void *thing, int first, int count, int part, int i) {
+    numbers_recall((real *)thing + first, count, state_part(s, part) + i * count * s.stride, s.stride);
+}
+
+INLINE void aim_keep(stage s, const aim *a) {
+    slice_keep(s, a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
+    if (KEEPS(s, STATE_THROUGH_LENS)) slice_keep(s, a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
+}
+
 INLINE aim aim_kept(stage s) {
-    aim a;
-    STATE_RECALL(s, a, STATE_AIM);
+    aim a = {R(0.0)};
+    slice_recall(s, &a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
+    if (KEEPS(s, STATE_THROUGH_LENS)) slice_recall(s, &a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
     return a;
 }
 
 // The first spot, or that after the last bounce.
 INLINE spot spot_kept(stage s, int bounce) {
-    spot here;
-    STATE_RECALL_ONE(s, here, STATE_SPOT, bounce > 0);
+    spot here = {R(0.0)};
+    slice_recall(s, &here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
+    if (KEEPS(s, STATE_SPOT_THING)) slice_recall(s, &here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
     return here;
 }
 
-INLINE void spot_keep(stage s, const spot *here, int bounce) { STATE_KEEP_ONE(s, *here, STATE_SPOT, bounce > 0); }
+INLINE void spot_keep(stage s, const spot *here, int bounce) {
+    slice_keep(s, here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
+    if (KEEPS(s, STATE_SPOT_THING)) slice_keep(s, here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
+}
 
-// What a path carries: slices that the scene does not need are 0.
+// What a path carries: slices that the scene does not need say that it is in the open.
+#define FLIGHT_FIRST (ASKED_LIGHT_NUMBERS + WITHIN_NUMBERS)
 INLINE void carried_keep(stage s, const carried *with) {
-    const real *numbers = (const real *)with;
-    numbers_keep(numbers, ASKED_LIGHT_NUMBERS, state_part(s, STATE_ASKED_LIGHT), s.stride);
-    numbers += ASKED_LIGHT_NUMBERS;
-    if (KEEPS(s, STATE_WITHIN)) numbers_keep(numbers, WITHIN_NUMBERS, state_part(s, STATE_WITHIN), s.stride);
-    numbers += WITHIN_NUMBERS;
-    if (KEEPS(s, STATE_FLIGHT)) numbers_keep(numbers, FLIGHT_NUMBERS, state_part(s, STATE_FLIGHT), s.stride);
+    slice_keep(s, with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
+    if (KEEPS(s, STATE_WITHIN)) slice_keep(s, with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
+    if (KEEPS(s, STATE_FLIGHT)) slice_keep(s, with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
+}
+
+INLINE carried carried_kept(stage s) {
+    carried with = {{R(0.0)}};
+    with.wave = R(-1.0);
+    with.flight = (real)(REAL_LARGEST);
+    slice_recall(s, &with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
+    if (KEEPS(s, STATE_WITHIN)) slice_recall(s, &with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
+    if (KEEPS(s, STATE_FLIGHT)) slice_recall(s, &with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
+    return with;
 }
 
 // Where a number of it is kept.
@@ -56,15 +82,4 @@ INLINE int carried_number(__constant const int *at, int number) {
     if (number < ASKED_LIGHT_NUMBERS) return at[STATE_ASKED_LIGHT] + number;
     number -= ASKED_LIGHT_NUMBERS;
     return number < WITHIN_NUMBERS ? at[STATE_WITHIN] + number : at[STATE_FLIGHT] + number - WITHIN_NUMBERS;
-}
-
-INLINE carried carried_kept(stage s) {
-    carried with = {{R(0.0)}};
-    real *numbers = (real *)&with;
-    numbers_recall(numbers, ASKED_LIGHT_NUMBERS, state_part(s, STATE_ASKED_LIGHT), s.stride);
-    numbers += ASKED_LIGHT_NUMBERS;
-    if (KEEPS(s, STATE_WITHIN)) numbers_recall(numbers, WITHIN_NUMBERS, state_part(s, STATE_WITHIN), s.stride);
-    numbers += WITHIN_NUMBERS;
-    if (KEEPS(s, STATE_FLIGHT)) numbers_recall(numbers, FLIGHT_NUMBERS, state_part(s, STATE_FLIGHT), s.stride);
-    return with;
 }

@@ -51,13 +51,17 @@ def _carried(name: str, meaning: str, *members: tuple[Kind, str, str]) -> Carrie
     return Carried(name, meaning, tuple(Member(*member) for member in members))
 
 
-AIM = _carried(
-    "aim",
-    "Where the shot goes to.",
+AIM_AT = _carried(
+    "aim_at",
+    "Where the shot goes to in the picture.",
     ("real", "wanted", "whether the pixel takes this sample"),
     ("real", "x", "pixels from the picture's left side ..."),
     ("real", "y", "... and from its top"),
     ("real", "offset", "distance squared from the pixel's middle, pixels"),
+)
+THROUGH_LENS = _carried(
+    "through_lens",
+    "Where the shot goes through the lens, and when.",
     ("real", "lens_x", "lens radii from its middle"),
     ("real", "lens_y", ""),
     ("real", "time", "while the shutter is open, 0 to 1"),
@@ -81,8 +85,8 @@ TALLY = _carried(
     ("real", "count", "applications of the formula"),
     ("real", "bad", "steps that ended inside"),
 )
-SPOT = _carried(
-    "spot",
+SPOT_SEEN = _carried(
+    "spot_seen",
     "A place on the surface, and how it looks.",
     ("real", "found", ""),
     ("vec", "point", "where it is shaded, and rays leave it"),
@@ -91,6 +95,10 @@ SPOT = _carried(
     ("real", "cone", "the pixel's footprint there"),
     ("real", "smooth", "escape count"),
     ("color", "tint", "of the surface"),
+)
+SPOT_THING = _carried(
+    "spot_thing",
+    "Of what thing a spot is, and what chooses its colour.",
     (
         "real",
         "object",
@@ -118,7 +126,6 @@ PATH = _carried(
     ("color", "through", "part of what comes next that reaches the eye"),
     ("color", "seen", "light so far"),
 )
-# What a path of light carries from a spot to the next, in three slices, of which a scene may not need the last ones.
 ASKED_LIGHT = _carried(
     "asked_light",
     "What a path awaits of the lights at its last spot.",
@@ -147,12 +154,19 @@ FLIGHT = _carried(
     ("real", "seed_low", "32 random bits for a walk of its own, as two whole numbers ..."),
     ("real", "seed_high", "... of which this is the higher one"),
 )
-SLICES = (ASKED_LIGHT, WITHIN, FLIGHT)
-CARRIED = Carried(
-    "carried",
-    "What a path of light carries from a spot to the next.",
-    tuple(member for each in SLICES for member in each.members),
+
+
+def _whole(name: str, meaning: str, *slices: Carried) -> Carried:
+    return Carried(name, meaning, tuple(member for each in slices for member in each.members))
+
+
+# Things of slices, of which a scene may not need the last ones.
+AIM = _whole("aim", "Where the shot goes to.", AIM_AT, THROUGH_LENS)
+SPOT = _whole("spot", "A place on the surface.", SPOT_SEEN, SPOT_THING)
+CARRIED = _whole(
+    "carried", "What a path of light carries from a spot to the next.", ASKED_LIGHT, WITHIN, FLIGHT
 )
+SLICES = (AIM_AT, THROUGH_LENS, SPOT_SEEN, SPOT_THING, ASKED_LIGHT, WITHIN, FLIGHT)
 FACE = _carried(
     "plane_face",
     "Where a plane opens the set on the way to the next spot.",

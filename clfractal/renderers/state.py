@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from clfractal.renderers.carried import (
-    AIM,
+    AIM_AT,
     ASKED_LIGHT,
     FACE,
     FACET,
@@ -23,9 +23,11 @@ from clfractal.renderers.carried import (
     PATH,
     PIXEL,
     SIGHTING,
-    SPOT,
+    SPOT_SEEN,
+    SPOT_THING,
     START,
     TALLY,
+    THROUGH_LENS,
     TOUCH,
     WITHIN,
 )
@@ -34,7 +36,7 @@ from clfractal.renderers.passes import has_mattes, has_parts
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces
-from clfractal.renderers.waves import air_turns, has_cones
+from clfractal.renderers.waves import air_turns, has_cones, has_lens
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 
@@ -57,6 +59,12 @@ def _goes_on(scene: Scene) -> bool:
     return along_paths(scene) or bounces(scene) > 0
 
 
+def _tells_things(scene: Scene, plan: Plan) -> bool:
+    """Whether spots know more than how they look."""
+    by_quantity = scene.coloring.by not in ("solid", "normal", "iterations")
+    return by_quantity or bool(scene.objects) or has_mattes(plan) or has_faces(scene)
+
+
 def normal_count(scene: Scene) -> int:
     """Normals over which a pixel's shading is averaged."""
     renderer = scene.surface
@@ -66,14 +74,20 @@ def normal_count(scene: Scene) -> int:
 
 
 PARTS = (
-    Part("AIM", AIM.numbers, lambda scene, plan: 1),
+    Part("AIM_AT", AIM_AT.numbers, lambda scene, plan: 1),
+    Part("THROUGH_LENS", THROUGH_LENS.numbers, lambda scene, plan: int(has_lens(scene) or plan.moving)),
     Part("SIGHTING", SIGHTING.numbers, lambda scene, plan: 1),
     Part("TALLY", TALLY.numbers, lambda scene, plan: 1),
     Part("SUMS", PIXEL.numbers, lambda scene, plan: 1),
     Part("START", START.numbers, lambda scene, plan: int(has_cones(scene, plan))),
     Part("TOUCH", TOUCH.numbers, lambda scene, plan: int(scene.surface.used_points.count > 1)),
     # The first spot, and the one after the last bounce.
-    Part("SPOT", SPOT.numbers, lambda scene, plan: 1 + _goes_on(scene)),
+    Part("SPOT_SEEN", SPOT_SEEN.numbers, lambda scene, plan: 1 + _goes_on(scene)),
+    Part(
+        "SPOT_THING",
+        SPOT_THING.numbers,
+        lambda scene, plan: (1 + _goes_on(scene)) * _tells_things(scene, plan),
+    ),
     Part("FACET", FACET.numbers, lambda scene, plan: normal_count(scene) if normal_count(scene) > 1 else 0),
     Part("PATH", PATH.numbers, lambda scene, plan: int(_goes_on(scene))),
     Part("ASKED_LIGHT", ASKED_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),

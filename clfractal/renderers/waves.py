@@ -4,7 +4,7 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     [send_cones  march]  and for each sample
 
-    begin_shots  march  [send_points  march  join_points]  find_spots  [color_spots]  march  light_spots
+    begin_shots  march  find_spots (or send_points  march  join_points)  [color_spots]  march  light_spots
 
 with `[meet_objects]` before each march and `[look_at_objects]` after those that look for a spot, with `[find_planes]` and
 `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look
@@ -64,8 +64,12 @@ def asks_formula(scene: Scene) -> bool:
 def has_cones(scene: Scene, plan: Plan) -> bool:
     """Whether a cone for each block of pixels goes before the rays: those through a lens, or of a view that moves, have no
     common one."""
-    lens = isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0
-    return scene.surface.search == "distance" and not lens and not plan.moving
+    return scene.surface.search == "distance" and not has_lens(scene) and not plan.moving
+
+
+def has_lens(scene: Scene) -> bool:
+    """Whether rays leave a lens."""
+    return isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0
 
 
 def meets_objects(scene: Scene) -> bool:
@@ -158,9 +162,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             if within:
                 yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE, bounce)
         yield from of_objects(looked, turns + within)
-        if points > 1 and bounce == 0:
-            yield stage("join_points", turns)
-        yield stage("find_spots", turns, bounce=bounce, next_turns=after)
+        kernel = "join_points" if points > 1 and bounce == 0 else "find_spots"
+        yield stage(kernel, turns, bounce=bounce, next_turns=after)
         if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)
         paths = isinstance(scene.lighting, PathLighting)
