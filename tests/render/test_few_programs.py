@@ -1,0 +1,134 @@
+"""What a scene has is data: it neither changes a program's text nor, but for stages that it launches, needs another one."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from clfractal.device.select import Device
+from clfractal.renderers.surface import program_texts
+from clfractal.scene.model import Scene
+from tests.render.shots import PERSPECTIVE, plan_of, scene_of
+
+FORMULA = {"name": "mandelbulb", "iterations": 6}
+PLANE = {"center": [0, 0, 0], "normal": [1, -1, 0.2], "width": 2, "height": 2}
+BALL = {"type": "sphere", "position": [1.5, 0, 0], "radius": 0.3}
+LAMPS = [
+    {"type": "sphere", "position": [3, 0, 0], "radius": 0.2},
+    {"type": "rectangle", "position": [0, 3, 0], "direction": [0, -1, -0.5], "width": 1, "height": 1},
+    {"type": "spot", "position": [0, 0, 3], "direction": [0, 0, -1]},
+    {"type": "point", "position": [2, 2, 2]},
+    {"direction": [1, 1, -1], "angular_size": 4},
+]
+# Of each feature what a scene says, and the programs that it needs beside those of a plain one.
+FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
+    "lights": ({"lights": LAMPS}, set()),
+    "sky": ({"environment": {"sky": {}, "rays": 2}}, set()),
+    "map": ({"environment": {"name": "studio", "rays": 2, "background": True}}, set()),
+    "occlusion": ({"renderer": {"ambient_occlusion": {"rays": 2}}}, set()),
+    "fog": ({"fog": {"density": 0.1, "height": 2}}, set()),
+    "shafts": ({"fog": {"density": 0.1, "scattering": {}}}, set()),
+    "mirror": ({"material": {"reflection": 0.5}}, set()),
+    "noise": ({"renderer": {"samples": 64, "noise": 0.02}}, set()),
+    "lens": ({"camera": {**PERSPECTIVE, "f_number": 2}}, set()),
+    "normal colours": ({"coloring": {"by": "normal"}}, set()),
+    "counts": ({"coloring": {"by": "iterations"}}, set()),
+    "trap": ({"coloring": {"by": "trap", "trap": {"shape": "sphere"}}}, {"colors"}),
+    "thickness": ({"coloring": {"by": "thickness", "along": "view"}}, {"colors"}),
+    "layer": ({"coloring": {"by": "layer_distance", "along": "reflection"}}, {"colors"}),
+    "glow": ({"glow": {"by": "trap"}}, {"glow"}),
+    "objects": ({"objects": {"ball": BALL, "sea": {"type": "water", "position": [0, 0, -2]}}}, {"objects"}),
+    "cut": ({"cut_planes": [{"plane": PLANE, "cut": True}]}, {"planes"}),
+    "quads": ({"cut_planes": [{"plane": PLANE}]}, {"planes"}),
+}
+# Programs that know the formula, and how its solids are joined.
+OF_FORMULA = {"rays", "colors", "glow", "planes", "glass"}
+
+
+def scene(formula: dict[str, Any] = FORMULA, camera: dict[str, Any] = PERSPECTIVE, **sections: Any) -> Scene:
+    return scene_of(formula, camera, **sections)
+
+
+def texts(given: Scene, device: Device, **plan: Any) -> dict[str, str]:
+    return {each.name: each.flat.text for each in program_texts(given, plan_of(given, device, **plan))}
+
+
+@pytest.mark.parametrize("feature", FEATURES)
+def test_a_feature_is_data(feature: str, device: Device) -> None:
+    sections, more = FEATURES[feature]
+    plain = texts(scene(FORMULA), device)
+    found = texts(scene(FORMULA, **sections), device)
+    assert set(found) == set(plain) | more
+    assert all(found[name] == text for name, text in plain.items())
+
+
+def test_layers_and_mattes_are_data(device: Device) -> None:
+    plain = texts(scene(FORMULA), device, channels=("R", "A"))
+    assert (
+        texts(scene(FORMULA), device, channels=("R", "albedo.R", "direct.G", "object", "CryptoObject00.R"))
+        == plain
+    )
+
+
+@pytest.mark.parametrize("features", [("trap", "thickness"), ("trap", "layer"), ("cut", "quads")])
+def test_kinds_of_a_feature_are_one_program(features: tuple[str, str], device: Device) -> None:
+    one, other = (texts(scene(FORMULA, **FEATURES[each][0]), device) for each in features)
+    assert one == other
+
+
+def test_normals_and_points_are_one_program(device: Device) -> None:
+    """But for the march, which polishes places that normals are made of."""
+    kinds: list[dict[str, Any]] = [
+        {"points": {"pattern": "grid", "count": 9}},
+        {"points": {"pattern": "stochastic", "count": 4}},
+        {"normal": "least_squares"},
+        {"normal": "one_triangle"},
+        {"normal": "eight_triangles_shading"},
+        {"normal": "eight_triangles_normal"},
+    ]
+    found = [texts(scene(FORMULA, renderer=each), device) for each in kinds]
+    for each in found:
+        each.pop("rays")
+    assert all(each == found[0] for each in found)
+
+
+def test_stages_without_a_formula_are_the_same_for_all(device: Device) -> None:
+    """For any formula, alone or joined to others."""
+    hole = {"hole": {"type": "sphere", "join": "cut"}, "drop": {"type": "box", "join": "smooth_union"}}
+    plain = texts(scene(FORMULA), device)
+    for other in (scene({"name": "hast", "iterations": 9}), scene(FORMULA, objects=hole)):
+        found = texts(other, device)
+        assert {name: text for name, text in found.items() if name not in OF_FORMULA} == {
+            name: text for name, text in plain.items() if name not in OF_FORMULA
+        }
+
+
+# Features that still make texts of their own: none may join them.
+LEFT = {
+    *("HAS_SET_LIGHTS", "HAS_MAPS", "HAS_BUMP", "MATERIALS", "HAS_EMITTERS", "HAS_CLOUDS"),
+    *("HAS_GLASS", "HAS_GLASS_SET", "HAS_GLASS_SCATTER", "HAS_SUBSURFACE", "TRANSFER_COLUMNS"),
+}
+# What is the same in every program: counts, sizes, and numbers of words.
+ALIKE = re.compile(
+    r"(CHANNEL|KEPT|STATISTIC|OBJECT|MAP|LIGHT|TRAP|COLORING|ALONG|NORMAL|FEATURE|STATE|ALBEDO|SMOOTHEST|REPEATED)_\w+"
+    r"|TILE|PALETTE_SIZE|CHANNEL_COUNT|RAY_CHANNELS|MATTE_RANKS|STATISTICS|PASS_KEEP|PASS_ADD|WAVES|SPECTRUM_PLACES"
+    r"|TRANSFER_SIZE|\w+_NUMBERS"
+)
+
+
+def test_nothing_else_is_defined_for_stages_without_a_formula(device: Device) -> None:
+    """A define that stands for a feature is a conditional by another name."""
+    scenes = [
+        scene(FORMULA, **FEATURES["objects"][0]),
+        scene(FORMULA, lighting={"mode": "path"}),
+        scene(FORMULA, renderer={"normal": "least_squares"}),
+    ]
+    for each_scene in scenes:
+        for name, text in texts(each_scene, device).items():
+            if name in OF_FORMULA:
+                continue
+            head = text.split("#line", 1)[0]
+            named = set(re.findall(r"^#define (\w+)", head, re.MULTILINE)) - {"LANES", "REAL_IS_DOUBLE"}
+            assert {each for each in named if not ALIKE.fullmatch(each)} <= LEFT
