@@ -38,11 +38,14 @@ STAGE_NUMBERS = ("next_turns", "goal", "bounce", "sample")
 
 @dataclass(frozen=True, slots=True)
 class ProgramText:
-    """The whole text of a program, what it is for, and the names of its kernels that are launched."""
+    """The whole text of a program, what it is for, and the names of its kernels."""
 
     name: str
     flat: FlatText
     kernels: tuple[str, ...]
+
+
+Over: TypeAlias = Literal["pixels", "rays", "packets of rays"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,7 @@ class Stage:
     """
 
     kernel: str
-    over: Literal["pixels", "rays", "packets of rays"] = "pixels"
+    over: Over = "pixels"
     turns: int = 0
     numbers: Mapping[str, int] = field(default_factory=dict)
     of: Literal["pixels", "blocks"] = "pixels"
@@ -102,6 +105,10 @@ class TileKernel(ABC):
     def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
         """The kernels of a launch, in order, for samples from the first up to the second."""
         yield Stage(self.name)
+
+    def over(self, kernel: str) -> Over:
+        """What each work-item of one of its kernels does, see `Stage`."""
+        return "pixels"
 
     def wave_needs(self) -> WaveNeeds:
         """What pixels need between stages."""

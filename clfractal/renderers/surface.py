@@ -19,6 +19,7 @@ from clfractal.renderers.kernel import (
     RAY_NUMBERS,
     STATE_PADDING,
     KernelArgument,
+    Over,
     ProgramText,
     Stage,
     TileKernel,
@@ -51,6 +52,8 @@ from clfractal.renderers.scattering import albedo_tables
 from clfractal.renderers.set_lights import set_light_data, set_lights_of
 from clfractal.renderers.state import state_numbers, state_places, state_text
 from clfractal.renderers.waves import (
+    OF_SINGLE_LANES,
+    OVER,
     meets_objects,
     met_numbers,
     most_turns,
@@ -152,6 +155,9 @@ class SurfaceKernel(TileKernel):
     def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
         return surface_stages(self.scene, self.plan, samples)
 
+    def over(self, kernel: str) -> Over:
+        return OVER.get(kernel, "pixels")
+
     def wave_needs(self) -> WaveNeeds:
         ray = RAY_NUMBERS + OBJECT_NUMBERS * meets_objects(self.scene)
         return WaveNeeds(
@@ -247,9 +253,10 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     launched = {stage.kernel for stage in surface_stages(scene, plan, (0, 1))}
     texts = []
     for name, entry, kernels, defines_of in _PROGRAMS:
-        wanted = tuple(kernel for kernel in kernels if kernel in launched)
-        if not wanted:
+        if launched.isdisjoint(kernels):
             continue
+        # All that there are: what is kept of a program has every kernel that any scene may launch.
+        wanted = tuple(each for each in kernels if plan.lanes == 1 or each not in OF_SINGLE_LANES)
         defines = defines_of(scene, plan)
         files = [
             *(("trap_near.h",) if entry in _ASK_TRAPS else ()),

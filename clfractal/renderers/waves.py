@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from clfractal.renderers.kernel import MET_NUMBERS, Stage
+from clfractal.renderers.kernel import MET_NUMBERS, Over, Stage
 from clfractal.renderers.maps import asked_maps, bump_numbers, has_glass_set
 from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.plan import Plan
@@ -107,6 +107,20 @@ def most_turns(scene: Scene) -> int:
     return max(scene.surface.used_points.count, after, 1 + int(has_glass_set(scene)))
 
 
+# What work-items do of kernels that are not launched over pixels.
+OVER: dict[str, Over] = {
+    "march_rays": "rays",
+    "march_inside": "rays",
+    "send_cones": "packets of rays",
+    "look_at_surfaces": "packets of rays",
+    "look_inside_set": "packets of rays",
+    "meet_objects": "packets of rays",
+    "look_at_objects": "packets of rays",
+}
+# Packets look at surfaces where they march.
+OF_SINGLE_LANES = ("look_at_surfaces", "look_inside_set")
+
+
 def march_kernels(plan: Plan) -> tuple[str, ...]:
     """The kernels of `kernels/march.cl`: packets look at surfaces where they march."""
     return ("march_rays", "look_at_surfaces") if plan.lanes == 1 else ("march_rays",)
@@ -121,8 +135,8 @@ def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterat
     """The stages of a launch for samples from the first up to the second."""
     cones = has_cones(scene, plan)
     if cones and samples[0] < samples[1]:
-        yield Stage("send_cones", "packets of rays", 1, of="blocks")
-        yield Stage("march_rays", "rays", 1, {"goal": GOAL_CONE}, of="blocks")
+        yield Stage("send_cones", OVER["send_cones"], 1, of="blocks")
+        yield Stage("march_rays", OVER["march_rays"], 1, {"goal": GOAL_CONE}, of="blocks")
     # A launch without samples only writes what pixels have.
     for sample in range(*samples):
         yield from _sample(scene, sample, plan, cones=cones)
@@ -140,7 +154,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     met, looked = (("meet_objects",), ("look_at_objects",)) if beside else ((), ())
 
     def of_objects(kernels: tuple[str, ...], turns: int) -> Iterator[Stage]:
-        return (Stage(kernel, "packets of rays", turns) for kernel in kernels)
+        return (Stage(kernel, OVER[kernel], turns) for kernel in kernels)
 
     yield stage("begin_shots", int(cones))
     for bounce in range(bounces(scene) + 1):
@@ -191,6 +205,6 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
 
 
 def _marched(kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0) -> Iterator[Stage]:
-    yield Stage(kernels[0], "rays", turns, {"goal": goal, "bounce": bounce})
+    yield Stage(kernels[0], OVER[kernels[0]], turns, {"goal": goal, "bounce": bounce})
     if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
-        yield Stage(kernels[1], "packets of rays", turns)
+        yield Stage(kernels[1], OVER[kernels[1]], turns)

@@ -322,9 +322,9 @@ class Drawing:
         arguments = [Argument("buffer", size) for size in buffers]
         numbers = 2 + number_count(kernel)
         arguments += [Argument("scalar", dtype="int32", value=0.0)] * numbers
-        stage = next(each for each in kernel.stages((0, 1)) if each.kernel == name)
-        group = group_of(stage, lanes, self.group)
-        size = (self.packets, 1) if stage.over == "pixels" else group
+        over = kernel.over(name)
+        group = group_of(over, lanes, self.group)
+        size = (self.packets, 1) if over == "pixels" else group
         return Warm(name, size, group, tuple(arguments))
 
 

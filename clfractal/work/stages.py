@@ -18,6 +18,7 @@ from clfractal.renderers.kernel import (
     STAGE_NUMBERS,
     STATE_PADDING,
     WAVE_NUMBERS,
+    Over,
     Stage,
     TileKernel,
 )
@@ -88,11 +89,11 @@ def number_count(kernel: TileKernel) -> int:
     return _SPAN_NUMBERS + (len(WAVE_NUMBERS) + len(STAGE_NUMBERS) if kernel.waves else 0)
 
 
-def group_of(stage: Stage, lanes: int, group: int) -> tuple[int, ...]:
+def group_of(over: Over, lanes: int, group: int) -> tuple[int, ...]:
     """The size of a stage's work-groups, of which those over pixels have `group` work-items."""
-    if stage.over == "rays":
+    if over == "rays":
         return rays_group(lanes)
-    return (group, 1) if stage.over == "pixels" else (group,)
+    return (group, 1) if over == "pixels" else (group,)
 
 
 class Stages:
@@ -124,7 +125,7 @@ class Stages:
     def _enqueue(self, stage: Stage, span: Span, tiles: range, arguments: Sequence[Any]) -> cl.Event:
         lanes, (first, end) = self.kernel.plan.lanes, span.packets
         kernel = self._kernels.kernel(stage.kernel)
-        group = self._kernels.group(stage.kernel, group_of(stage, lanes, self.group))
+        group = self._kernels.group(stage.kernel, group_of(stage.over, lanes, self.group))
         numbers = [first, end, *span.samples, span.mode]
         size: tuple[int, ...] = (-(-(end - first) // self.group) * self.group, len(tiles))
         if self.kernel.waves:

@@ -64,6 +64,16 @@ def test_a_feature_is_data(feature: str, device: Device) -> None:
     assert all(found[name] == text for name, text in plain.items())
 
 
+@pytest.mark.parametrize("feature", ["lens", "objects", "cut", "mirror"])
+def test_a_program_has_the_same_kernels_for_all(feature: str, device: Device) -> None:
+    """What is kept of it would else have to be made again."""
+    plain, other = (
+        {each.name: each.kernels for each in program_texts(given, plan_of(given, device))}
+        for given in (scene(FORMULA), scene(FORMULA, **FEATURES[feature][0]))
+    )
+    assert all(other[name] == kernels for name, kernels in plain.items())
+
+
 def test_layers_and_mattes_are_data(device: Device) -> None:
     plain = texts(scene(FORMULA), device, channels=("R", "A"))
     assert (
