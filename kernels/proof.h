@@ -11,6 +11,7 @@
 #define PROOF_LANDED R(0.002)    // ... and this near where the potential is high
 #define PROOF_LOW R(0.1)         // a low potential: below this part of the cone over the set's radius
 #define PROOF_REACH R(0.75)      // of the pixel's cone: how far from the ray the descent may lead: a little more than half a diagonal
+#define PROOF_AHEAD R(1.0)       // of the pixel's cone: how far along the ray a hit may lie from where its proof has arrived
 #define PROOF_APART R(1.0)       // of the pixel's cone: how far apart two proofs are, unless ...
 #define PROOF_CLOSER R(0.7)      // ... the solid is that much nearer than at the failed one
 #define PROOF_ONWARD R(0.5)      // of the pixel's cone: the step after a failed proof
@@ -53,7 +54,8 @@ INLINE mask proof_step(march *m, const sight *s, int goal, __constant const stru
     const mask failed = m->proving & ~arrived & (astray | less_equal(proof_most(goal), m->probes));
     m->found.hit |= arrived;
     m->found.last = pick(arrived, m->low, m->found.last);
-    m->found.t = pick(arrived, m->proved_t, m->found.t);
+    const real solid_t = m->t + along, apart = PROOF_AHEAD * cone;
+    m->found.t = pick(arrived, clamp(m->proved_t, solid_t - apart, solid_t + apart), m->found.t);
     m->active &= ~arrived;
     m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
     m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
