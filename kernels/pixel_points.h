@@ -95,9 +95,9 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met,
     p->cone = pick(nearer & ~of_the_set(object, w), r.footprint + r.spread * met.t, p->cone);
     p->object = pick(nearer, object, p->object);
     p->other = pick(nearer, met.other, p->other);
-    p->share = pick(nearer, met.share, p->share);
+    p->share = pick(nearer, met.part, p->share);
     if (is_colored_at_once(w.material)) {
-        const color tint = spot_color(met.normal, met.smooth, object, met.other, met.share, w);
+        const color tint = spot_color(met.normal, met.smooth, object, met.other, met.part, w);
         p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
     }
     if (w.settings->geometric) points_place(p, number, w.settings->point_rows, found, base);

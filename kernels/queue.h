@@ -14,7 +14,7 @@ typedef struct {
     real smooth;                   // ... its escape count ...
     real more_steps, more_count;   // ... and what finding these has cost
     real solid;                    // the number of the object that the surface belongs to, or 0
-    real other, share;             // where two flow together: likewise of the other one, and its part of the colour
+    real other, part;              // where two flow together: likewise of the other one, and its part of the colour
 } encounter;
 
 // Places of numbers in these structs.
@@ -87,7 +87,7 @@ INLINE encounter encounter_kept(queue q, int at) {
     if (q.numbers > ENCOUNTER_SOLID) e.solid = lanes_load(q.met + ENCOUNTER_SOLID * q.stride + at);
     if (q.numbers > ENCOUNTER_OTHER) {
         e.other = lanes_load(q.met + ENCOUNTER_OTHER * q.stride + at);
-        e.share = lanes_load(q.met + (ENCOUNTER_OTHER + 1) * q.stride + at);
+        e.part = lanes_load(q.met + (ENCOUNTER_OTHER + 1) * q.stride + at);
     }
     return e;
 }
@@ -98,7 +98,7 @@ INLINE void encounter_keep_surface(queue q, int at, const encounter *e) {
     if (q.numbers > ENCOUNTER_SOLID) lanes_store(e->solid, q.met + ENCOUNTER_SOLID * q.stride + at);
     if (q.numbers > ENCOUNTER_OTHER) {
         lanes_store(e->other, q.met + ENCOUNTER_OTHER * q.stride + at);
-        lanes_store(e->share, q.met + (ENCOUNTER_OTHER + 1) * q.stride + at);
+        lanes_store(e->part, q.met + (ENCOUNTER_OTHER + 1) * q.stride + at);
     }
 }
 
@@ -121,7 +121,7 @@ INLINE encounter queue_met(queue q, int turn, int first) {
     e.hit = pick(nearer, R(1.0), e.hit);
     e.t = pick(nearer, object, e.t);
     e.touch = pick(nearer, object, e.touch);
-    e.share = pick(nearer, R(0.0), e.share);
+    e.part = pick(nearer, R(0.0), e.part);
     return e;
 }
 

@@ -95,10 +95,10 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, vec place, world w) {
     here.smooth = met.smooth;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-    here.tint = spot_color(met.normal, met.smooth, object, met.other, met.share, w);
+    here.tint = spot_color(met.normal, met.smooth, object, met.other, met.part, w);
     here.object = object;
     here.other = met.other;
-    here.share = met.share;
+    here.share = met.part;
     return here;
 }
 

@@ -147,7 +147,7 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
 #endif
 #if JOINS_SMOOTHLY
     met->other = surface.other_solid;
-    met->share = surface.share;
+    met->part = surface.share;
 #endif
 }
 

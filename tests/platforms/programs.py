@@ -15,6 +15,7 @@ from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import cut_plane, points, surface, trial, volume
 from clfractal.renderers.declarations import STRUCTS
 from clfractal.renderers.plan import make_plan
+from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.solids import Body
@@ -41,6 +42,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
     """All that is no renderer: grids, lists of points, measurements of the device, the window."""
     yield from of_grids(count, precision)
     yield "probe", probe.program_text(count, precision)
+    yield "volume exact", _exact_normals(count, precision)
     for name in ("mandelbulb", "hast"):  # by a scalar rule, and by the Jacobian
         yield (
             f"march_probe {name}",
@@ -53,6 +55,22 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
         yield "canvas", canvas.program_text()
         for to_image in (False, True):
             yield f"show {to_image=}", show.program_text(to_image=to_image)
+
+
+def _exact_normals(count: int, precision: Precision) -> FlatText:
+    """A surface in a grid with the formula's normals where rays meet it."""
+    scene = load_scene(
+        {
+            "version": 1,
+            "formula": {"name": "hast"},
+            "camera": {"position": [0, -4, 1], "target": [0, 0, 0]},
+            "renderer": {"type": "volume", "normals": "exact"},
+        }
+    )
+    grid: Any = SimpleNamespace(kind="byte", values=(None,))
+    return volume.program_text(
+        scene, make_plan(scene, precision=precision, lanes=count, channels=CHANNELS), grid
+    )
 
 
 def of_pictures(count: int, precision: Precision, pictures: Sequence[str]) -> Iterator[Named]:
