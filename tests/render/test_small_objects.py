@@ -122,11 +122,15 @@ def unlike(film: Film, other: Film) -> tuple[float, float]:
     ("scale", "mode"), one_of((0.28, "path"), (1000.0, "path"), (0.001, "direct"), (1.0, "direct"))
 )
 def test_an_object_looks_like_the_scenes_own_formula(device: Device, scale: float, mode: str) -> None:
-    """The same arrangement at other sizes is the same picture, but for places at a fractal's rims."""
+    """The same arrangement at other sizes is the same picture, but for places at a fractal's rims.
+
+    Along paths light is computed at a part of the cone that is told in estimates, and those of objects are scaled by their own
+    formula already: theirs lies nearer.
+    """
     for size in (96, 40):
         film = shoot(bulb("object", scale, mode, size), device)
         more, differ = unlike(film, shoot(bulb("main", 1.0, mode, size), device))
-        assert abs(more) < 0.004, size
+        assert abs(more) < (0.008 if mode == "path" else 0.004), size
         assert differ < 0.004, size
 
 
