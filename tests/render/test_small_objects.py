@@ -124,8 +124,8 @@ def unlike(film: Film, other: Film) -> tuple[float, float]:
 def test_an_object_looks_like_the_scenes_own_formula(device: Device, scale: float, mode: str) -> None:
     """The same arrangement at other sizes is the same picture, but for places at a fractal's rims.
 
-    Along paths light is computed at a part of the cone that is told in estimates, and those of objects are scaled by their own
-    formula already: theirs lies nearer.
+    Along paths light is computed at a part of the cone that is told in estimates, and those of objects are scaled by their
+    own formula already: theirs lies nearer.
     """
     for size in (96, 40):
         film = shoot(bulb("object", scale, mode, size), device)
