@@ -69,9 +69,8 @@ def settings_of(**values: Any) -> Environment:
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int, has_sun: bool) -> Any:
+def _program(device: Device, precision: Precision, lanes: int) -> Any:
     defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "PALETTE_SIZE": 256}
-    defines["HAS_SUN"] = int(has_sun)
     generated = {"environment.cl": _TEXT, "structs.h": struct_text()}
     flat = flatten("environment.cl", generated=generated, defines=defines)
     return compiler.compile_source(device, flat.text, program.math_flags(precision))
@@ -107,6 +106,7 @@ def ask(
     material = np.zeros((), records.MATERIAL.dtype(precision))
     for name, value in material_fields(settings or settings_of(), packed).items():
         material[name] = value
+    material["environment_sun"] = int(has_sun)
     device = choose()
     result = np.full((8, count), np.nan, precision)
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
@@ -114,7 +114,7 @@ def ask(
         cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
         for array in (planes, result, packed.data, material.reshape(1))
     ]
-    kernel = cl.Kernel(_program(device, precision, lanes, has_sun), "environment")
+    kernel = cl.Kernel(_program(device, precision, lanes), "environment")
     kernel.set_args(*buffers, np.int32(count))
     cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
     cl.enqueue_copy(device.queue, result, buffers[1])

@@ -187,7 +187,7 @@ def test_scenes_of_clear_glass_do_not_know_it() -> None:
         )
         plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
         texts.append([text.flat.text for text in program_texts(found, plan)])
-        assert "#define HAS_GLASS_SCATTER 0" in texts[-1][1]
+        assert any("#define HAS_GLASS_SCATTER 0" in text for text in texts[-1])
     assert texts[0] == texts[1]
 
 
