@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
@@ -65,8 +67,6 @@ from clfractal.scene.model import Scene
 from clfractal.solids import Body
 
 PALETTE_SIZE = 256
-# Entries that ask how near orbits come to traps.
-_ASK_TRAPS = ("color_spots.cl", "glow.cl")
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
 # Neither search of `search_defines`: rays within glass have one of their own.
@@ -224,47 +224,63 @@ class SurfaceKernel(TileKernel):
         )
 
 
-# Of each program its name, its entry point, the kernels that it may have, and the defines of its text. A scene needs those
-# whose stages it launches.
-_PROGRAMS: tuple[tuple[str, str, tuple[str, ...], Callable[[Scene, Plan], dict[str, object]]], ...] = (
-    ("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines),
-    ("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
-    ("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
-    ("spots", "find_spots.cl", ("find_spots",), state_defines),
-    ("objects", "objects.cl", ("meet_objects", "look_at_objects"), state_defines),
-    ("light", "light_spots.cl", ("light_spots",), state_defines),
-    ("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
-    ("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
-    ("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines),
-    ("colors", "color_spots.cl", ("color_spots",), formula_defines),
-    ("glow", "glow.cl", ("add_glow",), formula_defines),
-    ("planes", "see_planes.cl", ("find_faces", "find_planes"), face_and_plane_defines),
+@dataclass(frozen=True, slots=True)
+class _Program:
+    """A program: its entry point, the kernels that it may have, and the defines of its text.
+
+    Attributes:
+        formula: the kernel files beside `orbit.h` by which it asks the formula; None: it knows none.
+    """
+
+    name: str
+    entry: str
+    kernels: tuple[str, ...]
+    defines: Callable[[Scene, Plan], dict[str, object]]
+    formula: tuple[str, ...] | None = None
+
+
+# A scene needs those whose stages it launches.
+_PROGRAMS = (
+    _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines, ()),
+    _Program("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
+    _Program("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
+    _Program("spots", "find_spots.cl", ("find_spots",), state_defines),
+    _Program("objects", "objects.cl", ("meet_objects", "look_at_objects"), state_defines),
+    _Program("light", "light_spots.cl", ("light_spots",), state_defines),
+    _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
+    _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
+    _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines, ()),
+    _Program("colors", "color_spots.cl", ("color_spots",), formula_defines, ("trap_near.h",)),
+    _Program("glow", "glow.cl", ("add_glow",), formula_defines, ("trap_near.h",)),
+    _Program("planes", "see_planes.cl", ("find_faces", "find_planes"), face_and_plane_defines, ("escape.h",)),
 )
+
+
+@cache
+def _structs() -> dict[str, str]:
+    """The declarations that stand in every program."""
+    return {
+        "structs.h": struct_text() + CUT_PLANE.c_text(),
+        "carried.h": carried_text() + state_text(),
+        "pbr.h": pbr_text(),
+    }
 
 
 def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
     """The texts of the programs whose stages the scene launches."""
     body = Body.of(scene)
-    structs = {
-        "structs.h": struct_text() + CUT_PLANE.c_text(),
-        "carried.h": carried_text() + state_text(),
-        "pbr.h": pbr_text(),
-    }
     launched = {stage.kernel for stage in surface_stages(scene, plan, (0, 1))}
+    defines = cache(lambda of: of(scene, plan))
     texts = []
-    for name, entry, kernels, defines_of in _PROGRAMS:
-        if launched.isdisjoint(kernels):
+    for each in _PROGRAMS:
+        if launched.isdisjoint(each.kernels):
             continue
         # All that there are: what is kept of a program has every kernel that any scene may launch.
-        wanted = tuple(each for each in kernels if plan.lanes == 1 or each not in OF_SINGLE_LANES)
-        defines = defines_of(scene, plan)
-        files = [
-            *(("trap_near.h",) if entry in _ASK_TRAPS else ()),
-            *(("escape.h",) if "ESCAPE_COLORS" in defines else ()),
-        ]
-        generated = {
-            **body.texts(files=files, defines=escape_defines if "escape.h" in files else None),
-            **structs,
-        }
-        texts.append(ProgramText(name, flat_text(entry, generated=generated, defines=defines), wanted))
+        kernels = tuple(name for name in each.kernels if plan.lanes == 1 or name not in OF_SINGLE_LANES)
+        generated = _structs()
+        if each.formula is not None:
+            turns = escape_defines if "escape.h" in each.formula else None
+            generated = {**body.texts(files=each.formula, defines=turns), **generated}
+        flat = flat_text(each.entry, generated=generated, defines=defines(each.defines))
+        texts.append(ProgramText(each.name, flat, kernels))
     return texts

@@ -14,6 +14,17 @@ from clfractal.formulas.reference import apply, constant_of, space_to_state
 Floats = npt.NDArray[np.float64]
 
 STEP = 1e-7
+# Formulas that stretch space unevenly: an application more turns the normal by degrees.
+UNEVEN = ("hast", "aexion", "makin_brot", "tetrabrot", "riemann_sphere")
+CAMERA = {"position": [1.7, -2.9, 1.4], "target": [0, 0, 0], "frame": "all"}
+# Another formula that is joined to one of them.
+BESIDE: dict[str, Any] = {
+    "type": "formula",
+    "formula": {"name": "makin_brot", "iterations": 4},
+    "position": [1.6, 0.4, 0.3],
+    "rotation": [20, 10, 40],
+    "scale": 0.6,
+}
 
 
 def sizes(chain: Chain, points: Floats, applications: int) -> Floats:

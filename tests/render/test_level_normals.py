@@ -13,13 +13,10 @@ from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject, turned_axes
-from tests.render.levels import Floats, degrees, sizes, slopes
+from tests.render.levels import BESIDE, CAMERA, UNEVEN, Floats, degrees, sizes, slopes
 from tests.render.shots import normals_of, points_of, scene_of, shoot
 from tests.variants import one_of
 
-# Formulas that stretch space unevenly: an application more turns the normal by degrees.
-UNEVEN = ("hast", "aexion", "makin_brot", "tetrabrot", "riemann_sphere")
-CAMERA = {"position": [1.7, -2.9, 1.4], "target": [0, 0, 0], "frame": "all"}
 FINE: dict[str, Any] = {"type": "surface", "detail": 0.02}
 SEARCHES: dict[str, dict[str, Any]] = {"distance": {}, "steps": {"search": "steps", "step": 0.004}}
 
@@ -130,16 +127,9 @@ def test_the_potential_has_the_slope_of_a_later_z(device: Device) -> None:
 
 @lru_cache
 def joined_film(device: Device, normal: str) -> tuple[Scene, Film]:
-    other = {
-        "type": "formula",
-        "formula": {"name": "makin_brot", "iterations": 4},
-        "position": [1.6, 0.4, 0.3],
-        "rotation": [20, 10, 40],
-        "scale": 0.6,
-    }
     ball = {"type": "sphere", "position": [-1.1, -0.5, 0], "radius": 0.5, "join": "cut"}
     renderer = {**FINE, "normal": normal}
-    objects = {"ball": ball, "other": other}
+    objects = {"ball": ball, "other": BESIDE}
     scene = scene_of({"name": "hast", "iterations": 4}, CAMERA, (96, 72), objects=objects, renderer=renderer)
     return scene, shoot(scene, device, finest(device), lanes=4)
 

@@ -11,12 +11,9 @@ from clfractal.device.select import Device
 from clfractal.renderers.planes import zoom_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject, turned_axes
-from tests.render.levels import Floats, along, degrees, onto_level, sizes, slopes
+from tests.render.levels import BESIDE, CAMERA, UNEVEN, Floats, along, degrees, onto_level, sizes, slopes
 from tests.render.shots import normals_of, points_of, scene_of, shoot
 from tests.voxels.grids import filled
-
-CAMERA = {"position": [1.7, -2.9, 1.4], "target": [0, 0, 0], "frame": "all"}
-UNEVEN = ("hast", "aexion", "makin_brot", "tetrabrot", "riemann_sphere")
 
 
 @pytest.fixture(scope="module")
@@ -77,16 +74,8 @@ def test_zoomed_boxes_values_and_lanes(device: Device, value: str, lanes: int) -
 
 def test_each_of_several_solids_has_its_own(device: Device) -> None:
     renderer = {"type": "volume", "resolution": 128, "normals": "exact"}
-    other = {
-        "type": "formula",
-        "formula": {"name": "makin_brot", "iterations": 4},
-        "position": [1.6, 0.4, 0.3],
-        "rotation": [20, 10, 40],
-        "scale": 0.6,
-        "join": "union",
-    }
     scene = scene_of(
-        {"name": "hast", "iterations": 4}, CAMERA, (96, 72), objects={"other": other}, renderer=renderer
+        {"name": "hast", "iterations": 4}, CAMERA, (96, 72), objects={"other": BESIDE}, renderer=renderer
     )
     places, normals = seen(scene, device)
     part = scene.objects["other"]
