@@ -151,9 +151,10 @@ INLINE mask polynomial_root(const real *c, real length, mask inside, mask here, 
         high = pick(crosses, ends[i], high);
         found |= crosses;
     }
-    // Newton's steps, or halves where they leave the bracket.
+    // Newton's steps, or halves where they leave the bracket; lanes that are there wait for the others.
     real at = R(0.5) * (low + high);
-    for (int i = 0; i < ROOT_STEPS; ++i) {
+    mask moves = found;
+    for (int i = 0; i < ROOT_STEPS && any_lane(moves); ++i) {
         const real value = polynomial_at(c, at), slope = (R(3.0) * c[3] * at + R(2.0) * c[2]) * at + c[1];
         const mask past = less_equal(R(0.0), value) ^ inside;
         high = pick(past, at, high);
@@ -161,9 +162,9 @@ INLINE mask polynomial_root(const real *c, real length, mask inside, mask here, 
         const real newton = at - value / divisor(slope);
         const mask usable = less(low, newton) & less(newton, high);
         const real next = pick(usable, newton, R(0.5) * (low + high));
-        const mask moves = found & less(R(2.0) * (real)(REAL_EPSILON) * (R(1.0) + at), fabs(next - at));
-        at = next;
-        if (!any_lane(moves)) break;
+        const mask far = less(R(2.0) * (real)(REAL_EPSILON) * (R(1.0) + at), fabs(next - at));
+        at = pick(moves, next, at);
+        moves &= far;
     }
     *root = at;
     return found;

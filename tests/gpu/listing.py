@@ -13,208 +13,12 @@ from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import points, trial
 from clfractal.scene.load import load_scene
 from clfractal.solids import Body
+from tests.features import APART, FEATURES, OF_MEDIA, put_together
 from tests.gpu.pairs import covering
 from tests.platforms import programs
 from tests.portability.pictures import FOLDER
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
-
-# One of each kind: a scalar rule, the Jacobian (by partials, and operation by operation), a shape, a chain, states
-# of four numbers by both rules, folds with an inversion, and the one that needs the most registers.
-_FORMULAS = (
-    "mandelbulb",
-    "hast",
-    "aexion",
-    "sierpinski_tetrahedron",
-    "mengerbulb",
-    "quaternion_julia",
-    "box_fold_quaternion",
-    "kaliset",
-    "riemann_sphere",
-)
-_TILTED = {"normal": [1, -1, 0.2], "width": 2, "height": 2}
-_OFTEN: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "planes": {
-        "": {},
-        "planes": {"cut_planes": [{"plane": _TILTED, "count": 2}]},
-        "cut": {"cut_planes": [{"plane": _TILTED, "cut": True}]},
-    },
-    "lens": {"": {}, "lens": {"camera": {"f_number": 0.5}}},
-    "noise": {"": {}, "noise": {"renderer": {"noise": 0.01, "samples": 64}}},
-    "motion": {"": {}, "motion": {"animation": {"frames": 2, "shutter": 0.5, "frame": 0}}},
-}
-# What a scene says for each value of a feature: sections that are put together.
-_SHAPES = [
-    {"type": "sphere", "position": [9, 0, 9], "radius": 1},
-    {"type": "rectangle", "position": [-9, 0, 9], "direction": [1, 0, -1], "width": 2, "height": 1},
-    {"type": "spot", "position": [0, -9, 9], "direction": [0, 1, -1]},
-]
-_GLASS = {
-    "lighting": {"mode": "path"},
-    "materials": {"glass": {"transmission": {"weight": 1, "dispersion_scale": 1}}},
-    "material": {"name": "glass"},
-}
-_SKIN = {
-    "lighting": {"mode": "path"},
-    "materials": {"skin": {"subsurface": {"weight": 0.8}}},
-    "material": {"name": "skin"},
-}
-_MAPS = {
-    "lighting": {"mode": "path"},
-    "materials": {
-        "gold": {
-            "base": {"color": {"by": "trap", "palette": ["#fff", "#840"]}, "metalness": 1},
-            "specular": {"roughness": {"by": "iterations", "curve": [[0, 0.1], [1, 0.6]]}},
-        },
-        "clay": {"base": {"weight": {"by": "curvature"}}, "bump": {"height": {"by": "trap"}}},
-        "both": {"blend": ["gold", "clay"], "mask": {"by": "normal"}},
-    },
-    "material": {"name": "both"},
-}
-_OBJECTS = {
-    "sea": {"type": "water", "position": [0, 0, -3], "material": "wood"},
-    "ball": {"type": "sphere", "position": [3, 0, 0], "radius": 1, "material": "wood"},
-}
-_LAMPS = {
-    "ball": {"type": "sphere", "position": [3, 0, 0], "material": "glow"},
-    "box": {"type": "box", "position": [0, 3, 0], "material": "glow"},
-    "tube": {"type": "cylinder", "position": [0, 0, 3], "material": "glow"},
-}
-_GRIDS = {
-    "core": {"type": "volume", "file": "ball.npy", "position": [3, 0, 0], "material": "wood"},
-}
-_CLOUDS = {
-    **_GRIDS,
-    "cloud": {
-        "type": "volume",
-        "file": "ball.npy",
-        "transfer": {
-            "opacity": [{"at": 0, "opacity": 0}, {"at": 255, "opacity": 0.5}],
-            "emission": [{"at": 0, "emission": [0.1, 0, 0]}],
-        },
-    },
-}
-_JOINED = {
-    "hole": {"type": "sphere", "join": "cut"},
-    "drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"},
-    "other": {"type": "formula", "formula": {"name": "hast"}, "position": [3, 0, 0]},
-    "mould": {"type": "formula", "formula": {"name": "hast"}, "position": [0, -1, 0], "join": "cut"},
-}
-# Of features whose code is a part of another one's only the other is here: a sky has a map, shafts of light have fog, lamps
-# with a shape are soft. Each program takes several compilers.
-_SURFACE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
-    "coloring": {
-        "solid": {},
-        "normal": {"coloring": {"by": "normal"}},
-        "iterations": {"coloring": {"by": "iterations"}},
-        "residual": {"coloring": {"by": "residual"}},
-        "thickness": {"coloring": {"by": "thickness", "along": "view"}},
-        "layer": {"coloring": {"by": "layer_distance", "along": "reflection"}},
-        "trap": {"coloring": {"by": "trap", "trap": {"shape": "sphere"}}},
-    },
-    "points": {
-        "": {},
-        "grid": {"renderer": {"points": {"count": 9}}},
-        "triangle": {"renderer": {"normal": "one_triangle"}},
-        "shading": {"renderer": {"normal": "eight_triangles_shading"}},
-        "eight": {"renderer": {"normal": "eight_triangles_normal"}},
-        "squares": {"renderer": {"points": {"pattern": "stochastic", "count": 4}, "normal": "least_squares"}},
-    },
-    "lighting": {
-        "": {},
-        "path": {"lighting": {"mode": "path"}},
-        "glass": _GLASS,
-        "skin": _SKIN,
-        "maps": _MAPS,
-    },
-    "objects": {
-        "": {},
-        "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
-        "joined": {"objects": _JOINED},
-        # Beside them objects that shine.
-        "grids": {
-            "objects": {**_GRIDS, **_LAMPS},
-            "materials": {"wood": {}, "glow": {"emission": {"luminance": 5}}},
-        },
-        "clouds": {"objects": _CLOUDS, "materials": {"wood": {}}},
-        "opened": {
-            "objects": _OBJECTS,
-            "materials": {"wood": {}},
-            "cut_planes": [{"plane": _TILTED, "cut": True, "set": False, "objects": ["ball"]}],
-        },
-    },
-    "search": {"": {}, "steps": {"renderer": {"search": "steps"}}},
-    "occlusion": {"": {}, "occlusion": {"renderer": {"ambient_occlusion": {"rays": 2}}}},
-    "environment": {
-        "": {},
-        "sky": {"environment": {"sky": {}, "rays": 2}},
-    },
-    "light": {
-        "": {},
-        "shapes": {"lights": _SHAPES},
-    },
-    "fog": {
-        "": {},
-        "shafts": {"fog": {"density": 0.05, "height": 2, "scattering": {}}},
-        "glow": {"glow": {"by": "trap"}},
-    },
-    **_OFTEN,
-}
-_STOPS = [{"at": 0.05, "opacity": 0}, {"at": 1, "opacity": 0.6}]
-_SHINES = [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [1, 0.5, 0]}]
-_TINTS = [{"at": 0, "color": [1, 0, 0]}, {"at": 1, "color": [0, 0, 1]}]
-_VOLUME: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "formula": {name: {"formula": {"name": name}} for name in ("mandelbulb", "hast")},
-    "values": {"byte": {}, "float": {}},
-    "pools": {"one": {}, "three": {}},
-    "transfer": {
-        "level": {},
-        "opacity": {"renderer": {"transfer": {"opacity": _STOPS}}},
-        "shining": {"renderer": {"transfer": {"opacity": _STOPS, "emission": _SHINES}}},
-        "tinted": {"renderer": {"transfer": {"opacity": _STOPS, "color": _TINTS}}},
-    },
-    "lighting": {"": {}, "path": {"lighting": {"mode": "path"}}},
-    "shadows": {"": {}, "shadows": {"renderer": {"shadows": True}}},
-    "places": {"": {}, "nearest": {"renderer": {"interpolation": "nearest"}}},
-    "coloring": {"solid": {}, "normal": {"coloring": {"by": "normal"}}},
-    **_OFTEN,
-}
-_CUT_PLANE: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
-    "formula": {name: {"formula": {"name": name}} for name in _FORMULAS},
-    "counts": {"smooth": {}, "stepped": {"renderer": {"colors": {"mode": "stepped"}}}},
-    "noise": _OFTEN["noise"],
-    "motion": _OFTEN["motion"],
-}
-_APART = {
-    frozenset({("coloring", "residual"), ("points", "")}),  # a plane needs points
-    # Each sample of a path finds a spot of its own.
-    *(
-        frozenset({("lighting", light), ("points", name)})
-        for light in ("path", "glass", "skin", "maps")
-        for name in _SURFACE["points"]
-        if name
-    ),
-    *(
-        frozenset({("lighting", light), ("coloring", "residual")})
-        for light in ("path", "glass", "skin", "maps")
-    ),
-    *(frozenset({("lighting", light), ("planes", "cut")}) for light in ("glass", "skin")),
-    # These have planes of their own.
-    *(frozenset({("objects", "opened"), ("planes", name)}) for name in ("planes", "cut")),
-    *(frozenset({("objects", "joined"), ("planes", name)}) for name in ("planes", "cut")),
-    frozenset({("objects", "joined"), ("lighting", "glass")}),
-    frozenset({("objects", "clouds"), ("lighting", "")}),
-    # So they have neither points nor a plane through them.
-    frozenset({("objects", "clouds"), ("coloring", "residual")}),
-    *(frozenset({("objects", "clouds"), ("points", name)}) for name in _SURFACE["points"] if name),
-    frozenset({("objects", "clouds"), ("fog", "shafts")}),
-}
-_OF_MEDIA = {
-    frozenset({("lighting", "path"), ("transfer", "level")}),
-    *(frozenset({("lighting", "path"), ("planes", name)}) for name in ("planes", "cut")),
-}
-_FEATURES = {"surface": _SURFACE, "volume": _VOLUME, "cut_plane": _CUT_PLANE}
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,9 +32,9 @@ class Listed:
 
 def paired() -> Iterator[Listed]:
     """Programs that have every pair of a renderer's features, number types included, and one of each other kind."""
-    for renderer, features in _FEATURES.items():
+    for renderer, features in FEATURES.items():
         for chosen in covering(
-            {**features, "precision": PRECISIONS}, _OF_MEDIA if renderer == "volume" else _APART
+            {**features, "precision": PRECISIONS}, OF_MEDIA if renderer == "volume" else APART
         ):
             yield from _of_choice(renderer, chosen)
     for precision in PRECISIONS:
@@ -253,7 +57,7 @@ def everything() -> Iterator[Listed]:
             # What knows a formula in a program of its own has figures for each of them.
             plain = load_scene({**_scene("surface"), "formula": {"name": name}})
             for part, text in programs.of_scene(plain, 1, precision):
-                if part.startswith("march"):
+                if part == "rays":
                     yield Listed(f"{part} {name} {precision}", precision, text)
 
 
@@ -277,11 +81,7 @@ def _scene(renderer: str) -> dict[str, Any]:
 
 def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
     """The programs of a scene that has what is chosen of each feature."""
-    scene = _scene(renderer)
-    for feature, value in chosen.items():
-        for section, content in _FEATURES[renderer].get(feature, {}).get(value, {}).items():
-            known = scene.get(section)
-            scene[section] = {**known, **content} if isinstance(known, dict) else content
+    scene = put_together(_scene(renderer), FEATURES[renderer], chosen)
     precision: Precision = "float64" if chosen["precision"] == "float64" else "float32"
     values, pools = chosen.get("values", "byte"), 3 if chosen.get("pools") == "three" else 1
     name = " ".join(value for value in chosen.values() if value)

@@ -1,0 +1,157 @@
+"""Every two values of features meet in a picture: the same in parts, and what is switched off leaves no trace."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from clfractal.device.select import Device
+from clfractal.files.channels import MATTES, SURFACE_LAYERS
+from clfractal.pictures.film import Film
+from clfractal.scene.load import load_scene
+from clfractal.scene.model import Scene
+from clfractal.work import drawing
+from tests.features import APART, CUT_PLANE, OF_MEDIA, SURFACE, VOLUME, Values, put_together
+from tests.gpu.pairs import covering
+from tests.portability.pictures import FOLDER
+from tests.render.shots import CHANNELS, plan_of, render_planned, shoot
+
+SIZE = (44, 26)  # two tiles, neither of them whole
+PLAIN: dict[str, Any] = {
+    "version": 1,
+    "image": {"width": SIZE[0], "height": SIZE[1]},
+    "camera": {"position": [1.5, -3.4, 1.4], "target": [0, 0, 0], "fov": 42},
+}
+# Formulas differ in their own text alone, so three are enough: a scalar rule, the Jacobian, and one with a shape.
+FORMULAS: Values = {
+    name: {"formula": {"name": name, "iterations": 4}}
+    for name in ("mandelbulb", "hast", "sierpinski_tetrahedron")
+}
+OF_SURFACES: Mapping[str, Values] = {
+    **SURFACE,
+    "formula": FORMULAS,
+    "light": {
+        **SURFACE["light"],
+        "small": {"lights": [{"type": "point", "position": [0, -9, 9], "angular_size": 3}]},
+        "set": {"lights": [{"type": "set", "trap": {"shape": "point"}, "threshold": 0.9, "radius": 0.02}]},
+    },
+    "mirror": {"": {}, "mirror": {"material": {"reflection": 0.5}}},
+    "layers": {"": {}, "layers": {}},
+}
+OF_VOLUMES: Mapping[str, Values] = {
+    **{name: each for name, each in VOLUME.items() if name not in ("values", "pools")},
+    "formula": FORMULAS,
+    **{
+        key: {value: {"renderer": {key: value}} for value in values}
+        for key, values in {
+            "value": ("inside", "coverage"),
+            "store": ("byte", "float"),
+            "normals": ("gradient", "least_squares", "exact"),
+            "fill": ("octree", "brute"),
+        }.items()
+    },
+}
+FEATURES: Mapping[str, Mapping[str, Values]] = {
+    "surface": OF_SURFACES,
+    "volume": OF_VOLUMES,
+    "cut_plane": {**CUT_PLANE, "formula": FORMULAS},
+}
+_NUMBERS = st.floats(-1, 1, width=32)
+# What random scenes say beside their features.
+SECTIONS: dict[str, st.SearchStrategy[dict[str, Any]]] = {
+    "camera": st.builds(lambda x, y, z: {"position": [x, y - 3.2, z]}, _NUMBERS, _NUMBERS, _NUMBERS),
+    "renderer": st.builds(lambda count: {"samples": count}, st.integers(1, 3)),
+    "fog": st.builds(lambda part: {"density": abs(part) / 4}, _NUMBERS),
+    "glow": st.builds(lambda part: {"intensity": abs(part)}, _NUMBERS),
+}
+NEVER = {"surface": APART, "volume": OF_MEDIA, "cut_plane": frozenset()}
+CHOICES = [(kind, chosen) for kind, each in FEATURES.items() for chosen in covering(each, NEVER[kind])]
+
+
+def of(kind: str, chosen: Mapping[str, str]) -> dict[str, Any]:
+    more: dict[str, Any] = {"resolution": 24} if kind == "volume" else {}
+    plain = {
+        **PLAIN,
+        "renderer": {"type": kind, **more} if kind == "cut_plane" else {"type": kind, "samples": 2, **more},
+    }
+    return put_together(plain, FEATURES[kind], chosen)
+
+
+def read(scene: Mapping[str, Any]) -> Scene:
+    return load_scene(dict(scene), folder=FOLDER)
+
+
+def with_nothing(kind: str, scene: Mapping[str, Any]) -> dict[str, Any]:
+    """A scene and what shines not or lets all light through: features that are switched off."""
+    dark = {"type": "point", "position": [0, 9, 9], "intensity": 0}
+    off: dict[str, dict[str, Any]] = {"surface": {"fog": {"density": 0}, "glow": {"intensity": 0}}}
+    return {**off.get(kind, {}), **scene, "lights": [*scene.get("lights", [{}]), dark]}
+
+
+def channels(chosen: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*CHANNELS, *SURFACE_LAYERS, *MATTES))) if chosen.get("layers") else CHANNELS
+
+
+def same(film: Film, other: Film, name: str) -> bool:
+    """Equal bits, which tells 0 from -0."""
+    return film[name].tobytes() == other[name].tobytes()
+
+
+@pytest.mark.parametrize(
+    ("kind", "chosen"),
+    CHOICES,
+    ids=[" ".join(filter(None, (kind, *each.values()))) for kind, each in CHOICES],
+)
+def test_a_pair(
+    kind: str, chosen: Mapping[str, str], device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    holds(kind, chosen, device, monkeypatch)
+
+
+@given(st.data())
+@settings(max_examples=15)
+def test_random_scenes(device: Device, data: st.DataObject) -> None:
+    """Of surfaces, with many features at once, seen from anywhere, in lights and fog of any strength."""
+    chosen = {name: data.draw(st.sampled_from(sorted(values)), name) for name, values in OF_SURFACES.items()}
+    assume(not any(frozenset(pair) in APART for pair in combinations(chosen.items(), 2)))
+    more = data.draw(st.fixed_dictionaries({}, optional=SECTIONS), "more")
+    with pytest.MonkeyPatch.context() as patch:
+        holds("surface", chosen, device, patch, more)
+
+
+def holds(
+    kind: str,
+    chosen: Mapping[str, str],
+    device: Device,
+    monkeypatch: pytest.MonkeyPatch,
+    more: Mapping[str, Mapping[str, Any]] | None = None,
+) -> None:
+    """A picture has the same bits in parts, in a region with fewer channels, and beside what is switched off."""
+    asked = of(kind, chosen)
+    for section, content in (more or {}).items():
+        asked[section] = {**asked.get(section, {}), **content}
+    names = channels(chosen)
+    scene = read(asked)
+    whole = shoot(scene, device, channels=names)
+    assert all(np.isfinite(whole[name]).all() for name in names if name != "Z")
+    assert more or whole["A"].max() > 0
+
+    plan = plan_of(scene, device, channels=names)
+    parts = Film(plan.channels, SIZE, plan.region)
+    monkeypatch.setattr(drawing, "CAPACITY", 1)
+    render_planned(scene, plan, device, parts, budget_seconds=2e-3)
+    assert [name for name in names if not same(whole, parts, name)] == []
+
+    few = shoot(scene, device, channels=("R", "N.Y"), region=(20, 7, 24, 12))
+    for name in few.channels:
+        assert np.array_equal(few[name], whole[name][7:19, 20:44]), name
+
+    # A light that shines not is asked for in vain.
+    less = shoot(read(with_nothing(kind, asked)), device, channels=names)
+    assert [name for name in names if name != "steps" and not same(whole, less, name)] == []
