@@ -28,10 +28,9 @@ typedef struct {
     real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
     real dielectric;          // part of the surface that has a body
     mask seen;                // whether the viewer is over the surface
-#if HAS_BUMP
-    vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each; see bsdf_bumped.h
+    int relief;               // whether the normal is that of a relief; see bsdf_bumped.h
+    vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each
     real level;               // cosine between the normals
-#endif
 #if HAS_GLASS
     glass clear;
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
@@ -89,8 +88,11 @@ INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
 // `to_viewer` has length 1.
 INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const float *tables) {
     bsdf b;
-    b.normal = normal;
+    b.normal = b.surface = normal;
     make_frame(normal, &b.side, &b.up);
+    b.relief = 0;
+    b.leans = b.side;
+    b.level = R(1.0);
     b.out = bsdf_local(&b, to_viewer);
     b.seen = less(R(0.0), b.out.z);
     b.out.z = fmax(b.out.z, R(1e-4));
@@ -179,14 +181,7 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several,
 #define THROUGH_LAYERS(b) color_scale((b)->coat_tint, (R(1.0) - (b)->coat_albedo) * (R(1.0) - (b)->fuzz_albedo))
 
 // How much of a lobe counts, of which facets with this width reflect: sharp ones as highlights, broad ones as diffuse bodies.
-// Without reliefs all do.
-INLINE real lobe_share(real broad, real sharp, real alpha) {
-#if HAS_BUMP
-    return sharp + (broad - sharp) * alpha * alpha;
-#else
-    return R(1.0);
-#endif
-}
+INLINE real lobe_share(real broad, real sharp, real alpha) { return sharp + (broad - sharp) * alpha * alpha; }
 
 // f * cosine, with factors on what is diffuse and on highlights; 0 for directions below the surface, unless it is glass.
 INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __global const float *tables) {
@@ -243,8 +238,6 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
     return color_pick(over, sum, below);
 }
 
-INLINE color bsdf_value(const bsdf *b, vec toward, __global const float *tables) { return bsdf_parts(b, toward, R(1.0), R(1.0), tables); }
-
 // Probability per steradian with which bsdf_sample chooses a direction, with the same factors.
 INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
     const vec i = bsdf_local(b, toward), h = middle_way(b->out, i);
@@ -269,10 +262,8 @@ INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
 #endif
 }
 
-INLINE real bsdf_density(const bsdf *b, vec toward) { return bsdf_densities(b, toward, R(1.0), R(1.0)); }
-
-// A direction chosen by three numbers in (0, 1).
-INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density) {
+// A direction chosen by three numbers in (0, 1), and whether light is scattered there.
+INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, mask *usable) {
     const mask coat = less(choice, b->by_coat), gloss = ~coat & less(choice, b->by_coat + b->by_gloss);
     const vec h = ggx_facet(b->out, pick(coat, b->coat_alpha, b->alpha), u, v), mirrored = mirrored_by(b->out, h);
     const vec around = hemisphere_direction(vec_of(R(0.0), R(0.0), R(1.0)), u, v);
@@ -284,14 +275,10 @@ INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, real *density
     i = vec_pick(bends, refracted_at(b->out, h, b->clear.across), i);
     i.z = pick(beyond, -i.z, i.z);
     // A facet that mirrors below the surface, or refracts above it, is hidden by others.
-    const mask hidden = ~less(R(0.0), pick(bends | beyond, -i.z, i.z));
+    *usable = b->seen & less(R(0.0), pick(bends | beyond, -i.z, i.z));
 #else
     const vec i = vec_pick(coat | gloss, mirrored, around);
+    *usable = b->seen & less(R(0.0), i.z);
 #endif
-    const vec toward = vec_along(vec_along(vec_scale(b->normal, i.z), i.x, b->side), i.y, b->up);
-    *density = bsdf_density(b, toward);
-#if HAS_GLASS
-    *density = pick(hidden, R(0.0), *density);
-#endif
-    return toward;
+    return vec_along(vec_along(vec_scale(b->normal, i.z), i.x, b->side), i.y, b->up);
 }

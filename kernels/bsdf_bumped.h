@@ -5,10 +5,9 @@
 // ("Microfacet-based normal mapping for robust Monte Carlo path tracing") does. Highlights do not fade, or they would come back as sparks;
 // wide ones do in part, by the square of their alpha. All these are mirror images of directions: what a material reflects in all stays, and
 // values and densities change alike.
-#if HAS_BUMP
-
 // The material of a relief, `b`, on the surface with that normal.
 INLINE void bsdf_lean(bsdf *b, vec surface) {
+    b->relief = 1;
     b->surface = surface;
     b->level = vec_dot(b->normal, surface);
     // Any direction along the surface where the normal does not lean.
@@ -35,15 +34,21 @@ INLINE mask same_side(real a, real b) { return less(R(0.0), a * b); }
 // f * cosine, and the probability per steradian of `scatter_sample`.
 CALLED void scatter_value(const bsdf *b, const vec *direction, __global const float *tables, color *value, real *density) {
     const vec toward = *direction;
-    const real over = vec_dot(toward, b->surface);
-    const mask above = less(R(0.0), over), across = above & less(vec_dot(toward, b->leans), R(0.0));
-    const vec leaning = vec_pick(across, mirrored_across(toward, b->leans), toward);
-    const real stays = pick(above, horizon_share(b, leaning), R(1.0)), comes = pick(across, R(1.0) - stays, stays);
-    const real none = R(0.0);
+    const real over = vec_dot(toward, b->surface), none = R(0.0);
+    mask across = less(R(1.0), none);
+    vec leaning = toward;
+    real stays = R(1.0), comes = none;
+    if (b->relief) {
+        const mask above = less(none, over);
+        across = above & less(vec_dot(toward, b->leans), none);
+        leaning = vec_pick(across, mirrored_across(toward, b->leans), toward);
+        stays = pick(above, horizon_share(b, leaning), R(1.0));
+        comes = pick(across, R(1.0) - stays, stays);
+    }
     *value = color_of(none, none, none);
     *density = none;
     // What leaves in a direction came in it, or from its image below the surface; or was mirrored by the wall.
-    for (int i = 0; i < TURNS(3); ++i) {
+    for (int i = 0; i < (b->relief ? 3 : 1); ++i) {
         const vec from = i == 0 ? toward : i == 1 ? mirrored_across(leaning, b->surface) : leaning;
         const real broad = i == 0 ? pick(across, R(1.0), stays) : i == 1 ? comes : pick(across, comes, none);
         const real sharp = i == 0 ? R(1.0) : i == 1 ? pick(across, none, R(1.0)) : none;
@@ -54,11 +59,8 @@ CALLED void scatter_value(const bsdf *b, const vec *direction, __global const fl
     }
 }
 
-// A direction chosen by four numbers in (0, 1); 0 where there is none.
-INLINE vec scatter_sample(const bsdf *b, real choice, real u, real v, real wall) {
-    real density;
-    vec toward = bsdf_sample(b, choice, u, v, &density);
-    const mask usable = less(R(0.0), density);
+// Where a direction goes that the leaning normal's material has chosen.
+INLINE vec bumped_direction(const bsdf *b, vec toward, real choice, real wall) {
     const mask apart = ~same_side(vec_dot(toward, b->normal), vec_dot(toward, b->surface));
     toward = vec_pick(apart, mirrored_across(toward, b->surface), toward);
     real fades = pick(less(choice, b->by_coat + b->by_gloss), b->alpha * b->alpha, R(1.0));
@@ -69,15 +71,13 @@ INLINE vec scatter_sample(const bsdf *b, real choice, real u, real v, real wall)
 #endif
     const mask leans = less(R(0.0), vec_dot(toward, b->surface)) & less(R(0.0), vec_dot(toward, b->leans));
     const mask moves = leans & less(wall, fades * (R(1.0) - horizon_share(b, toward)));
-    toward = vec_pick(moves, mirrored_across(toward, b->leans), toward);
+    return vec_pick(moves, mirrored_across(toward, b->leans), toward);
+}
+
+// A direction chosen by four numbers in (0, 1); 0 where there is none.
+INLINE vec scatter_sample(const bsdf *b, real choice, real u, real v, real wall) {
+    mask usable;
+    vec toward = bsdf_sample(b, choice, u, v, &usable);
+    if (b->relief) toward = bumped_direction(b, toward, choice, wall);
     return vec_pick(usable, toward, vec_of(R(0.0), R(0.0), R(0.0)));
 }
-#define SURFACE_NORMAL(b) ((b)->surface)
-
-#else
-INLINE void scatter_value(const bsdf *b, const vec *direction, __global const float *tables, color *value, real *density) {
-    *density = bsdf_density(b, *direction);
-    *value = bsdf_value(b, *direction, tables);
-}
-#define SURFACE_NORMAL(b) ((b)->normal)
-#endif

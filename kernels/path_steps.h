@@ -74,7 +74,7 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     mask dark = ~less(R(0.0), brightest(*brings));
 #if HAS_GLASS
     // A body hides what is behind its surface.
-    dark |= ~leads_out(chosen.toward, SURFACE_NORMAL(b), behind);
+    dark |= ~leads_out(chosen.toward, b->surface, behind);
 #endif
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
@@ -88,21 +88,16 @@ INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     real u, v, choice, roulette;
     path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
-#if HAS_BUMP
-    real wall, unused;
-    color value;
-    path_square(s, at, PURPOSE_WALL, w, &wall, &unused);
+    real wall = R(0.5), unused;
+    if (b->relief) path_square(s, at, PURPOSE_WALL, w, &wall, &unused);
     so_far->direction = scatter_sample(b, choice, u, v, wall);
+    color value;
     scatter_value(b, &so_far->direction, w.albedos, &value, &with->density);
-#else
-    so_far->direction = bsdf_sample(b, choice, u, v, &with->density);
-    const color value = bsdf_value(b, so_far->direction, w.albedos);
-#endif
     mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density), sinks = on_path & ~on_path;
     color part = color_scale(value, R(1.0) / with->density);
 #if HAS_SUBSURFACE
     sinks = mask_of(so_far->on_path) & b->seen & less(R(1.0) - b->by_below, choice);
-    so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(SURFACE_NORMAL(b), R(-1.0)), u, v), so_far->direction);
+    so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(b->surface, R(-1.0)), u, v), so_far->direction);
     part = color_pick(sinks, b->below, part);
     on_path |= sinks;
 #endif

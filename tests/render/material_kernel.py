@@ -53,7 +53,7 @@ _SCATTER = """\
 // Planes of `count` numbers. In: viewer, light (x, y, z each), choice, u, v, wall. Out: value and density of the light's
 // direction; the sampled direction, its density, its value. `leans`: the normal of a relief.
 __kernel void scatter(__global const scalar *in, __global scalar *out, __constant struct Pbr *material,
-                      __global const float *albedos, __constant scalar *leans, int count, int inside) {
+                      __global const float *albedos, __constant scalar *leans, int count, int inside, int relief) {
     const int lane = (int)get_global_id(0) * LANES;
     in += lane;
     out += lane;
@@ -62,26 +62,17 @@ __kernel void scatter(__global const scalar *in, __global scalar *out, __constan
     const vec normal = vec_of(R(0.0), R(0.6), R(0.8));
     pbr p = pbr_of(material, color_splat(material->base_color));
     p.inside = (real)((scalar)inside);
-#if HAS_BUMP
     bsdf b = bsdf_at(&p, vec_splat(leans), viewer, albedos);
-    bsdf_lean(&b, normal);
-#else
-    const bsdf b = bsdf_at(&p, normal, viewer, albedos);
-#endif
+    if (relief) bsdf_lean(&b, normal);
     color value;
     real density;
     scatter_value(&b, &light, albedos, &value, &density);
     PUT_COLOR(0, value);
     store(out + 3 * count, density);
-#if HAS_BUMP
     const real wall = load(in + 9 * count);
     const vec chosen = scatter_sample(&b, load(in + 6 * count), load(in + 7 * count), load(in + 8 * count), wall);
     color there;
     scatter_value(&b, &chosen, albedos, &there, &density);
-#else
-    const vec chosen = bsdf_sample(&b, load(in + 6 * count), load(in + 7 * count), load(in + 8 * count), &density);
-    const color there = bsdf_value(&b, chosen, albedos);
-#endif
     store(out + 4 * count, chosen.x);
     store(out + 5 * count, chosen.y);
     store(out + 6 * count, chosen.z);
@@ -95,9 +86,8 @@ NORMAL = np.array([0.0, 0.6, 0.8])
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int, *, glass: bool, bump: bool) -> Any:
+def _program(device: Device, precision: Precision, lanes: int, *, glass: bool) -> Any:
     defines = {
-        "HAS_BUMP": int(bump),
         "HAS_GLASS": int(glass),
         "LANES": lanes,
         "REAL_IS_DOUBLE": int(precision == "float64"),
@@ -160,8 +150,8 @@ def ask(
         cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
         for array in (planes, result, record, tables, np.array(NORMAL if leans is None else leans, precision))
     ]
-    kernel = cl.Kernel(_program(device, precision, lanes, glass=glass, bump=leans is not None), "scatter")
-    kernel.set_args(*buffers, np.int32(count), np.int32(inside))
+    kernel = cl.Kernel(_program(device, precision, lanes, glass=glass), "scatter")
+    kernel.set_args(*buffers, np.int32(count), np.int32(inside), np.int32(leans is not None))
     cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
     cl.enqueue_copy(device.queue, result, buffers[1])
     found = result[:, :given].astype(np.float64)
