@@ -3,28 +3,25 @@
 #include "emitter_places.h"
 
 // All of them, as `weight_of_all`; those with the number `own` leave themselves out.
-INLINE real emitters_weight(vec point, real own, world w) {
+CALLED real emitters_weight(const vec *point, real own, world w) {
     real sum = R(0.0);
     for (int i = 0; i < w.settings->object_count; ++i) {
         if (!w.objects[i].asked) continue;
-        sum += pick(equal(own, (real)((scalar)(i + 1))), R(0.0), emitter_weight(w.objects + i, &point));
+        sum += pick(equal(own, (real)((scalar)(i + 1))), R(0.0), emitter_weight(w.objects + i, point));
     }
     return sum;
 }
 
-// Among lights that are chosen by their weights: the object at whose part of their sum `place` lies, where that is still `open`.
-INLINE mask emitter_asked(vec from, real own, const real *numbers, real total, real place, real *before, mask *open, light_ray *chosen,
-                          real *share, world w) {
-    mask any = *open & ~*open;
+// The object on whose part of the row of lights the choice lies.
+CALLED void emitter_asked(choosing *c, const real *numbers, world w) {
+    const vec from = c->from;
     const real far_out = fmax(fmax(fabs(from.x), fabs(from.y)), fabs(from.z));
     for (int i = 0; i < w.settings->object_count; ++i) {
         __global const struct Object *o = w.objects + i;
         if (!o->asked) continue;
-        const real weight = pick(equal(own, (real)((scalar)(i + 1))), R(0.0), emitter_weight(o, &from));
-        const mask here = *open & less(place, *before + weight) & less(R(0.0), weight);
-        const real choice = clamp((place - *before) / fmax(weight, (real)(REAL_SMALLEST)), R(0.0), R(1.0));
-        *before += weight;
-        *open &= ~here;
+        const real weight = pick(equal(c->own, (real)((scalar)(i + 1))), R(0.0), emitter_weight(o, &from));
+        const real choice = clamp((c->place - c->before) / fmax(weight, (real)(REAL_SMALLEST)), R(0.0), R(1.0));
+        const mask here = is_chosen(c, weight);
         if (!any_lane(here)) continue;
         const emitter_place found = emitter_chosen(o, &from, choice, numbers[0], numbers[1]);
         const vec way = emitter_in_space(o, found.way);
@@ -32,15 +29,12 @@ INLINE mask emitter_asked(vec from, real own, const real *numbers, real total, r
         // The ray that asks ends a little before the object, which would be in its own way.
         const real thin = fmin(fmin(EMITTER_SIDE(o, 0), EMITTER_SIDE(o, 1)), EMITTER_SIDE(o, 2));
         const real lift = R(1e-3) * thin + R(64.0) * (real)(REAL_EPSILON) * (distance + far_out);
-        const mask usable = here & less(R(0.0), found.density);
-        chosen->toward = vec_pick(here, vec_normalize(way), chosen->toward);
-        chosen->distance = pick(here, distance - lift, chosen->distance);
-        chosen->light = color_pick(usable, color_splat(o->radiance), chosen->light);
-        chosen->density = pick(here, pick(usable, found.density, R(1.0)), chosen->density);
-        *share = pick(here, weight / total, *share);
-        any |= here;
+        const mask usable = less(R(0.0), found.density);
+        const light_ray r = {vec_normalize(way), distance - lift, color_pick(usable, color_splat(o->radiance), color_of(R(0.0), R(0.0), R(0.0))),
+                             pick(usable, found.density, R(1.0))};
+        takes(c, here, r, weight);
+        c->found.both |= here;
     }
-    return any;
 }
 
 // The part of an object's light that a path keeps which has met it by chance, `distance` from where its direction was chosen with

@@ -72,9 +72,7 @@ STAGE(end_paths) {
     before.met &= ~cloud.met;
 #endif
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
-#if HAS_EMITTERS
-    path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
-#endif
+    if (HAS(w, EMITTERS)) path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
     if (bounce == 1 && KEEPS(s, STATE_GLANCE)) glance_once(s, so_far.seen);
     const spot first_spot = spot_kept(s, 0);
     end_shots(s, a, so_far.seen, &first_spot, cost, w);

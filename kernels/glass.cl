@@ -19,6 +19,7 @@
 #include "state.h"
 #include "eye.h"
 #include "phase.h"
+#include "set_lights.h"
 #include "light_places.h"
 #include "flights.h"
 #endif

@@ -1,26 +1,12 @@
 // How paths ask lights, whatever they leave: a surface or a place in a medium. What a path could also have met by chance is weighed by the
 // power heuristic (Veach and Guibas 1995).
 
-INLINE real power_share(real own, real other) {
-    const real square = own * own;
-    return square / fmax(square + other * other, (real)(REAL_SMALLEST));
-}
-
-#if HAS_EMITTERS
-#include "emitters.h"
-#endif
-
 // What could light a point from everywhere: the sum over the lights, and the environment. `own`: the object whose surface it is, or 0; no
 // object lights itself.
 INLINE real weight_of_all(vec point, real own, world w) {
     real sum = (real)(w.settings->environment_weight);
     for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, point);
-#if HAS_SET_LIGHTS
-    sum += set_weight(point, w);
-#endif
-#if HAS_EMITTERS
-    sum += emitters_weight(point, own, w);
-#endif
+    sum = with_lights_beside(sum, point, own, w);
     return fmax(sum, (real)(REAL_SMALLEST));
 }
 
@@ -55,33 +41,18 @@ INLINE lamp lamp_met(vec origin, vec direction, int of_eye, real *far, world w) 
     return found;
 }
 
-// A light that was asked for: the ray to it, and the probability of having asked.
-typedef struct {
-    light_ray ray;
-    real share;            // of all lights, that this one is chosen
-    real reckoned;         // a factor on the density with which both ways to find it reckon
-    mask both, unblocked;  // whether a path meets it by chance, too; whether nothing can be in its way
-} asked;
-
-// Numbers in (0, 1): two for the place on a light, one for the light, two for the one of those on the set.
-#define ASKING_NUMBERS 5
-
 // One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium, and
 // `own` as above.
 INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
     const real u = numbers[0], v = numbers[1], choice = numbers[2];
-    light_ray chosen = {vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
-    real share = R(1.0);
-    mask blocked = less(R(0.0), R(1.0));
-    real place = choice * total, before = R(0.0);
-    mask open = blocked, both = ~blocked;
+    const mask all = less(R(0.0), R(1.0));
+    const light_ray none = {vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
+    choosing c = {point, from, normal, own, total, choice * total, R(0.0), all, {none, R(1.0), R(1.0), ~all, ~all}, from};
     for (int i = 0; i <= w.settings->light_count; ++i) {
         const int is_light = i < w.settings->light_count;
         __constant const struct Light *light = w.lights + (is_light ? i : 0);
         const real weight = is_light ? light_weight(light, from) : (real)(w.settings->environment_weight);
-        const mask here = open & less(place, before + weight) & less(R(0.0), weight);
-        before += weight;
-        open &= ~here;
+        const mask here = is_chosen(&c, weight);
         if (!any_lane(here)) continue;
         light_ray r;
         if (is_light) {
@@ -92,45 +63,16 @@ INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *
             r.light = environment_color(r.toward, w.material, w.environment);
             r.distance = (real)(REAL_LARGEST);
         }
-        chosen.toward = vec_pick(here, r.toward, chosen.toward);
-        chosen.distance = pick(here, r.distance, chosen.distance);
-        chosen.light = color_pick(here, r.light, chosen.light);
-        chosen.density = pick(here, r.density, chosen.density);
-        share = pick(here, weight / total, share);
-        if (!is_light || light_is_met(light) || light_is_seen(light)) both |= here;
-        if (is_light && !light->shadow) blocked &= ~here;
+        takes(&c, here, r, weight);
+        if (!is_light || light_is_met(light) || light_is_seen(light)) c.found.both |= here;
+        if (is_light && !light->shadow) c.found.unblocked |= here;
     }
-#if HAS_EMITTERS
-    both |= emitter_asked(from, own, numbers, total, place, &before, &open, &chosen, &share, w);
-#endif
-    real reckoned = R(1.0);
-    vec begin = from;
-#if HAS_SET_LIGHTS
-    const real weight_of_set = set_weight(from, w);
-    const mask of_set = open & less(R(0.0), weight_of_set);
-    if (any_lane(of_set)) {
-        const set_choice choice_of_set = set_choose(point, normal, numbers[3], numbers[4], w);
-        const set_ball ball = set_ball_of(choice_of_set.number, w);
-        real distance, density;
-        const vec toward = set_direction(&ball, point, u, v, &distance, &density);
-        const mask shines = less(R(0.0), choice_of_set.weight);
-        chosen.toward = vec_pick(of_set, toward, chosen.toward);
-        chosen.distance = pick(of_set, distance, chosen.distance);
-        chosen.light = color_pick(of_set, color_pick(shines, ball.light, color_of(R(0.0), R(0.0), R(0.0))), chosen.light);
-        chosen.density = pick(of_set, density / pick(shines, choice_of_set.weight, R(1.0)), chosen.density);
-        reckoned = pick(of_set & shines, choice_of_set.weight, reckoned);
-        begin = vec_pick(of_set, point, from);
-        share = pick(of_set, weight_of_set / total, share);
-        both |= of_set;
-        blocked &= ~of_set | ball.shadow;
-    }
-#endif
+    lights_beside_asked(&c, numbers, w);
     // Lights hide what is behind them.
-    real far = chosen.distance * R(0.999);
-    const lamp hides = lamp_met(begin, chosen.toward, 0, &far, w);
-    chosen.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), chosen.light);
-    const asked found = {chosen, share, reckoned, both, ~blocked};
-    return found;
+    real far = c.found.ray.distance * R(0.999);
+    const lamp hides = lamp_met(c.begin, c.found.ray.toward, 0, &far, w);
+    c.found.ray.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), c.found.ray.light);
+    return c.found;
 }
 
 // The weight of the light that was asked for; `other`: with which density the path itself chooses this direction.

@@ -67,10 +67,6 @@ INLINE real light_weight(__constant const struct Light *light, vec point) {
     return LIGHT_PI * light_at(light, point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
 }
 
-#if HAS_SET_LIGHTS
-#include "set_lights.h"
-#endif
-
 // The nearest light that a ray meets before `far`, its number, or -1; the eye's own rays see only visible ones.
 INLINE mask nearest_light(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     mask met = less(R(1.0), R(0.0));
@@ -86,8 +82,5 @@ INLINE mask nearest_light(vec origin, vec direction, int of_eye, real *far, colo
         *density = pick(here, light_density(light, origin, direction), *density);
         *weight = pick(here, light_weight(light, origin), *weight);
     }
-#if HAS_SET_LIGHTS
-    met |= set_met(origin, direction, of_eye, far, shows, density, weight, w);
-#endif
-    return met;
+    return met | met_on_set(origin, direction, of_eye, far, shows, density, weight, w);
 }

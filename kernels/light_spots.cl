@@ -4,6 +4,7 @@
 #include "sky.h"
 #include "phase.h"
 #include "spot.h"
+#include "set_lights.h"
 #include "light_places.h"
 #include "secondary.h"
 #include "fog.h"

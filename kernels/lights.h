@@ -51,3 +51,46 @@ INLINE color light_shown(__constant const struct Light *light) {
     const scalar square = light->spread * (S(2.0) - light->spread);
     return color_scale(color_splat(light->color), (real)(light->intensity / square));
 }
+
+// Of what two ways could have found the part that one keeps: the power heuristic.
+INLINE real power_share(real own, real other) {
+    const real square = own * own;
+    return square / fmax(square + other * other, (real)(REAL_SMALLEST));
+}
+
+// A light that was asked for: the ray to it, and the probability of having asked.
+typedef struct {
+    light_ray ray;
+    real share;            // of all lights, that this one is chosen
+    real reckoned;         // a factor on the density with which both ways to find it reckon
+    mask both, unblocked;  // whether a path meets it by chance, too; whether nothing can be in its way
+} asked;
+
+// Numbers in (0, 1): two for the place on a light, one for the light, two for the one of those on the set.
+#define ASKING_NUMBERS 5
+
+// How one of all lights is chosen by what it can bring to `from`: they lie in a row, each as long as its weight, and `place` is on one of them.
+typedef struct {
+    vec point, from, normal;    // small lights are seen from `point`; no normal within a medium
+    real own;                   // the object whose surface it is, or 0: no object lights itself
+    real total, place, before;  // all weights; where the choice lies; the weights so far
+    mask open;                  // whether none is chosen so far
+    asked found;
+    vec begin;                  // where the ray to it begins
+} choosing;
+
+// Whether the light with that weight is the one.
+INLINE mask is_chosen(choosing *c, real weight) {
+    const mask here = c->open & less(c->place, c->before + weight) & less(R(0.0), weight);
+    c->before += weight;
+    c->open &= ~here;
+    return here;
+}
+
+INLINE void takes(choosing *c, mask here, light_ray r, real weight) {
+    c->found.ray.toward = vec_pick(here, r.toward, c->found.ray.toward);
+    c->found.ray.distance = pick(here, r.distance, c->found.ray.distance);
+    c->found.ray.light = color_pick(here, r.light, c->found.ray.light);
+    c->found.ray.density = pick(here, r.density, c->found.ray.density);
+    c->found.share = pick(here, weight / c->total, c->found.share);
+}

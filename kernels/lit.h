@@ -12,7 +12,6 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
     return sum;
 }
 
-#if HAS_SET_LIGHTS
 // The light of one of the rays to balls on the set. (After the lights stands one that is white, for them.)
 INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, look l,
                           tally *cost, world w) {
@@ -22,11 +21,11 @@ INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, in
     color shines;
     mask shadow;
     const int number = s.sample * w.settings->set_rays + of_set;
-    const incidence in = set_incidence(here->point, here->normal, &place.at, number, s.bounce, w, &shines, &shadow);
+    incidence in;
+    set_incidence(here, &place.at, number, s.bounce, &in, &shines, &shadow, w);
     const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, l, w);
     return color_scale(color_mul(white, shines), (real)(S(1.0) / (scalar)w.settings->set_rays));
 }
-#endif
 
 // The light that the spot's rays have brought.
 INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
@@ -43,13 +42,11 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
     gathered = limited(gathered, w.settings);
     for (; turn < turns_for_light(w); ++turn) {
         const int number = turn - hemisphere_turns(w);
-#if HAS_SET_LIGHTS
         const int of_set = number - w.settings->light_count * w.settings->light_rays;
         if (of_set >= 0) {
             gathered = color_add(gathered, set_gathered(s, here, to_viewer, turn, of_set, open, l, cost, w));
             continue;
         }
-#endif
         __constant const struct Light *light = w.lights + number / w.settings->light_rays;
         if (number % w.settings->light_rays >= light->rays) continue;
         const encounter met = queue_met(s.q, turn, s.slot);

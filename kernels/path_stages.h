@@ -4,6 +4,7 @@
 #include "sky.h"
 #include "phase.h"
 #include "spot.h"
+#include "set_lights.h"
 #include "light_places.h"
 #include "secondary.h"
 #include "fog.h"
@@ -15,6 +16,8 @@
 #include "bsdf_bumped.h"
 #include "material_at.h"
 #include "lights.h"
+#include "emitters.h"
+#include "lights_beside.h"
 #if HAS_GLASS
 #include "glass_paths.h"
 #endif

@@ -14,9 +14,7 @@ INLINE void path_asking(stage s, const packet_pixels *at, world w, real numbers[
     path_square(s, at, PURPOSE_ASK, w, numbers, numbers + 1);
     path_square(s, at, PURPOSE_CHOICE, w, numbers + 2, &unused);
     numbers[3] = numbers[4] = R(0.5);
-#if HAS_SET_LIGHTS
-    path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
-#endif
+    if (w.settings->set_count > 0) path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
 }
 
 #if HAS_GLASS_SCATTER || HAS_CLOUDS
@@ -128,17 +126,14 @@ INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) 
 // Adds what a spot shines with by itself.
 INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *here, color light, mask shows, world w) {
     color more = color_mul(light, so_far->through);
-#if HAS_EMITTERS
-    const real distance = vec_dot(vec_sub(here->seen, so_far->origin), so_far->direction);
-    if (s.bounce > 0) {
+    if (s.bounce > 0 && HAS(w, EMITTERS)) {
+        const real distance = vec_dot(vec_sub(here->seen, so_far->origin), so_far->direction);
         more = color_scale(more, emitter_share(so_far->origin, so_far->direction, distance, here->object, with->density, with->total, w));
     }
-#endif
     if (s.bounce > 0) more = limited(more, w.settings);
     so_far->seen = color_pick(shows, color_add(so_far->seen, more), so_far->seen);
 }
 
-#if HAS_EMITTERS
 // Adds the light of an object that the last ray of a path has met, as far as the path could also have asked for it.
 INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, encounter last, mask here, world w) {
     const real number = queue_object(s.q, 0, s.slot, last);
@@ -149,7 +144,6 @@ INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, enc
     const color more = limited(color_mul(color_scale(light, share), so_far->through), w.settings);
     so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
 }
-#endif
 
 // A spot's material, ready to scatter by the normal `shading`, which is the surface's own, or that of its relief. `behind`: in glass,
 // whether the spot is seen from inside its body.

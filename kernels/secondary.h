@@ -65,7 +65,7 @@ INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, r
 INLINE int hemisphere_turns(world w) { return w.settings->cosine_rays + w.settings->map_rays; }
 
 // All turns of a spot.
-INLINE int turns_for_light(world w) { return hemisphere_turns(w) + w.settings->light_count * w.settings->light_rays + (HAS_SET_LIGHTS ? w.settings->set_rays : 0); }
+INLINE int turns_for_light(world w) { return hemisphere_turns(w) + w.settings->light_count * w.settings->light_rays + w.settings->set_rays; }
 
 // The direction that a ray of this turn takes, and whether anything may be in its way; false for turns that a light does not need.
 INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w, incidence *in, mask *wanted) {
@@ -75,16 +75,14 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn
     }
     const int light_index = (turn - hemisphere_turns(w)) / w.settings->light_rays;
     const int ray_of_light = (turn - hemisphere_turns(w)) % w.settings->light_rays;
-#if HAS_SET_LIGHTS
     const int of_set = turn - hemisphere_turns(w) - w.settings->light_count * w.settings->light_rays;
     if (of_set >= 0) {
         color shines;
         mask shadow;
-        *in = set_incidence(here->point, here->normal, at, s.sample * w.settings->set_rays + of_set, s.bounce, w, &shines, &shadow);
+        set_incidence(here, at, s.sample * w.settings->set_rays + of_set, s.bounce, in, &shines, &shadow, w);
         *wanted &= shadow & less(R(0.0), in->strength);
         return 1;
     }
-#endif
     __constant const struct Light *light = w.lights + light_index;
     if (ray_of_light >= light->rays) return 0;
     *in = light_at(light, here->point);

@@ -45,10 +45,10 @@ INLINE void set_rows(vec point, world w, int *rows) {
 }
 
 // About the irradiance that all balls together can bring to a point.
-INLINE real set_weight(vec point, world w) {
+CALLED real set_weight(const vec *point, world w) {
     int rows[LANES];
     scalar found[LANES];
-    set_rows(point, w, rows);
+    set_rows(*point, w, rows);
     for (int lane = 0; lane < LANES; ++lane) found[lane] = w.set_lights[rows[lane] + w.settings->set_count];
     return lanes_load(found);
 }
@@ -191,16 +191,16 @@ INLINE int set_walk(const scalar *o, const scalar *d, int of_eye, scalar *far, w
     return found;
 }
 
-// The nearest ball that rays meet before `far`, as `nearest_light` gives other lights. `density` is what the weights of both ways to find
+// The nearest ball that rays meet before `far`, as `nearest_light` gives single lights. `density` is what the weights of both ways to find
 // it reckon with: that of a place which asks for this ball alone. Whatever they reckon with, they add up to 1 (Veach 1997, sec. 9.2).
-INLINE mask set_met(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
+CALLED mask set_met(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     scalar o[3][LANES], d[3][LANES], reach[LANES], found[LANES];
-    lanes_store(origin.x, o[0]);
-    lanes_store(origin.y, o[1]);
-    lanes_store(origin.z, o[2]);
-    lanes_store(direction.x, d[0]);
-    lanes_store(direction.y, d[1]);
-    lanes_store(direction.z, d[2]);
+    lanes_store(origin->x, o[0]);
+    lanes_store(origin->y, o[1]);
+    lanes_store(origin->z, o[2]);
+    lanes_store(direction->x, d[0]);
+    lanes_store(direction->y, d[1]);
+    lanes_store(direction->z, d[2]);
     lanes_store(*far, reach);
     for (int lane = 0; lane < LANES; ++lane) {
         const scalar from[3] = {o[0][lane], o[1][lane], o[2][lane]}, way[3] = {d[0][lane], d[1][lane], d[2][lane]};
@@ -213,23 +213,26 @@ INLINE mask set_met(vec origin, vec direction, int of_eye, real *far, color *sho
     const set_ball b = set_ball_of(known, w);
     *far = lanes_load(reach);
     *shows = color_pick(met, b.light, *shows);
-    *density = pick(met, R(0.15915494309189535) / set_spread(&b, origin), *density);
+    *density = pick(met, R(0.15915494309189535) / set_spread(&b, *origin), *density);
     *weight = pick(met, set_weight(origin, w), *weight);
     return met;
 }
 
+INLINE mask met_on_set(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
+    if (w.settings->set_count == 0) return less(R(1.0), R(0.0));
+    return set_met(&origin, &direction, of_eye, far, shows, density, weight, w);
+}
+
 // One ball's light at a spot, for shading by Phong's model: `shines` is its colour, and the strength what stands for all balls.
-INLINE incidence set_incidence(vec point, vec normal, const packet_pixels *at, int number, int bounce, world w, color *shines, mask *shadow) {
+CALLED void set_incidence(const spot *here, const packet_pixels *at, int number, int bounce, incidence *in, color *shines, mask *shadow, world w) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, (uint)(PURPOSE_SET_LIGHT + 16 * bounce));
     real u, v, across, below, density;
     unit_square((bits)((uint)number), seed, &u, &v);
     unit_square((bits)((uint)number), hash_bits(seed + 1u), &across, &below);
-    const set_choice chosen = set_choose(point, normal, u, v, w);
+    const set_choice chosen = set_choose(here->point, here->normal, u, v, w);
     const set_ball b = set_ball_of(chosen.number, w);
-    incidence in;
-    in.toward = set_direction(&b, point, across, below, &in.distance, &density);
-    in.strength = R(0.3183098861837907) * chosen.weight / density;
+    in->toward = set_direction(&b, here->point, across, below, &in->distance, &density);
+    in->strength = R(0.3183098861837907) * chosen.weight / density;
     *shines = b.light;
     *shadow = b.shadow;
-    return in;
 }

@@ -2,6 +2,7 @@
 #include "environment.h"
 #include "phase.h"
 #include "spot.h"
+#include "set_lights.h"
 #include "light_places.h"
 #include "secondary.h"
 #include "fog.h"

@@ -41,8 +41,12 @@ typedef uchar sample;
 #include "volume_shot.h"
 #if HAS_PATHS
 #include "sky.h"
+// Beside a grid are neither objects that shine nor lights on a set.
+INLINE mask met_on_set(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) { return less(R(1.0), R(0.0)); }
 #include "light_places.h"
 #include "lights.h"
+INLINE real with_lights_beside(real sum, vec point, real own, world w) { return sum; }
+INLINE void lights_beside_asked(choosing *c, const real *numbers, world w) {}
 #include "light_asks.h"
 #include "volume_paths.h"
 #endif

@@ -25,7 +25,7 @@ NORMALS = {
     "least_squares": 4,
 }
 # What a scene has beside what other fields tell, as bits.
-FEATURES = {"fog": 1, "bump": 2, "paths": 4, "shining_clouds": 8}
+FEATURES = {"fog": 1, "bump": 2, "paths": 4, "shining_clouds": 8, "emitters": 16}
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {
     "LIGHT": LIGHT_KINDS,

@@ -9,6 +9,7 @@ import numpy as np
 
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.environment import PackedEnvironment
 from clfractal.renderers.fineness import Fineness
 from clfractal.renderers.kinds import FEATURES, NORMALS
@@ -123,6 +124,7 @@ def features_of(scene: Scene) -> int:
         "fog": scene.fog is not None,
         "bump": has_bump(scene),
         "paths": along_paths(scene),
+        "emitters": any(each is not None for each in asked_radiance(scene)),
         "shining_clouds": any(each.transfer.emission is not None for each in clouds_of(scene)),
     }
     return sum(FEATURES[name] for name, there in has.items() if there)

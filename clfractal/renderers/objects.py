@@ -93,7 +93,6 @@ OBJECT = Struct(
 def object_defines(scene: Scene) -> dict[str, object]:
     """The defines of all programs that send rays, or read what is kept between stages."""
     return {
-        "HAS_EMITTERS": int(any(each is not None for each in asked_radiance(scene))),
         "WAVES": WAVES,
         **grid_defines(scene),
         **{f"OBJECT_{kind.upper()}": number for kind, number in OBJECT_KINDS.items()},

@@ -62,7 +62,6 @@ from clfractal.renderers.waves import (
     surface_stages,
 )
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.solids import Body
 
@@ -124,7 +123,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "HAS_GLASS_SET": int(has_glass_set(scene)),
         "HAS_GLASS_SCATTER": int(has_cloudy_glass(scene)),
         **({"HAS_SUBSURFACE": 1} if has_subsurface(scene) else {}),
-        "HAS_SET_LIGHTS": int(any(isinstance(light, SetLight) for light in scene.lights)),
     }
 
 

@@ -25,6 +25,7 @@ LAMPS = [
 # Of each feature what a scene says, and the programs that it needs beside those of a plain one.
 FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "lights": ({"lights": LAMPS}, set()),
+    "lights on the set": ({"lights": [{"type": "set", "trap": {"shape": "sphere"}}]}, set()),
     "sky": ({"environment": {"sky": {}, "rays": 2}}, set()),
     "map": ({"environment": {"name": "studio", "rays": 2, "background": True}}, set()),
     "occlusion": ({"renderer": {"ambient_occlusion": {"rays": 2}}}, set()),
@@ -42,6 +43,19 @@ FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "objects": ({"objects": {"ball": BALL, "sea": {"type": "water", "position": [0, 0, -2]}}}, {"objects"}),
     "cut": ({"cut_planes": [{"plane": PLANE, "cut": True}]}, {"planes"}),
     "quads": ({"cut_planes": [{"plane": PLANE}]}, {"planes"}),
+}
+PATHS = {"lighting": {"mode": "path"}}
+GLOW = {"glow": {"emission": {"luminance": 3}}}
+# The same of scenes along paths.
+FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
+    "lights": FEATURES["lights"],
+    "lights on the set": FEATURES["lights on the set"],
+    "map": FEATURES["map"],
+    # The set shines like its ball, so that both have one material.
+    "shining object": (
+        {"material": {"name": "glow"}, "objects": {"ball": BALL}, "materials": GLOW},
+        {"objects"},
+    ),
 }
 # Programs that know the formula, and how its solids are joined.
 OF_FORMULA = {"rays", "colors", "glow", "planes", "glass"}
@@ -62,6 +76,15 @@ def test_a_feature_is_data(feature: str, device: Device) -> None:
     found = texts(scene(FORMULA, **sections), device)
     assert set(found) == set(plain) | more
     assert all(found[name] == text for name, text in plain.items())
+
+
+@pytest.mark.parametrize("feature", FEATURES_OF_PATHS)
+def test_a_feature_of_paths_is_data(feature: str, device: Device) -> None:
+    sections, more = FEATURES_OF_PATHS[feature]
+    plain = texts(scene(FORMULA, **PATHS), device)
+    found = texts(scene(FORMULA, **PATHS, **sections), device)
+    assert set(found) == set(plain) | more
+    assert {name: text for name, text in found.items() if plain.get(name, text) != text} == {}
 
 
 @pytest.mark.parametrize("feature", ["lens", "objects", "cut", "mirror"])
@@ -117,7 +140,7 @@ def test_stages_without_a_formula_are_the_same_for_all(device: Device) -> None:
 
 # Features that still make texts of their own: none may join them.
 LEFT = {
-    *("HAS_SET_LIGHTS", "HAS_MAPS", "HAS_BUMP", "MATERIALS", "HAS_EMITTERS", "HAS_CLOUDS"),
+    *("HAS_MAPS", "HAS_BUMP", "MATERIALS", "HAS_CLOUDS"),
     *("HAS_GLASS", "HAS_GLASS_SET", "HAS_GLASS_SCATTER", "HAS_SUBSURFACE", "TRANSFER_COLUMNS"),
 }
 # What is the same in every program: counts, sizes, and numbers of words.
