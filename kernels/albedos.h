@@ -6,7 +6,7 @@
 #define REPEATED_TABLES 4   // of metals, see `clfractal/renderers/facets.py`
 #define ALBEDO_FUZZ (REPEATED_TABLES * ALBEDO_TABLE)
 #define ALBEDO_DIELECTRIC (ALBEDO_FUZZ + ALBEDO_TABLE)
-// With HAS_GLASS (`clfractal/renderers/glass.py`): rough glass, seen from outside and from inside; wavelengths.
+// With glass (`clfractal/renderers/glass.py`): rough glass, seen from outside and from inside; wavelengths.
 #define ALBEDO_GLASS (ALBEDO_DIELECTRIC + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
 #define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
 #define SPECTRUM (ALBEDO_GLASS_INSIDE + ALBEDO_REFLECTANCES * ALBEDO_TABLE)

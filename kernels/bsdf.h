@@ -5,9 +5,7 @@
 // sees its coat and fuzz.
 #include "albedos.h"
 #include "microfacets.h"
-#if HAS_GLASS
 #include "bsdf_glass.h"
-#endif
 
 // A material at a spot, `pbr`: generated from clfractal/renderers/materials.py.
 #include "pbr.h"
@@ -31,15 +29,11 @@ typedef struct {
     int relief;               // whether the normal is that of a relief; see bsdf_bumped.h
     vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each
     real level;               // cosine between the normals
-#if HAS_GLASS
     glass clear;
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
-#endif
-#if HAS_SUBSURFACE
     mask emerges;             // whether light comes from below the boundary, as from a white body whose viewer is below, too
     real bare;                // part of the body that is none of a medium
     color below; real by_below; // what goes below the boundary, over the probability of choosing that, the last part of all choices
-#endif
 } bsdf;
 
 INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
@@ -59,28 +53,18 @@ INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side),
 INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
     real of_gloss = R(0.0);
     if (any_of(b->dielectric * b->root)) of_gloss = albedo_of_dielectric(tables, b->out.z, b->rough, b->root).of_direction;
-#if HAS_SUBSURFACE
     of_gloss = pick(b->emerges, R(0.0), of_gloss);
-#endif
     const real mirrored = b->metalness * fmax(luminance(b->metal), R(0.1)) + b->dielectric * of_gloss;
     real scattered = b->dielectric * (R(1.0) - of_gloss) * fmax(luminance(b->body), R(0.02)) + b->metalness * b->rough * R(0.3)
                            + luminance(b->fuzz);
-#if HAS_GLASS
     scattered += b->clear.weight * (R(1.0) - b->clear.crosses) * b->clear.lost;
     const real bent = b->clear.weight * (R(1.0) - b->clear.lost), lost = b->clear.weight * b->clear.crosses * b->clear.lost;
-#if HAS_SUBSURFACE
     const real sunk = below_sampled(b, of_gloss, &scattered);
-#endif
     const real below = (R(1.0) - b->coat_albedo) * (mirrored + scattered + bent + lost), all = b->coat_albedo + below;
-#if HAS_SUBSURFACE
     b->by_below = (R(1.0) - b->coat_albedo) * sunk / all;
     b->below = color_scale(color_mul(b->below, b->coat_tint), (R(1.0) - b->fuzz_albedo) * all);
-#endif
     b->by_glass = (R(1.0) - b->coat_albedo) * bent / all;
     b->by_beyond = (R(1.0) - b->coat_albedo) * lost / all;
-#else
-    const real below = (R(1.0) - b->coat_albedo) * (mirrored + scattered), all = b->coat_albedo + below;
-#endif
     b->by_coat = b->coat_albedo / all;
     b->by_gloss = (R(1.0) - b->coat_albedo) * mirrored / all;
 }
@@ -114,7 +98,6 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.fuzz_rough = fmax(p->fuzz_roughness, SMOOTHEST_FUZZ);
     b.coat_albedo = b.fuzz_albedo = R(0.0);
     b.dielectric = R(1.0) - b.metalness;
-#if HAS_GLASS
     const mask inside = less(R(0.5), p->inside);
     b.coat = pick(inside, R(0.0), b.coat);
     b.coat_tint = color_pick(inside, color_of(R(1.0), R(1.0), R(1.0)), b.coat_tint);
@@ -124,10 +107,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     const real bending = (R(1.0) + bent_root) / (R(1.0) - bent_root);
     b.clear = glass_at(b.dielectric * p->transmission_weight, b.out.z, p->inside, b.ior, bending, b.rough, b.alpha, b.root, tint, tables);
     b.dielectric *= R(1.0) - p->transmission_weight;
-#endif
-#if HAS_SUBSURFACE
     below_begins(&b, p, inside);
-#endif
     if (any_of(b.coat)) {
         // Light that the coat's inner side reflects meets the body again (OpenPBR 1.1, Coat darkening).
         const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
@@ -138,9 +118,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
         DARKENED(b.body.g);
         DARKENED(b.body.b);
 #undef DARKENED
-#if HAS_SUBSURFACE
         b.below = color_of(DARKENING(p->subsurface_color.r), DARKENING(p->subsurface_color.g), DARKENING(p->subsurface_color.b));
-#endif
         b.metal = b.body;
         b.coat_albedo = b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction;
     }
@@ -188,13 +166,11 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
     vec i = bsdf_local(b, toward);
     const mask over = b->seen & less(R(0.0), i.z);
     color below = color_of(R(0.0), R(0.0), R(0.0));
-#if HAS_GLASS
     const mask under = b->seen & less(i.z, R(0.0));
     if (any_lane(under & less(R(0.0), b->clear.weight))) {
         const color passes = color_scale(glass_passes(&b->clear, b->out, i, tables), b->clear.weight);
         below = color_pick(under, color_scale(color_mul(passes, THROUGH_LAYERS(b)), sharp), below);
     }
-#endif
     i.z = fmax(i.z, R(1e-6));
     const vec h = middle_way(b->out, i);
     const real single = ggx_value(b->out, i, h, b->alpha) * lobe_share(broad, sharp, b->alpha);
@@ -208,14 +184,11 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
             other = albedo_of_dielectric(tables, i.z, b->rough, b->root);
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }
-#if HAS_SUBSURFACE
         o.of_direction = pick(b->emerges, R(0.0), o.of_direction);
         body = color_scale(body, b->bare);
-#endif
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other) * broad)),
                           b->dielectric);
     }
-#if HAS_GLASS
     if (any_of(b->clear.weight)) {
         // The tint of the boundary is that of its outer side.
         const color tint = color_pick(b->clear.inside, color_of(R(1.0), R(1.0), R(1.0)), b->gloss);
@@ -223,7 +196,6 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
         const real reflects = b->clear.weight * glass_reflects(&b->clear, b->out, i, h, facets, tables) * sharp;
         sum = color_add(sum, color_scale(tint, reflects));
     }
-#endif
     if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, broad, tables), b->metalness));
     if (any_of(b->coat)) {
         const real facets = ggx_value(b->out, i, h, b->coat_alpha) * lobe_share(broad, sharp, b->coat_alpha);
@@ -242,24 +214,19 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
 INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
     const vec i = bsdf_local(b, toward), h = middle_way(b->out, i);
     const real of_coat = b->by_coat * lobe_share(broad, sharp, b->coat_alpha), of_gloss = b->by_gloss * lobe_share(broad, sharp, b->alpha);
-#if HAS_GLASS
-    const glass *g = &b->clear;
     real around = R(1.0) - b->by_coat - b->by_gloss - b->by_glass - b->by_beyond;
-#if HAS_SUBSURFACE
-    around = fmax(around - b->by_below, R(0.0));
-#endif
+    around = pick(less(R(0.0), b->by_below), fmax(around - b->by_below, R(0.0)), around);
     const real hemisphere = broad * around * fmax(i.z, R(0.0)) / BSDF_PI;
-    const real facets = of_gloss + b->by_glass * sharp * fresnel_across(vec_dot(b->out, h), g->mirrors);
+    real facets = of_gloss, beyond = R(0.0);
+    if (any_of(b->clear.weight)) {
+        const glass *g = &b->clear;
+        facets += b->by_glass * sharp * fresnel_across(vec_dot(b->out, h), g->mirrors);
+        const vec bends = bending_facet(b->out, i, g->across);
+        const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->mirrors)) * bending_density(g, b->out, i, bends);
+        beyond = sharp * (bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI);
+    }
     const real sum = hemisphere + facets * ggx_density(b->out, h, b->alpha) + of_coat * ggx_density(b->out, h, b->coat_alpha);
-    const vec bends = bending_facet(b->out, i, g->across);
-    const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->mirrors)) * bending_density(g, b->out, i, bends);
-    const real beyond = sharp * (bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI);
     return pick(b->seen, pick(less(R(0.0), i.z), sum, pick(less(i.z, R(0.0)), beyond, R(0.0))), R(0.0));
-#else
-    const real hemisphere = broad * (R(1.0) - b->by_coat - b->by_gloss) * fmax(i.z, R(0.0)) / BSDF_PI;
-    const real sum = hemisphere + of_gloss * ggx_density(b->out, h, b->alpha) + of_coat * ggx_density(b->out, h, b->coat_alpha);
-    return pick(b->seen & less(R(0.0), i.z), sum, R(0.0));
-#endif
 }
 
 // A direction chosen by three numbers in (0, 1), and whether light is scattered there.
@@ -267,18 +234,17 @@ INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, mask *usable)
     const mask coat = less(choice, b->by_coat), gloss = ~coat & less(choice, b->by_coat + b->by_gloss);
     const vec h = ggx_facet(b->out, pick(coat, b->coat_alpha, b->alpha), u, v), mirrored = mirrored_by(b->out, h);
     const vec around = hemisphere_direction(vec_of(R(0.0), R(0.0), R(1.0)), u, v);
-#if HAS_GLASS
-    const real before = b->by_coat + b->by_gloss, after = before + b->by_glass;
-    const mask facet = ~coat & ~gloss & less(choice, after), beyond = ~coat & ~gloss & ~facet & less(choice, after + b->by_beyond);
-    const mask bends = facet & less(fresnel_across(vec_dot(b->out, h), b->clear.mirrors), (choice - before) / b->by_glass);
-    vec i = vec_pick(coat | gloss | facet, mirrored, around);
-    i = vec_pick(bends, refracted_at(b->out, h, b->clear.across), i);
-    i.z = pick(beyond, -i.z, i.z);
+    vec i = vec_pick(coat | gloss, mirrored, around);
+    mask below = coat & ~coat;
+    if (any_of(b->clear.weight)) {
+        const real before = b->by_coat + b->by_gloss, after = before + b->by_glass;
+        const mask facet = ~coat & ~gloss & less(choice, after), beyond = ~coat & ~gloss & ~facet & less(choice, after + b->by_beyond);
+        const mask bends = facet & less(fresnel_across(vec_dot(b->out, h), b->clear.mirrors), (choice - before) / b->by_glass);
+        i = vec_pick(bends, refracted_at(b->out, h, b->clear.across), vec_pick(facet, mirrored, i));
+        i.z = pick(beyond, -i.z, i.z);
+        below = bends | beyond;
+    }
     // A facet that mirrors below the surface, or refracts above it, is hidden by others.
-    *usable = b->seen & less(R(0.0), pick(bends | beyond, -i.z, i.z));
-#else
-    const vec i = vec_pick(coat | gloss, mirrored, around);
-    *usable = b->seen & less(R(0.0), i.z);
-#endif
+    *usable = b->seen & less(R(0.0), pick(below, -i.z, i.z));
     return vec_along(vec_along(vec_scale(b->normal, i.z), i.x, b->side), i.y, b->up);
 }

@@ -1,13 +1,14 @@
 // Boundaries that light goes below and comes from: what a material's layers are for it.
-#if HAS_SUBSURFACE
 
 // Where light comes out, `emerges`, the boundary lets it through as that of a white diffuse body does, and there is nothing over it: what
 // lies there was reckoned where light went in. From inside glass nothing goes below its boundary.
 INLINE void below_begins(bsdf *b, const pbr *p, mask inside) {
     const color white = color_of(R(1.0), R(1.0), R(1.0)), none = color_of(R(0.0), R(0.0), R(0.0));
     b->emerges = less(R(0.5), p->emerges);
-    b->bare = R(1.0) - pick(b->emerges | inside, R(0.0), p->subsurface_weight);
+    b->bare = R(1.0);
     b->below = white;
+    if (!any_of(p->subsurface_weight) && !any_lane(b->emerges)) return;
+    b->bare = R(1.0) - pick(b->emerges | inside, R(0.0), p->subsurface_weight);
     b->out = vec_pick(b->emerges, vec_of(R(0.0), R(0.0), R(1.0)), b->out);
     b->body = color_pick(b->emerges, white, b->body);
     b->gloss = color_pick(b->emerges, none, b->gloss);
@@ -26,4 +27,3 @@ INLINE real below_sampled(const bsdf *b, real of_gloss, real *scattered) {
     *scattered += sinks - sinks * fmax(luminance(b->body), R(0.02));
     return sinks;
 }
-#endif

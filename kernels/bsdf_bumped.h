@@ -65,10 +65,8 @@ INLINE vec bumped_direction(const bsdf *b, vec toward, real choice, real wall) {
     toward = vec_pick(apart, mirrored_across(toward, b->surface), toward);
     real fades = pick(less(choice, b->by_coat + b->by_gloss), b->alpha * b->alpha, R(1.0));
     fades = pick(less(choice, b->by_coat), b->coat_alpha * b->coat_alpha, fades);
-#if HAS_GLASS
     const real before = b->by_coat + b->by_gloss;
     fades = pick(less_equal(before, choice) & less(choice, before + b->by_glass + b->by_beyond), R(0.0), fades);
-#endif
     const mask leans = less(R(0.0), vec_dot(toward, b->surface)) & less(R(0.0), vec_dot(toward, b->leans));
     const mask moves = leans & less(wall, fades * (R(1.0) - horizon_share(b, toward)));
     return vec_pick(moves, mirrored_across(toward, b->leans), toward);

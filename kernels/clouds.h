@@ -8,8 +8,8 @@ INLINE real cloud_number(grid_ray r, real value, int column) {
     const real place = clamp((value - (real)(r.o->value_low)) * (real)(r.o->value_range), R(0.0), R(1.0));
     const real at = place * (real)((scalar)(TRANSFER_SIZE - 1));
     const ints first = min(to_ints(at), (ints)(TRANSFER_SIZE - 2));
-    const ints entry = TRANSFER_COLUMNS * first + column;
-    return between_two(gather_floats(table, entry), gather_floats(table, entry + TRANSFER_COLUMNS), at - to_reals(first));
+    const ints entry = CLOUD_COLUMNS * first + column;
+    return between_two(gather_floats(table, entry), gather_floats(table, entry + CLOUD_COLUMNS), at - to_reals(first));
 }
 
 // What `volume_track.h` asks of a ray through a grid.
@@ -119,72 +119,51 @@ INLINE stream cloud_stream(stage s, const packet_pixels *at, uint purpose, world
 }
 
 // Where a path is scattered on its ray before `far`, which then is that place; what shines on the way there is added.
-INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_far, vec origin, vec direction, real *far, mask here,
-                                     world w) {
+INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_far, real *far, mask here, world w) {
     stream numbers = cloud_stream(s, at, CLOUD_MEETS, w);
-    const cloud_place found = clouds_met(&origin, &direction, *far, here, &numbers, w);
+    const cloud_place found = clouds_met(&so_far->origin, &so_far->direction, *far, here, &numbers, w);
     *far = pick(found.met, found.t, *far);
     if (!HAS(w, SHINING_CLOUDS)) return found;
     numbers = cloud_stream(s, at, CLOUD_SHINES, w);
-    color more = color_mul(clouds_shine(&origin, &direction, *far, here, &numbers, w), so_far->through);
+    color more = color_mul(clouds_shine(&so_far->origin, &so_far->direction, *far, here, &numbers, w), so_far->through);
     if (s.bounce > 0) more = limited(more, w.settings);
     so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
     return found;
 }
 
 // What comes through to a light that was asked for, if its ray has a length.
-INLINE real light_passes_clouds(stage s, const packet_pixels *at, vec from, vec toward, real distance, mask here, world w) {
+INLINE real light_passes_clouds(stage s, const packet_pixels *at, ray asks, mask here, world w) {
     const stream numbers = cloud_stream(s, at, CLOUD_ASKS, w);
-    return clouds_passed(&from, &toward, distance, here & less(R(0.0), distance), &numbers, w);
+    return clouds_passed(&asks.origin, &asks.direction, asks.far, here & less(R(0.0), asks.far), &numbers, w);
 }
 
-// Scatters paths where clouds have met them, for lanes `here`: one light is asked for, by the ray `asks`, and one direction followed.
-INLINE void path_in_cloud(stage s, const packet_pixels *at, path *so_far, carried *with, path arrived_as, carried arrived_with, ray arrived,
-                          const cloud_place *place, ray *asks, mask here, world w) {
+// Scatters paths where clouds have met them, for lanes `here`: one light is asked for, by a ray that `stop` keeps, and one direction
+// followed.
+INLINE void path_in_cloud(stage s, const packet_pixels *at, path *so_far, carried *with, const cloud_place *place, halt *stop, mask here,
+                          world w) {
     if (!any_lane(here)) return;
-    path p = arrived_as;
-    carried c = arrived_with;
-    p.origin = vec_along(arrived.origin, place->t, arrived.direction);
-    p.footprint = arrived.footprint + arrived.spread * place->t;
-    p.spread = arrived.spread;
+    path p = *so_far;
+    carried c = *with;
+    const vec before = p.direction;
+    p.origin = vec_along(p.origin, place->t, before);
+    p.footprint += p.spread * place->t;
     p.through = color_mul(p.through, place->keeps);
     real u, v, unused, roulette, numbers[ASKING_NUMBERS];
     path_asking(s, at, w, numbers);
     c.total = weight_of_all(p.origin, R(0.0), w);
     asked a;
-    color brings = medium_asks(p.origin, arrived.direction, place->anisotropy, numbers, c.total, w, &a);
-    mask asking = here & less(R(0.0), brightest(brings));
-#if HAS_GLASS
+    const color brings = color_mul(medium_asks(p.origin, before, place->anisotropy, numbers, c.total, w, &a), p.through);
     // The boundary of a body would bend the way out of it: nobody asks from inside.
-    const mask open = equal(c.medium, R(0.0));
-    asking &= open;
-#endif
-    const real distance = pick(asking & ~a.unblocked, a.ray.distance, R(-1.0));
-    brings = color_scale(brings, light_passes_clouds(s, at, p.origin, a.ray.toward, distance, asking, w));
-    brings = color_mul(brings, p.through);
-    if (s.bounce > 0) brings = limited(brings, w.settings);
+    const mask open = equal(c.medium, R(0.0)), asking = here & open & less(R(0.0), brightest(brings));
     c.awaited = color_pick(asking, brings, color_of(R(0.0), R(0.0), R(0.0)));
     path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
-    p.direction = phase_direction(arrived.direction, u, v, place->anisotropy);
-    c.density = phase_of(vec_dot(arrived.direction, p.direction), place->anisotropy);
-#if HAS_GLASS
-    c.density = pick(open, c.density, R(-1.0));
-#endif
-    mask on_path = here & less(R(0.0), brightest(p.through));
+    p.direction = phase_direction(before, u, v, place->anisotropy);
+    c.density = pick(open, phase_of(vec_dot(before, p.direction), place->anisotropy), R(-1.0));
     path_square(s, at, PURPOSE_CHOICES, w, &unused, &roulette);
-    if (s.bounce >= w.settings->roulette) {
-        const real stays = fmin(brightest(p.through), R(0.95));
-        on_path &= less(roulette, stays);
-        p.through = color_pick(on_path, color_scale(p.through, R(1.0) / stays), p.through);
-    }
-    p.on_path = number_of(on_path);
-#if HAS_GLASS_SCATTER
-    path_sets_out(s, at, &p, &c, PURPOSE_FLIGHT + NEXT_BOUNCE, on_path, w);
-#endif
-    asks->origin = vec_pick(here, p.origin, asks->origin);
-    asks->direction = vec_pick(here, a.ray.toward, asks->direction);
-    asks->far = pick(here, distance, asks->far);
-    asks->footprint = pick(here, p.footprint * (real)(w.settings->shadow_detail), asks->footprint);
+    path_stays(s, &p, here, roulette, w);
+    if (KEEPS(s, STATE_FLIGHT)) path_sets_out(s, at, &p, &c, PURPOSE_FLIGHT + NEXT_BOUNCE, mask_of(p.on_path), w);
+    stop->toward = vec_pick(here, a.ray.toward, stop->toward);
+    stop->far = pick(asking & ~a.unblocked, a.ray.distance, stop->far);
     *so_far = path_pick(here, p, *so_far);
     *with = carried_pick(here, c, *with);
 }

@@ -1,21 +1,7 @@
 // Glass beside the set that scatters light: milk, jade, cloudy water. How far a flight goes is in flights.h; the set's walks are in walks.h.
 //
 // No lamp is asked for: the boundary would bend the way to it. So the density of the direction is -1, and all light is met by chance.
-#define SOUGHT_BEYOND R(4.0)     // footprints
 #define PURPOSE_TURN 0x10000u   // from the numbers of one scattering to those of the next
-
-// Draws the flight of a path that sets out, with the numbers of a purpose.
-INLINE void path_sets_out(stage s, const packet_pixels *at, const path *so_far, carried *with, uint purpose, mask here, world w) {
-    real u, choice;
-    path_square(s, at, purpose, w, &u, &choice);
-    flight_begins(with, so_far->through, u, choice, here);
-}
-
-// How far a ray is marched for a flight: a surface just before its end is found some footprints beyond it.
-INLINE real flight_sought(const path *so_far, const carried *with, world w) {
-    const real cone = (real)(w.settings->detail) * (so_far->footprint + so_far->spread * with->flight);
-    return fmin(with->flight + SOUGHT_BEYOND * cone, (real)(REAL_LARGEST));
-}
 
 // Brings a path to where it is scattered.
 INLINE void path_flies(path *so_far, const carried *with, mask here) {
@@ -26,9 +12,7 @@ INLINE void path_flies(path *so_far, const carried *with, mask here) {
 // Whether nothing at all is in the way of a flight, as far as is known here: only the march knows where the set is.
 INLINE mask flight_is_free(const path *so_far, const carried *with, mask here, world w) {
     here &= less(body_of(with->medium), set_body(w)) & less(with->flight, (real)(REAL_LARGEST));
-#if HAS_CLOUDS
-    here &= ~here;  // clouds may be in the way, too
-#endif
+    if (HAS(w, CLOUDS)) here &= ~here;   // they may be in the way, too
     if (!any_lane(here)) return here;
     ray r = {so_far->origin, so_far->direction, R(0.0), with->flight, so_far->footprint, so_far->spread, RAY_NOTHING_KNOWN};
     real number, far = with->flight;
@@ -60,17 +44,15 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
     }
 }
 
-// Follows paths that an object's medium `scatters` on their way: what they were when they arrived is `flown` and `within`.
-INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, carried *with, path flown, carried within, ray arrived,
-                               mask scatters, world w) {
+// Follows paths that an object's medium `scatters` on their way.
+INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, carried *with, mask scatters, world w) {
     if (!any_lane(scatters)) return;
-    flown.origin = arrived.origin;
-    flown.direction = arrived.direction;
-    flown.footprint = arrived.footprint;
-    flown.spread = arrived.spread;
-    within.density = R(-1.0);
-    path_flies(&flown, &within, scatters);
-    path_scatters(s, at, &flown, &within, scatters, w);
-    *so_far = path_pick(scatters, flown, *so_far);
-    *with = carried_pick(scatters, within, *with);
+    path p = *so_far;
+    carried c = *with;
+    c.density = R(-1.0);
+    c.awaited = color_of(R(0.0), R(0.0), R(0.0));
+    path_flies(&p, &c, scatters);
+    path_scatters(s, at, &p, &c, scatters, w);
+    *so_far = path_pick(scatters, p, *so_far);
+    *with = carried_pick(scatters, c, *with);
 }

@@ -2,9 +2,10 @@
 
 #define EXIT_GRAZES R(0.05)   // least cosine of a ray with the normal where it leaves the set
 
-// The rays within: each pixel's second one.
-INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride, __constant const struct March *settings) {
-    const queue q = {rays + wave, met + wave, wave, 1, stride, settings->met_numbers, HAS_GLASS_SCATTER ? settings->meets_objects : 0, 0};
+// The rays within: each pixel's second one. `objects`: whether they meet any.
+INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride, __constant const struct March *settings,
+                       int objects) {
+    const queue q = {rays + wave, met + wave, wave, 1, stride, settings->met_numbers, objects, 0};
     return q;
 }
 
@@ -36,4 +37,12 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
     e.touch = beyond - e.touch;
     e.t = t;
     encounter_keep_surface(q, at, &e);
+}
+
+// The same for a packet's share, which has been marched; `waits` are counted in the launch's statistics.
+INLINE void look_along_share(share mine, int waits, queue q, __global uint *statistics, __constant const struct March *settings,
+                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (LANES == 1) return;
+    for (int at = mine.next; at < mine.end; at += LANES) look_inside(q, at, settings, orbit, k);
+    atomic_add(statistics + STATISTIC_WAITS, (uint)waits);
 }

@@ -87,5 +87,6 @@ INLINE int paths_are_over(stage s) {
     const int numbers[5] = {on_path, found, awaited, awaited + 1, awaited + 2};
     mask left = less(R(1.0), R(0.0));
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));
+    if (KEEPS(s, STATE_HALT)) left |= ~equal(lanes_load(state_part(s, STATE_HALT)), R(0.0));
     return !any_lane(left);
 }

@@ -1,9 +1,8 @@
 // Entry point: spots of what rays have met. It knows no formula.
 #include "stages.h"
 #include "spot_found.h"
-#if HAS_SUBSURFACE
+#include "flights.h"
 #include "media.h"
-#endif
 
 // Makes spots of what the rays along the path have met, and sends the rays that bring their light.
 STAGE(find_spots) {
@@ -20,17 +19,13 @@ STAGE(find_spots) {
     real object;
     vec place;
     encounter seen = surface_met(s, 0, r, &object, &place, w);
-#if HAS_GLASS_SET
-    if (bounce > 0) seen = met_within(s, r, seen, &object, &place, w);
-#endif
+    if (bounce > 0 && HAS(w, GLASS_SET)) seen = met_within(s, r, seen, &object, &place, w);
     tally_met(&cost, seen, 1);
     const sighting at_first = {seen.hit, seen.steps};
     spot found = spot_of_ray(r, seen, object, place, w);
-#if HAS_SUBSURFACE
-    if (bounce > 0) {
+    if (bounce > 0 && HAS(w, SUBSURFACE)) {
         const carried with = carried_kept(s);
         found.normal = vec_pick(path_emerges(bounce, &with, &found, w), vec_scale(found.normal, R(-1.0)), found.normal);
     }
-#endif
     spot_found(s, &here.at, a, r, so_far.on_path, found, at_first, cost, next_turns, w);
 }

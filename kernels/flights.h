@@ -5,15 +5,14 @@
 // each, and is weighed by the chance of it in the mean of all, as if each colour had chosen (the balance heuristic; Wilkie and others 2014,
 // Hero Wavelength Spectral Sampling): no colour weighs more than the sum of all did.
 
+INLINE mask is_cloudy(const carried *with) { return less(R(0.0), brightest(with->scatters)); }
+
 // What a medium leaves of light on a way through it.
 INLINE color absorbed(color light, color extinction, real way) {
     return color_of(light.r * exp(-way * extinction.r), light.g * exp(-way * extinction.g), light.b * exp(-way * extinction.b));
 }
 
-#if HAS_GLASS_SCATTER
 #define MOST_SCATTERINGS 1024   // between two things that a path meets
-
-INLINE mask is_cloudy(const carried *with) { return less(R(0.0), brightest(with->scatters)); }
 
 // What a path brings of each colour, as parts of their sum.
 INLINE color shares_of(color through) {
@@ -64,4 +63,3 @@ INLINE mask path_survives(path *so_far, real chance, mask here) {
     so_far->on_path = pick(here, number_of(goes_on), so_far->on_path);
     return here & goes_on;
 }
-#endif

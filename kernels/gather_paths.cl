@@ -1,6 +1,14 @@
 // Entry points: what lights have brought to paths, where these go on, and their ends. They know no formula.
 #include "path_stages.h"
 
+#define SOUGHT_BEYOND R(4.0)   // footprints
+
+// How far a ray is marched for a flight: a surface just before its end is found some footprints beyond it.
+INLINE real flight_sought(const path *so_far, const carried *with, world w) {
+    const real cone = (real)(w.settings->detail) * (so_far->footprint + so_far->spread * with->flight);
+    return fmin(with->flight + SOUGHT_BEYOND * cone, (real)(REAL_LARGEST));
+}
+
 // Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
 STAGE(gather_paths) {
     if (IS_BEYOND) return;
@@ -24,16 +32,12 @@ STAGE(gather_paths) {
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
-#if HAS_GLASS_SCATTER
-    far = pick(equal(body_of(with.medium), set_body(w)), far, flight_sought(&so_far, &with, w));
-#endif
+    const mask within = HAS(w, GLASS_SET) ? equal(body_of(with.medium), set_body(w)) : less(R(1.0), R(0.0));
+    if (KEEPS(s, STATE_FLIGHT)) far = pick(within, far, flight_sought(&so_far, &with, w));
     const ray r = {so_far.origin, so_far.direction, R(0.0), far, so_far.footprint, so_far.spread, RAY_NOTHING_KNOWN};
-#if HAS_GLASS_SET
-    const mask within = equal(body_of(with.medium), set_body(w));
-    send_clipped(s, 1, r, R(0.0), WHICH, mask_of(so_far.on_path) & within, w);
-    so_far.on_path = pick(within, R(0.0), so_far.on_path);
-#endif
-    send_clipped(s, 0, r, R(0.0), WHICH, mask_of(so_far.on_path), w);
+    const mask on_path = mask_of(so_far.on_path);
+    if (HAS(w, GLASS_SET)) send_clipped(s, 1, r, R(0.0), WHICH, on_path & within, w);
+    send_clipped(s, 0, r, R(0.0), WHICH, on_path & ~within, w);
 }
 
 // Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would
@@ -52,25 +56,11 @@ STAGE(end_paths) {
     const encounter last = queue_met(s.q, 0, s.slot);
     tally_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
-#if HAS_GLASS_SET
-    on_path &= ~equal(body_of(with.medium), set_body(w));
-#endif
+    if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
-#if HAS_CLOUDS
-    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const cloud_place cloud = path_meets_clouds(s, &here.at, &so_far, so_far.origin, so_far.direction, &far, on_path, w);
-#endif
-#if HAS_GLASS
-    const mask scatters = path_crosses_medium(&so_far, &with, far, on_path, w);
-    on_path &= ~scatters;
-    before.met &= ~scatters;
-#endif
-#if HAS_CLOUDS
-    on_path &= ~cloud.met;
-    before.met &= ~cloud.met;
-#endif
+    if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, on_path, w);
     path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
     if (HAS(w, EMITTERS)) path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
     if (bounce == 1 && KEEPS(s, STATE_GLANCE)) glance_once(s, so_far.seen);

@@ -1,7 +1,4 @@
 // Paths through glass: what they carry while they are inside, and how they get there.
-#include "flights.h"
-#include "media.h"
-
 // A place in the spectrum: the index of refraction there (`bend`, see `clfractal/renderers/glass.py`), and what it weighs.
 INLINE color spectrum_at(real place, real *bend, __global const float *table) {
     scalar x[LANES], found[4 * LANES];
@@ -53,18 +50,6 @@ INLINE mask leads_out(vec toward, vec normal, mask leaving) {
     return (over & ~leaving) | (~over & leaving);
 }
 
-// The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.
-INLINE real way_within(const carried *with, real way, world w) {
-    const real most = R(2.0) * (real)(w.settings->bounds_radius);
-    return pick(equal(body_of(with->medium), set_body(w)), fmin(way, most), way);
-}
-
-// Lets the medium absorb light on a path's way through it.
-INLINE void path_absorbs(path *so_far, const carried *with, real way, mask here) {
-    here &= less(R(0.0), with->medium);
-    so_far->through = color_pick(here, absorbed(so_far->through, with->extinction, way), so_far->through);
-}
-
 // Lets the glass on the outer side of a boundary absorb the light that was asked for there.
 INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
     const mask through_glass = less(R(0.0), pick(edge.leaving, edge.around, with->medium));
@@ -74,26 +59,19 @@ INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
     with->awaited = color_pick(through_glass, absorbed(with->awaited, around, fmax(way, R(0.0))), with->awaited);
 }
 
-// Over a boundary that is hidden a path goes on as it came.
-INLINE void path_goes_straight(path *so_far, const path *before, vec direction, mask hidden) {
-    so_far->direction = vec_pick(hidden, direction, so_far->direction);
-    so_far->through = color_pick(hidden, before->through, so_far->through);
-    so_far->on_path = pick(hidden, before->on_path, so_far->on_path);
-}
-
 // Brings a path over the boundary if its direction leads there.
 INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, mask sinks, color weights, real wave,
                          world w) {
     const mask over = less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;
     const mask stays_out = leads_out(so_far->direction, here->normal, edge.leaving);
     real body = edge.body;
-#if HAS_SUBSURFACE
-    // Colours stay together below a boundary.
-    wave = pick(sinks, with->wave, wave);
-    weights = color_pick(sinks, color_of(R(1.0), R(1.0), R(1.0)), weights);
-    sinks = (sinks & ~edge.hidden) | (edge.hidden & ~less(R(0.0), p->transmission_weight));
-    body += pick(sinks, SKIN, R(0.0));
-#endif
+    if (HAS(w, SUBSURFACE)) {
+        // Colours stay together below a boundary.
+        wave = pick(sinks, with->wave, wave);
+        weights = color_pick(sinks, color_of(R(1.0), R(1.0), R(1.0)), weights);
+        sinks = (sinks & ~edge.hidden) | (edge.hidden & ~less(R(0.0), p->transmission_weight));
+        body += pick(sinks, SKIN, R(0.0));
+    }
     so_far->through = color_pick(over, so_far->through, color_mul(so_far->through, weights));
     with->wave = pick(over, with->wave, wave);
     vec origin = here->seen;
@@ -109,12 +87,10 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     const mask enters = crosses & ~edge.leaving & equal(with->medium, body);
     medium next = medium_of(with->medium, w), own = next;
     own.extinction = absorption_of(p->transmission_color, p->transmission_depth);
-#if HAS_GLASS_SCATTER
     medium_scatters(&own, p->transmission_scatter, p->transmission_depth, p->transmission_scatter_anisotropy);
-#endif
-#if HAS_SUBSURFACE
-    own = medium_pick(sinks, medium_of_skin(p->subsurface_color, p->subsurface_radius, p->subsurface_radius_scale,
-                                            p->subsurface_scatter_anisotropy), own);
-#endif
+    if (any_lane(sinks)) {
+        own = medium_pick(sinks, medium_of_skin(p->subsurface_color, p->subsurface_radius, p->subsurface_radius_scale,
+                                                p->subsurface_scatter_anisotropy), own);
+    }
     media_found(with, medium_pick(enters, own, next), crosses);
 }

@@ -22,11 +22,8 @@ typedef struct {
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
-#if HAS_GLASS_SCATTER
-    const real start = r.near;
-#else
-    const real start = r.near + ENTRANCE_START * (real)(settings->detail) * r.footprint;
-#endif
+    const real ahead = goal == GOAL_WALK ? R(0.0) : ENTRANCE_START * (real)(settings->detail) * r.footprint;
+    const real start = r.near + ahead;
     m->r = ray_pick(fresh, r, m->r);
     m->active |= fresh;
     m->found = crossing_pick(fresh, nothing_met(r.near), m->found);

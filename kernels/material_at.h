@@ -3,9 +3,7 @@
 // hides counts for nothing.
 typedef struct {
     pbr sum;
-#if HAS_SUBSURFACE
     real body, medium;   // how much of the light meets the bodies and the media of all parts
-#endif
 } pbr_mix;
 
 INLINE pbr_mix pbr_nothing(void) {
@@ -14,29 +12,25 @@ INLINE pbr_mix pbr_nothing(void) {
     return m;
 }
 
-#if HAS_SUBSURFACE
 // Scales what only the light that meets the body, and the medium, is coloured by.
 INLINE void pbr_weigh(pbr *p, real body, real medium) {
     p->base_color = color_scale(p->base_color, body);
     p->subsurface_color = color_scale(p->subsurface_color, medium);
     p->subsurface_radius *= medium;
 }
-#endif
 
-INLINE void pbr_add(pbr_mix *m, pbr part, real share) {
-#if HAS_SUBSURFACE
-    const real medium = part.subsurface_weight, body = R(1.0) - medium * (R(1.0) - part.base_metalness);
-    pbr_weigh(&part, body, medium);
-    m->body += share * body;
-    m->medium += share * medium;
-#endif
+INLINE void pbr_add(pbr_mix *m, pbr part, real share, world w) {
+    if (HAS(w, SUBSURFACE)) {
+        const real medium = part.subsurface_weight, body = R(1.0) - medium * (R(1.0) - part.base_metalness);
+        pbr_weigh(&part, body, medium);
+        m->body += share * body;
+        m->medium += share * medium;
+    }
     for (int i = 0; i < NUMBERS_OF(pbr); ++i) ((real *)&m->sum)[i] += share * ((const real *)&part)[i];
 }
 
-INLINE pbr pbr_mixed(pbr_mix m) {
-#if HAS_SUBSURFACE
-    pbr_weigh(&m.sum, R(1.0) / fmax(m.body, R(1e-6)), R(1.0) / fmax(m.medium, R(1e-6)));
-#endif
+INLINE pbr pbr_mixed(pbr_mix m, world w) {
+    if (HAS(w, SUBSURFACE)) pbr_weigh(&m.sum, R(1.0) / fmax(m.body, R(1e-6)), R(1.0) / fmax(m.medium, R(1e-6)));
     return m.sum;
 }
 
@@ -94,9 +88,9 @@ INLINE pbr pbr_at(stage s, const spot *here, world w) {
             continue;
         }
 #endif
-        pbr_add(&mix, pbr_mapped(s, here, i, w), shares[i]);
+        pbr_add(&mix, pbr_mapped(s, here, i, w), shares[i], w);
     }
-    pbr sum = pbr_mixed(mix);
+    pbr sum = pbr_mixed(mix, w);
     sum.base_weight = sum.emission_luminance = R(1.0);
     return sum;
 #endif
@@ -117,9 +111,7 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
     p->fuzz_weight = pick(face, none, p->fuzz_weight);
     p->transmission_weight = pick(face, none, p->transmission_weight);
     p->emission_luminance = pick(face, none, p->emission_luminance);
-#if HAS_SUBSURFACE
     p->subsurface_weight = pick(face, none, p->subsurface_weight);
-#endif
 }
 
 // What a path meets at a spot: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
@@ -133,9 +125,9 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
         one.tint = object_color(here->normal, quantity, one.object, w);
         other.tint = object_color(here->normal, quantity, other.object, w);
         pbr_mix mix = pbr_nothing();
-        pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share);
-        pbr_add(&mix, pbr_at(s, &other, w), here->share);
-        p = pbr_mixed(mix);
+        pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share, w);
+        pbr_add(&mix, pbr_at(s, &other, w), here->share, w);
+        p = pbr_mixed(mix, w);
     }
     if (any_lane(on_face(here))) pbr_of_face(here, &p);
     return p;
@@ -145,10 +137,7 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
 // counts as nothing, since what it does not mirror comes back from the body.
 INLINE color pbr_albedo(const pbr *p, __global const float *tables) {
     const color white = color_of(R(1.0), R(1.0), R(1.0));
-    color body = color_scale(p->base_color, p->base_weight);
-#if HAS_SUBSURFACE
-    body = color_mix(body, p->subsurface_color, p->subsurface_weight);
-#endif
+    const color body = color_mix(color_scale(p->base_color, p->base_weight), p->subsurface_color, p->subsurface_weight);
     const color base = color_mix(body, white, p->transmission_weight * (R(1.0) - p->base_metalness));
     const color below = color_mul(base, color_mix(white, p->coat_color, p->coat_weight));
     const real fibres = p->fuzz_weight * albedo_at(tables + ALBEDO_FUZZ, R(0.5), fmax(p->fuzz_roughness, SMOOTHEST_FUZZ)).mean;

@@ -5,13 +5,9 @@
 #define THROUGH 1   // of an object's `glass`, where light goes through it: it may go below the boundary, too
 
 // Below a boundary (subsurface) a body has a medium of its own, whose number is greater by a half.
-#if HAS_SUBSURFACE
 #define SKIN R(0.5)
 INLINE real body_of(real medium) { return floor(medium); }
 INLINE mask is_skin(real medium) { return less(floor(medium), medium); }
-#else
-#define body_of(medium) (medium)
-#endif
 
 INLINE real set_body(world w) { return (real)((scalar)(w.settings->object_count + 1)); }
 
@@ -19,10 +15,8 @@ INLINE real set_body(world w) { return (real)((scalar)(w.settings->object_count 
 typedef struct {
     real index;
     color extinction;
-#if HAS_GLASS_SCATTER
     color scatters;    // part of the extinction
     real anisotropy;
-#endif
 } medium;
 
 INLINE color absorption_of(color left, real depth) {
@@ -33,7 +27,6 @@ INLINE color absorption_of(color left, real depth) {
 #undef ABSORBED
 }
 
-#if HAS_GLASS_SCATTER
 // Lets a medium that takes so much away scatter a part (OpenPBR 1.1, Translucent base): what it absorbs is the rest, raised by the same
 // for all colours where it would be below nothing.
 INLINE void medium_scatters(medium *found, color scatter, real depth, real anisotropy) {
@@ -50,9 +43,7 @@ INLINE void medium_scatters(medium *found, color scatter, real depth, real aniso
 #undef RAISED
     found->anisotropy = anisotropy;
 }
-#endif
 
-#if HAS_SUBSURFACE
 // The medium below a boundary, from what a thick body sends back of light from all sides (OpenPBR 1.1, Subsurface): van de Hulst's
 // reflectance A = (1 - s)(1 - 0.139 s) / (1 + 1.17 s), where s^2 = (1 - albedo) / (1 - g albedo), solved for s (Kulla and Conty 2017).
 // Bodies below a boundary bend no light: what the boundary reflects is told by its albedos, as for diffuse ones.
@@ -73,7 +64,6 @@ INLINE medium medium_of_skin(color back, real radius, color scale, real g) {
 #undef OF_SKIN
     return found;
 }
-#endif
 
 // Of lanes `here` one medium, of the others another.
 INLINE medium medium_pick(mask here, medium yes, medium no) {
@@ -90,32 +80,25 @@ INLINE void medium_of_material(int number, mask here, real body, medium *found, 
     medium own;
     own.index = (real)(material->specular_ior);
     own.extinction = absorption_of(color_splat(material->transmission_color), depth);
-#if HAS_GLASS_SCATTER
     const color scatter = color_splat(material->transmission_scatter);
     medium_scatters(&own, scatter, depth, (real)(material->transmission_scatter_anisotropy));
-#endif
-#if HAS_SUBSURFACE
-    const medium below = medium_of_skin(color_splat(material->subsurface_color), (real)(material->subsurface_radius),
-                                        color_splat(material->subsurface_radius_scale), (real)(material->subsurface_scatter_anisotropy));
-    own = medium_pick(is_skin(body), below, own);
-#endif
+    if (any_lane(here & is_skin(body))) {
+        const medium below = medium_of_skin(color_splat(material->subsurface_color), (real)(material->subsurface_radius),
+                                            color_splat(material->subsurface_radius_scale), (real)(material->subsurface_scatter_anisotropy));
+        own = medium_pick(is_skin(body), below, own);
+    }
     *found = medium_pick(here, own, *found);
 }
 
 // The medium of a body, or the open.
 CALLED medium medium_of(real body, world w) {
-    medium found = {R(1.0), color_of(R(0.0), R(0.0), R(0.0))};
-#if HAS_GLASS_SCATTER
-    found.scatters = found.extinction;
-    found.anisotropy = R(0.0);
-#endif
+    const color none = color_of(R(0.0), R(0.0), R(0.0));
+    medium found = {R(1.0), none, none, R(0.0)};
     if (!any_lane(less(R(0.0), body))) return found;
     for (int i = 0; i < w.settings->object_count; ++i) {
         medium_of_material(w.objects[i].material, equal(body_of(body), (real)((scalar)(i + 1))), body, &found, w);
     }
-#if HAS_GLASS_SET
-    medium_of_material(w.settings->set_material, equal(body_of(body), set_body(w)), body, &found, w);
-#endif
+    if (HAS(w, GLASS_SET)) medium_of_material(w.settings->set_material, equal(body_of(body), set_body(w)), body, &found, w);
     return found;
 }
 
@@ -133,13 +116,23 @@ INLINE void media_leave(carried *with, real body, mask here) {
     with->under = pick(first | second, R(0.0), with->under);
 }
 
+// The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.
+INLINE real way_within(const carried *with, real way, world w) {
+    const real most = R(2.0) * (real)(w.settings->bounds_radius);
+    return pick(equal(body_of(with->medium), set_body(w)), fmin(way, most), way);
+}
+
+// Lets a clear medium absorb light on a path's way to what it has met.
+INLINE void path_absorbs(path *so_far, const carried *with, real far, mask here, world w) {
+    here &= less(R(0.0), with->medium) & ~is_cloudy(with);
+    so_far->through = color_pick(here, absorbed(so_far->through, with->extinction, way_within(with, far, w)), so_far->through);
+}
+
 // Notes what the medium does that a path is in now.
 INLINE void media_found(carried *with, medium found, mask here) {
     with->extinction = color_pick(here, found.extinction, with->extinction);
-#if HAS_GLASS_SCATTER
     with->scatters = color_pick(here, found.scatters, with->scatters);
     with->anisotropy = pick(here, found.anisotropy, with->anisotropy);
-#endif
 }
 
 // The open around the eye, or the glass that it is in.
@@ -162,7 +155,7 @@ typedef struct {
 
 INLINE border border_at(const carried *with, const spot *here, world w) {
     border found;
-    mask glass = less(R(0.0), R(1.0)) & (HAS_GLASS_SET ? ~0 : 0);
+    mask glass = less(R(0.0), R(1.0)) & (HAS(w, GLASS_SET) ? ~0 : 0);
     found.body = set_body(w);
     found.leaving = equal(body_of(with->medium), found.body) | equal(body_of(with->under), found.body);
     // What is joined to the set is one body with it.
@@ -182,11 +175,9 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
     return found;
 }
 
-#if HAS_SUBSURFACE
 // Whether a path comes from below the boundary of a spot, which it then leaves as if it were seen from outside, straight on.
 INLINE mask path_emerges(int bounce, const carried *with, const spot *here, world w) {
     real body = set_body(w);
     body = pick(of_the_set(here->object, w), body, here->object);
     return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);
 }
-#endif

@@ -18,8 +18,8 @@
 #include "lights.h"
 #include "emitters.h"
 #include "lights_beside.h"
-#if HAS_GLASS
+#include "flights.h"
+#include "media.h"
 #include "glass_paths.h"
-#endif
 #include "light_asks.h"
 #include "path_steps.h"

@@ -17,7 +17,6 @@ INLINE void path_asking(stage s, const packet_pixels *at, world w, real numbers[
     if (w.settings->set_count > 0) path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
 }
 
-#if HAS_GLASS_SCATTER || HAS_CLOUDS
 // Of lanes `here` one path, of the others another; likewise what they carry.
 INLINE path path_pick(mask here, path yes, path no) {
     for (int i = 0; i < NUMBERS_OF(path); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
@@ -28,9 +27,7 @@ INLINE carried carried_pick(mask here, carried yes, carried no) {
     for (int i = 0; i < NUMBERS_OF(carried); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
     return no;
 }
-#endif
 
-#if HAS_GLASS_SCATTER
 // What each sample of each pixel has for its next walk within the set.
 INLINE void walk_seeded(stage s, const packet_pixels *at, carried *with, world w) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, PURPOSE_FLIGHT + NEXT_BOUNCE * (uint)s.bounce);
@@ -38,25 +35,25 @@ INLINE void walk_seeded(stage s, const packet_pixels *at, carried *with, world w
     with->seed_low = real_of_bits(each & 0xffffu);
     with->seed_high = real_of_bits(each >> 16);
 }
-#include "cloudy.h"
-#endif
-#if HAS_CLOUDS
-#include "clouds.h"
-#endif
-#if HAS_GLASS
-// What a medium does to a path on its way to what it has met: the result says where it scatters it before.
-INLINE mask path_crosses_medium(path *so_far, const carried *with, real far, mask here, world w) {
-    const real way = way_within(with, far, w);
-#if HAS_GLASS_SCATTER
-    const mask scatters = flight_ends(so_far, with, way, here);
-    path_absorbs(so_far, with, way, here & ~is_cloudy(with));
-    return scatters;
-#else
-    path_absorbs(so_far, with, way, here);
-    return here & ~here;
-#endif
+
+// Draws the flight of a path that sets out, with the numbers of a purpose.
+INLINE void path_sets_out(stage s, const packet_pixels *at, const path *so_far, carried *with, uint purpose, mask here, world w) {
+    real u, choice;
+    path_square(s, at, purpose, w, &u, &choice);
+    flight_begins(with, so_far->through, u, choice, here);
 }
-#endif
+
+// Ends paths that bring nothing, and after some bounces others by Russian roulette (Arvo and Kirk 1990). `here`: those that have a way to
+// go.
+INLINE void path_stays(stage s, path *so_far, mask here, real roulette, world w) {
+    here &= less(R(0.0), brightest(so_far->through));
+    if (s.bounce >= w.settings->roulette) {
+        const real stays = fmin(brightest(so_far->through), R(0.95));
+        here &= less(roulette, stays);
+        so_far->through = color_pick(here, color_scale(so_far->through, R(1.0) / stays), so_far->through);
+    }
+    so_far->on_path = number_of(here);
+}
 
 // One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
 // `behind`: in glass, whether the spot is seen from inside its body.
@@ -70,17 +67,15 @@ INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from
     scatter_value(b, &chosen.toward, w.albedos, &scattered, &density);
     *brings = color_scale(color_mul(scattered, chosen.light), asked_weight(&a, density));
     mask dark = ~less(R(0.0), brightest(*brings));
-#if HAS_GLASS
-    // A body hides what is behind its surface.
-    dark |= ~leads_out(chosen.toward, b->surface, behind);
-#endif
+    // A body of glass hides what is behind its surface.
+    if (HAS(w, GLASS)) dark |= ~leads_out(chosen.toward, b->surface, behind);
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
     chosen.distance = pick(~a.unblocked & ~dark, chosen.distance, R(-1.0));
     return chosen;
 }
 
-// Goes on in a direction that the surface chooses, unless Russian roulette ends the path (Arvo and Kirk 1990). The result says which
+// Goes on in a direction that the surface chooses, unless roulette ends the path. The result says which
 // paths go below the boundary.
 INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
     real u, v, choice, roulette;
@@ -93,20 +88,14 @@ INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried
     scatter_value(b, &so_far->direction, w.albedos, &value, &with->density);
     mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density), sinks = on_path & ~on_path;
     color part = color_scale(value, R(1.0) / with->density);
-#if HAS_SUBSURFACE
-    sinks = mask_of(so_far->on_path) & b->seen & less(R(1.0) - b->by_below, choice);
-    so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(b->surface, R(-1.0)), u, v), so_far->direction);
-    part = color_pick(sinks, b->below, part);
-    on_path |= sinks;
-#endif
-    so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
-    on_path &= less(R(0.0), brightest(so_far->through));
-    if (s.bounce >= w.settings->roulette) {
-        const real stays = fmin(brightest(so_far->through), R(0.95));
-        on_path &= less(roulette, stays);
-        so_far->through = color_pick(on_path, color_scale(so_far->through, R(1.0) / stays), so_far->through);
+    if (HAS(w, SUBSURFACE)) {
+        sinks = mask_of(so_far->on_path) & b->seen & less(R(1.0) - b->by_below, choice);
+        so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(b->surface, R(-1.0)), u, v), so_far->direction);
+        part = color_pick(sinks, b->below, part);
+        on_path |= sinks;
     }
-    so_far->on_path = number_of(on_path);
+    so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
+    path_stays(s, so_far, on_path, roulette, w);
     return sinks;
 }
 
@@ -162,11 +151,11 @@ INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, v
 // outside: its normal faces them.
 INLINE mask path_comes_out(int bounce, carried *with, spot *here, vec direction, mask lands, world w) {
     mask emerges = lands & ~lands;
-#if HAS_SUBSURFACE
-    emerges = lands & path_emerges(bounce, with, here, w);
-    media_leave(with, body_of(with->medium), emerges);
-    if (any_lane(emerges)) media_found(with, medium_of(with->medium, w), emerges);
-#endif
+    if (HAS(w, SUBSURFACE)) {
+        emerges = lands & path_emerges(bounce, with, here, w);
+        media_leave(with, body_of(with->medium), emerges);
+        if (any_lane(emerges)) media_found(with, medium_of(with->medium, w), emerges);
+    }
     here->normal = vec_pick(emerges, here->normal, facing(here->normal, direction));
     return emerges;
 }
@@ -179,66 +168,69 @@ INLINE void path_widens(stage s, path *so_far, const spot *here, ray from_eye, r
     so_far->spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone);
 }
 
-// What scatters a path before it has met anything.
-typedef struct {
-    mask glass;          // the glass that it is in
-#if HAS_CLOUDS
-    cloud_place cloud;
-#endif
-} scatterer;
+// How far a path's ray goes to the spot that it has met.
+INLINE real way_to_spot(const spot *found, ray arrived) {
+    return pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+}
 
-// Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or on the
-// way there something scatters it.
-INLINE mask path_arrives(stage s, const packet_pixels *at, path *so_far, const carried *with, spot *found, ray arrived, real picture_y,
-                         scatterer *by, world w) {
-    const mask on_path = mask_of(so_far->on_path);
-    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+// Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or a medium has
+// `halted` it before.
+INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found, ray arrived, real picture_y, mask halted, world w) {
+    const mask on_path = mask_of(so_far->on_path) & ~halted;
+    real far = way_to_spot(found, arrived);
     lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
     before.met &= on_path;
-    mask lands = on_path & mask_of(found->found) & ~before.met;
-    by->glass = on_path & ~on_path;
-    mask scatters = by->glass;
-#if HAS_CLOUDS
-    by->cloud = path_meets_clouds(s, at, so_far, arrived.origin, arrived.direction, &far, on_path, w);
-    scatters |= by->cloud.met;
-#endif
-#if HAS_GLASS
-    by->glass = path_crosses_medium(so_far, with, far, on_path, w);
-    scatters |= by->glass;
-#endif
-#if HAS_CLOUDS
-    by->cloud.met &= ~by->glass;
-#endif
-    before.met &= ~scatters;
-    lands &= ~scatters;
+    const mask lands = on_path & mask_of(found->found) & ~before.met;
+    if (HAS(w, GLASS)) path_absorbs(so_far, with, far, on_path, w);
     if (s.bounce > 0) {
-        path_ends(so_far, with, &before, on_path & ~lands & ~scatters, picture_y, w);
+        path_ends(so_far, with, &before, on_path & ~lands, picture_y, w);
     } else {
         so_far->seen = color_pick(before.met, color_mul(before.shows, so_far->through), so_far->seen);
         spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), before.met);
-#if HAS_GLASS_SCATTER
-        spot_of_light(s, found, arrived.origin, arrived.direction, with->flight, with->medium, by->glass);
-#endif
-#if HAS_CLOUDS
-        spot_of_light(s, found, arrived.origin, arrived.direction, by->cloud.t, by->cloud.number, by->cloud.met);
-#endif
     }
     return lands;
 }
 
-// What a path carries when it arrives.
-INLINE carried path_carries(stage s, const packet_pixels *at, const path *so_far, vec eye, world w) {
+// What a path carries when it leaves the eye.
+INLINE carried carried_from_eye(vec eye, world w) {
     carried with = {color_of(R(0.0), R(0.0), R(0.0)), R(-1.0), R(1.0)};
-    if (s.bounce > 0) {
-        with = carried_kept(s);
-        return with;
-    }
-#if HAS_GLASS
-    media_begin(&with, eye, w);
-#if HAS_GLASS_SCATTER
+    with.wave = R(-1.0);
     with.flight = (real)(REAL_LARGEST);
-    path_sets_out(s, at, so_far, &with, PURPOSE_FLIGHT, mask_of(so_far->on_path), w);
-#endif
-#endif
+    if (HAS(w, GLASS)) media_begin(&with, eye, w);
     return with;
+}
+
+// What a path carries when it arrives. With media that scatter light it has been through `cross_media`; the result says which paths
+// these have halted.
+INLINE mask path_carries(stage s, path *so_far, carried *with, vec eye, world w) {
+    const int crossed = KEEPS(s, STATE_HALT);
+    if (s.bounce > 0 || crossed) {
+        *with = carried_kept(s);
+    } else {
+        *with = carried_from_eye(eye, w);
+    }
+    if (!crossed) return less(R(1.0), R(0.0));
+    if (s.bounce == 0) STATE_RECALL(s, *so_far, STATE_PATH);
+    halt stop;
+    STATE_RECALL(s, stop, STATE_HALT);
+    return mask_of(stop.halted);
+}
+
+// Leaves paths that are `halted` as they are kept, with the ray by which they ask; and keeps how long rays that ask are.
+INLINE void path_halts(stage s, path *so_far, carried *with, ray *asks, mask halted, world w) {
+    halt stop;
+    STATE_RECALL(s, stop, STATE_HALT);
+    if (any_lane(halted)) {
+        path p;
+        STATE_RECALL(s, p, STATE_PATH);
+        *so_far = path_pick(halted, p, *so_far);
+        *with = carried_pick(halted, carried_kept(s), *with);
+        asks->origin = vec_pick(halted, p.origin, asks->origin);
+        asks->direction = vec_pick(halted, stop.toward, asks->direction);
+        asks->far = pick(halted, stop.far, asks->far);
+        asks->footprint = pick(halted, p.footprint * (real)(w.settings->shadow_detail), asks->footprint);
+    }
+    stop.halted = R(0.0);
+    stop.far = asks->far;
+    STATE_KEEP(s, stop, STATE_HALT);
 }

@@ -48,3 +48,4 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
 #define GOAL_TOUCH 2
 #define GOAL_POINT 3
 #define GOAL_CONE 4
+#define GOAL_WALK 5   // see walks.h

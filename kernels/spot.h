@@ -124,7 +124,6 @@ INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
     return bare;
 }
 
-#if HAS_GLASS_SET
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.
 INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *place, world w) {
     const ray second = queue_ray(s.q, 1, s.slot);
@@ -137,7 +136,6 @@ INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *pl
     *object = pick(within, other_object, *object);
     return met;
 }
-#endif
 
 // What a march has cost, and where `of_surface` what finding its normal has.
 INLINE void tally_met(tally *cost, encounter met, int of_surface) {

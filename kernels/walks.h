@@ -201,7 +201,7 @@ INLINE int walk_share(share mine, queue q, __global scalar *state, int stride, i
     int places[LANES];
     lanes_begin(&m, places);
     for (int waits = 0;;) {
-        const uint waiting = lanes_waiting(&m, &left, places, q, GOAL_SURFACE, w.settings);
+        const uint waiting = lanes_waiting(&m, &left, places, q, GOAL_WALK, w.settings);
         if (waiting == ALL_LANES) return waits;
         waits += bits_count(waiting);
         walk_takes(&a, places, lanes_bits(m.active & equal(m.found.steps, R(0.0))), state, w.settings->state_at, stride);

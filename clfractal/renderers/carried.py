@@ -155,6 +155,14 @@ FLIGHT = _carried(
     ("real", "seed_high", "... of which this is the higher one"),
 )
 
+HALT = _carried(
+    "halt",
+    "Where a medium has scattered a path before what it had met.",
+    ("real", "halted", "whether it has"),
+    ("vec", "toward", "where the ray goes that asks for light from there ..."),
+    ("real", "far", "... and how far; below 0: there is none. After spots: of each ray that asks"),
+)
+
 
 def _whole(name: str, meaning: str, *slices: Carried) -> Carried:
     return Carried(name, meaning, tuple(member for each in slices for member in each.members))
@@ -253,6 +261,7 @@ TYPES = (
     FACET,
     PATH,
     CARRIED,
+    HALT,
     FACE,
     LAYERS,
     GLANCE,

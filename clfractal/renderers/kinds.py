@@ -25,7 +25,17 @@ NORMALS = {
     "least_squares": 4,
 }
 # What a scene has beside what other fields tell, as bits.
-FEATURES = {"fog": 1, "bump": 2, "paths": 4, "shining_clouds": 8, "emitters": 16}
+FEATURES = {
+    "fog": 1,
+    "bump": 2,
+    "paths": 4,
+    "shining_clouds": 8,
+    "emitters": 16,
+    "glass": 32,
+    "glass_set": 64,
+    "subsurface": 128,
+    "clouds": 256,
+}
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {
     "LIGHT": LIGHT_KINDS,

@@ -13,7 +13,7 @@ from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.environment import PackedEnvironment
 from clfractal.renderers.fineness import Fineness
 from clfractal.renderers.kinds import FEATURES, NORMALS
-from clfractal.renderers.maps import has_bump, material_counts
+from clfractal.renderers.maps import has_bump, has_glass, has_glass_set, has_subsurface, material_counts
 from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.planes import plane_count
 from clfractal.renderers.records import (
@@ -126,6 +126,10 @@ def features_of(scene: Scene) -> int:
         "paths": along_paths(scene),
         "emitters": any(each is not None for each in asked_radiance(scene)),
         "shining_clouds": any(each.transfer.emission is not None for each in clouds_of(scene)),
+        "glass": has_glass(scene),
+        "glass_set": has_glass_set(scene),
+        "subsurface": has_subsurface(scene),
+        "clouds": along_paths(scene) and bool(clouds_of(scene)),
     }
     return sum(FEATURES[name] for name, there in has.items() if there)
 

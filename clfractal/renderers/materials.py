@@ -121,7 +121,7 @@ def pbr_text() -> str:
 
 
 def scattering_defines() -> dict[str, object]:
-    """The defines of `kernels/bsdf.h`, but for HAS_GLASS."""
+    """The defines of `kernels/bsdf.h`."""
     return {
         "SPECTRUM_PLACES": WAVELENGTHS,
         "ALBEDO_COSINES": COSINES,

@@ -12,15 +12,15 @@ from clfractal.renderers.transfer import (
     Floats,
     medium_table,
     table_bounds,
-    transfer_columns,
     value_limits,
 )
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, used_level, volumes_of
 from clfractal.scene.objects import VolumeObject
-from clfractal.scene.volume import Transfer
 
+CLOUD_COLUMNS = 7
+"""Numbers of a cloud's transfer table for one value: see `medium_table`. Those of one that shines nowhere end in zeros."""
 BRICK = 8
 """Cells along a side of a brick, whose least and largest value are known."""
 NO_GRID: dict[str, object] = {
@@ -61,7 +61,7 @@ class ObjectGrids:
         for name, each in self.volumes.items():
             if each.is_cloud:
                 found[name] = place
-                place += TRANSFER_SIZE * cloud_columns(self.scene) + brick_count(self.scene.grids[each.file])
+                place += TRANSFER_SIZE * CLOUD_COLUMNS + brick_count(self.scene.grids[each.file])
         return found
 
     def fields(self, name: str, begin: int) -> dict[str, object]:
@@ -82,7 +82,7 @@ class ObjectGrids:
             transfer = begin + self._clouds[name]
             found |= {
                 "transfer": transfer,
-                "bounds": transfer + TRANSFER_SIZE * cloud_columns(self.scene),
+                "bounds": transfer + TRANSFER_SIZE * CLOUD_COLUMNS,
                 "value_low": low,
                 "value_range": 1 / (high - low),
                 "anisotropy": each.anisotropy,
@@ -113,7 +113,7 @@ class ObjectGrids:
             each = self.volumes[name]
             low, high = value_limits(each.transfer, ())
             table = medium_table(each.transfer, (low, high), self._color)
-            table = np.pad(table, ((0, 0), (0, cloud_columns(self.scene) - table.shape[1])))
+            table = np.pad(table, ((0, 0), (0, CLOUD_COLUMNS - table.shape[1])))
             most = table[:, 0].astype(np.float64)
             parts += [table.reshape(-1), table_bounds(most, ranges[each.file], low, 1 / (high - low))]
         return np.concatenate(parts)
@@ -124,24 +124,9 @@ def clouds_of(scene: Scene) -> list[VolumeObject]:
     return [each for each in volumes_of(scene.objects).values() if each.is_cloud]
 
 
-def cloud_columns(scene: Scene) -> int:
-    """Numbers of each cloud's transfer table for one value: as many as the one with the most has."""
-    return max(
-        (transfer_columns(each.transfer) for each in clouds_of(scene)), default=transfer_columns(_PLAIN)
-    )
-
-
-_PLAIN = Transfer.model_validate({})
-
-
-def grid_defines(scene: Scene) -> dict[str, object]:
+def grid_defines() -> dict[str, object]:
     """The defines of programs that send rays past volumes."""
-    clouds = clouds_of(scene)
-    return {
-        "HAS_CLOUDS": int(bool(clouds)),
-        "TRANSFER_SIZE": TRANSFER_SIZE,
-        "TRANSFER_COLUMNS": cloud_columns(scene),
-    }
+    return {"TRANSFER_SIZE": TRANSFER_SIZE, "CLOUD_COLUMNS": CLOUD_COLUMNS}
 
 
 def brick_count(grid: GivenGrid) -> int:

@@ -94,7 +94,7 @@ def object_defines(scene: Scene) -> dict[str, object]:
     """The defines of all programs that send rays, or read what is kept between stages."""
     return {
         "WAVES": WAVES,
-        **grid_defines(scene),
+        **grid_defines(),
         **{f"OBJECT_{kind.upper()}": number for kind, number in OBJECT_KINDS.items()},
     }
 

@@ -17,6 +17,7 @@ from clfractal.renderers.carried import (
     FACET,
     FLIGHT,
     GLANCE,
+    HALT,
     LAYERS,
     MATTES,
     PARTS_OF_LIGHT,
@@ -36,7 +37,7 @@ from clfractal.renderers.passes import has_mattes, has_parts
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces
-from clfractal.renderers.waves import air_turns, has_cones, has_lens
+from clfractal.renderers.waves import air_turns, has_cones, has_lens, has_media
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 
@@ -93,6 +94,7 @@ PARTS = (
     Part("ASKED_LIGHT", ASKED_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),
     Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
     Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_cloudy_glass(scene))),
+    Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
     Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0)),
     Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
     # What the formula was asked for the present spot's material; and the same around it, with the normal and escape count

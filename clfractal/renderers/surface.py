@@ -28,16 +28,7 @@ from clfractal.renderers.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.renderers.maps import (
-    MAP,
-    MappedMaterials,
-    has_cloudy_glass,
-    has_glass,
-    has_glass_set,
-    has_subsurface,
-    map_defines,
-    mapped_materials,
-)
+from clfractal.renderers.maps import MAP, MappedMaterials, has_glass, map_defines, mapped_materials
 from clfractal.renderers.march import march_record, uses_positions
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.object_grids import ObjectGrids
@@ -68,7 +59,7 @@ from clfractal.solids import Body
 PALETTE_SIZE = 256
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
 POLISH = 5
-# Neither search of `search_defines`: rays within glass have one of their own.
+# Neither search of `search_defines`: rays within the set have one of their own.
 SEARCH_INSIDE = 2
 Floats = npt.NDArray[np.float32]
 
@@ -98,11 +89,12 @@ def searches_far(scene: Scene) -> bool:
 
 def inside_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """How rays within a set of glass go on, as far as the text of `kernels/glass.cl` depends on it."""
-    found = {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
-    if not has_cloudy_glass(scene):
-        return {**found, "HAS_GLASS_SCATTER": 0}
-    # Walks know what paths carry, and what may stand in their way.
-    return {**found, **state_defines(scene, plan)}
+    return {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
+
+
+def walk_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The same of `kernels/walks.cl`: walks know what paths carry, and what may stand in their way."""
+    return {**inside_defines(scene, plan), **state_defines(scene, plan)}
 
 
 def several_points(scene: Scene) -> int:
@@ -119,10 +111,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "STATE_PADDING": STATE_PADDING,
         **object_defines(scene),
         **map_defines(scene),
-        "HAS_GLASS": int(has_glass(scene)),
-        "HAS_GLASS_SET": int(has_glass_set(scene)),
-        "HAS_GLASS_SCATTER": int(has_cloudy_glass(scene)),
-        **({"HAS_SUBSURFACE": 1} if has_subsurface(scene) else {}),
     }
 
 
@@ -247,7 +235,9 @@ _PROGRAMS = (
     _Program("light", "light_spots.cl", ("light_spots",), state_defines),
     _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
     _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
+    _Program("media", "media.cl", ("cross_media", "pass_clouds"), path_defines),
     _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines, ()),
+    _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), walk_defines, ()),
     _Program("colors", "color_spots.cl", ("color_spots",), formula_defines, ("trap_near.h",)),
     _Program("glow", "glow.cl", ("add_glow",), formula_defines, ("trap_near.h",)),
     _Program("planes", "see_planes.cl", ("find_faces", "find_planes"), face_and_plane_defines, ("escape.h",)),

@@ -13,8 +13,10 @@ With `lighting.mode: path` in the place of the last two
 
     scatter_paths  march  gather_paths
 
-ask for light and send the next ray of each path (`march_inside` takes those within glass to where they leave the set), and
-after the last bounce `march  end_paths` finds out which rays leave the set. See "A shot" in docs/architecture.md.
+ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
+those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
+With media that scatter light `cross_media` stands before `scatter_paths` and `end_paths`, and with clouds `pass_clouds`
+after the former. See "A shot" in docs/architecture.md.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.renderers.kernel import MET_NUMBERS, Over, Stage
-from clfractal.renderers.maps import asked_maps, bump_numbers, has_glass_set
+from clfractal.renderers.maps import asked_maps, bump_numbers, has_cloudy_glass, has_glass_set
 from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
@@ -78,6 +80,12 @@ def meets_objects(scene: Scene) -> bool:
     return any(name not in scene.joined and each not in clouds for name, each in scene.objects.items())
 
 
+def has_media(scene: Scene) -> bool:
+    """Whether anything scatters paths on their way: clouds, or glass."""
+    along_paths = isinstance(scene.lighting, PathLighting)
+    return has_cloudy_glass(scene) or (along_paths and bool(clouds_of(scene)))
+
+
 def met_numbers(scene: Scene) -> int:
     """Numbers that are kept of what a ray met (`kernels/queue.h`)."""
     return MET_NUMBERS + bool(scene.joined) + 2 * joins_smoothly(scene)
@@ -111,14 +119,16 @@ def most_turns(scene: Scene) -> int:
 OVER: dict[str, Over] = {
     "march_rays": "rays",
     "march_inside": "rays",
+    "walk_inside": "rays",
     "send_cones": "packets of rays",
     "look_at_surfaces": "packets of rays",
     "look_inside_set": "packets of rays",
+    "look_where_walks_end": "packets of rays",
     "meet_objects": "packets of rays",
     "look_at_objects": "packets of rays",
 }
 # Packets look at surfaces where they march.
-OF_SINGLE_LANES = ("look_at_surfaces", "look_inside_set")
+OF_SINGLE_LANES = ("look_at_surfaces", "look_inside_set", "look_where_walks_end")
 
 
 def march_kernels(plan: Plan) -> tuple[str, ...]:
@@ -126,9 +136,11 @@ def march_kernels(plan: Plan) -> tuple[str, ...]:
     return ("march_rays", "look_at_surfaces") if plan.lanes == 1 else ("march_rays",)
 
 
-def inside_kernels(plan: Plan) -> tuple[str, ...]:
-    """The kernels of `kernels/glass.cl`."""
-    return ("march_inside", "look_inside_set") if plan.lanes == 1 else ("march_inside",)
+def inside_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
+    """The kernels of `kernels/glass.cl`, or of `walks.cl` where anything scatters light on the way."""
+    cloudy = has_cloudy_glass(scene)
+    found = ("walk_inside", "look_where_walks_end") if cloudy else ("march_inside", "look_inside_set")
+    return found if plan.lanes == 1 else found[:1]
 
 
 def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterator[Stage]:
@@ -174,7 +186,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
             if within:
-                yield from _marched(inside_kernels(plan), 1, GOAL_SURFACE, bounce)
+                yield from _marched(inside_kernels(scene, plan), 1, GOAL_SURFACE, bounce)
         yield from of_objects(looked, turns + within)
         kernel = "join_points" if points > 1 and bounce == 0 else "find_spots"
         yield stage(kernel, turns, bounce=bounce, next_turns=after)
@@ -187,7 +199,11 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield stage("add_glow", bounce=bounce)
         air = air_turns(scene) if bounce == 0 else 0
         if paths:
+            if has_media(scene):
+                yield stage("cross_media", 1, bounce=bounce)
             yield stage("scatter_paths", 1, bounce=bounce)
+            if clouds_of(scene):
+                yield stage("pass_clouds", bounce=bounce)
             if scene.cut_planes and bounce == 0:
                 yield stage("find_planes")
             yield from of_objects(met, 1 + air)
@@ -201,6 +217,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     if isinstance(scene.lighting, PathLighting):
         yield from of_objects(met, 1)
         yield from _marched(marching, 1, GOAL_SHADOW)
+        if has_media(scene):
+            yield stage("cross_media", 1, bounce=bounces(scene) + 1)
         yield stage("end_paths", 1, bounce=bounces(scene) + 1)
 
 

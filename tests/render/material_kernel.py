@@ -86,9 +86,8 @@ NORMAL = np.array([0.0, 0.6, 0.8])
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int, *, glass: bool) -> Any:
+def _program(device: Device, precision: Precision, lanes: int) -> Any:
     defines = {
-        "HAS_GLASS": int(glass),
         "LANES": lanes,
         "REAL_IS_DOUBLE": int(precision == "float64"),
         "PALETTE_SIZE": 256,
@@ -150,7 +149,7 @@ def ask(
         cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
         for array in (planes, result, record, tables, np.array(NORMAL if leans is None else leans, precision))
     ]
-    kernel = cl.Kernel(_program(device, precision, lanes, glass=glass), "scatter")
+    kernel = cl.Kernel(_program(device, precision, lanes), "scatter")
     kernel.set_args(*buffers, np.int32(count), np.int32(inside), np.int32(leans is not None))
     cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
     cl.enqueue_copy(device.queue, result, buffers[1])

@@ -175,20 +175,14 @@ def test_parts_of_a_picture_have_its_bits() -> None:
     assert np.array_equal(part, whole[12:21, 8:18])
 
 
-def test_scenes_of_clear_glass_do_not_know_it() -> None:
-    """Glass that scatters nothing, and a body that is no glass, have the texts of those without the setting."""
-    texts = []
-    for transmission in (
-        {"weight": 1, "depth": 1},
-        {"weight": 1, "depth": 1, "scatter": [0, 0, 0], "scatter_anisotropy": 0.5},
-    ):
-        found = scene_of(
-            lighting=path(2), materials={"m": {"transmission": transmission}}, material={"name": "m"}
-        )
-        plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
-        texts.append([text.flat.text for text in program_texts(found, plan)])
-        assert any("#define HAS_GLASS_SCATTER 0" in text for text in texts[-1])
-    assert texts[0] == texts[1]
+@pytest.mark.parametrize("scatter", [None, 0, 1])
+def test_only_glass_that_scatters_has_stages_for_it(scatter: float | None) -> None:
+    given = {} if scatter is None else {"scatter": [scatter] * 3, "scatter_anisotropy": 0.5}
+    materials = {"m": {"transmission": {"weight": 1, "depth": 1, **given}}}
+    found = scene_of(lighting=path(2), materials=materials, material={"name": "m"})
+    plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
+    names = {text.name for text in program_texts(found, plan)}
+    assert names & {"glass", "walks", "media"} == ({"walks", "media"} if scatter else {"glass"})
 
 
 @pytest.mark.combination

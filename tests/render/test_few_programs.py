@@ -44,6 +44,9 @@ FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "cut": ({"cut_planes": [{"plane": PLANE, "cut": True}]}, {"planes"}),
     "quads": ({"cut_planes": [{"plane": PLANE}]}, {"planes"}),
 }
+GLASS: dict[str, Any] = {"transmission": {"weight": 1, "dispersion_scale": 1}}
+MILK: dict[str, Any] = {"transmission": {"weight": 1, "depth": 1, "scatter": [1, 1, 1]}}
+SKIN: dict[str, Any] = {"subsurface": {"weight": 1}}
 PATHS = {"lighting": {"mode": "path"}}
 GLOW = {"glow": {"emission": {"luminance": 3}}}
 # The same of scenes along paths.
@@ -56,9 +59,12 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
         {"material": {"name": "glow"}, "objects": {"ball": BALL}, "materials": GLOW},
         {"objects"},
     ),
+    "glass": ({"materials": {"m": GLASS}, "material": {"name": "m"}}, {"glass"}),
+    "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"walks", "media"}),
+    "skin": ({"materials": {"m": SKIN}, "material": {"name": "m"}}, {"walks", "media"}),
 }
 # Programs that know the formula, and how its solids are joined.
-OF_FORMULA = {"rays", "colors", "glow", "planes", "glass"}
+OF_FORMULA = {"rays", "colors", "glow", "planes", "glass", "walks"}
 
 
 def scene(formula: dict[str, Any] = FORMULA, camera: dict[str, Any] = PERSPECTIVE, **sections: Any) -> Scene:
@@ -140,14 +146,13 @@ def test_stages_without_a_formula_are_the_same_for_all(device: Device) -> None:
 
 # Features that still make texts of their own: none may join them.
 LEFT = {
-    *("HAS_MAPS", "HAS_BUMP", "MATERIALS", "HAS_CLOUDS"),
-    *("HAS_GLASS", "HAS_GLASS_SET", "HAS_GLASS_SCATTER", "HAS_SUBSURFACE", "TRANSFER_COLUMNS"),
+    *("HAS_MAPS", "HAS_BUMP", "MATERIALS"),
 }
 # What is the same in every program: counts, sizes, and numbers of words.
 ALIKE = re.compile(
     r"(CHANNEL|KEPT|STATISTIC|OBJECT|MAP|LIGHT|TRAP|COLORING|ALONG|NORMAL|FEATURE|STATE|ALBEDO|SMOOTHEST|REPEATED)_\w+"
     r"|TILE|PALETTE_SIZE|CHANNEL_COUNT|RAY_CHANNELS|MATTE_RANKS|STATISTICS|PASS_KEEP|PASS_ADD|WAVES|SPECTRUM_PLACES"
-    r"|TRANSFER_SIZE|\w+_NUMBERS"
+    r"|TRANSFER_SIZE|CLOUD_COLUMNS|\w+_NUMBERS"
 )
 
 

@@ -1,0 +1,45 @@
+// Entry points that know the formula: paths within a set that scatters light go on to where they leave it. Their rays are the second ones
+// of the queue.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "numbers/dual.h"
+#include "vectors.h"
+#include "structs.h"
+#include "formula.h"
+#include "orbit.h"
+#include "rays.h"
+#include "queue.h"
+#include "arguments.h"
+#include "sampling.h"
+#include "shade.h"
+#include "tiles.h"
+#include "pixel.h"
+#include "planes.h"
+#include "stage.h"
+#include "state.h"
+#include "eye.h"
+#include "phase.h"
+#include "set_lights.h"
+#include "light_places.h"
+#include "flights.h"
+#include "march_inside.h"
+#include "share.h"
+#include "surface_at.h"
+#include "exits.h"
+#include "walks.h"
+
+STAGE(walk_inside) {
+    const queue q = inside_of(rays, met, wave, queue_stride, settings, settings->meets_objects);
+    const share mine = share_of_item(ITEM, slice, q);
+    if (mine.next >= mine.end || WAS_CANCELLED) return;
+    const world w = WORLD;
+    const int waits = walk_share(mine, q, state, wave + STATE_PADDING, bounce, w, orbit, k);
+    look_along_share(mine, waits, q, statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet), settings, orbit, k);
+}
+
+#if LANES == 1
+STAGE(look_where_walks_end) {
+    const queue q = inside_of(rays, met, wave, queue_stride, settings, settings->meets_objects);
+    if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_inside(q, ITEM, settings, orbit, k);
+}
+#endif
