@@ -26,6 +26,10 @@ INLINE mask value_met(grid_ray r, real number, mask active, world w, real *value
 
 INLINE real extinction_at(grid_ray r, real value, world w) { return cloud_number(r, value, 0); }
 
+// What shines in clouds is looked for at places of its own (`clouds_shine`).
+INLINE int shines_itself(world w) { return 0; }
+INLINE color emission_of(real value, world w) { return color_of(R(0.0), R(0.0), R(0.0)); }
+
 #include "volume_track.h"
 #include "medium_light.h"
 

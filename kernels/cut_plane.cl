@@ -18,10 +18,9 @@
 typedef struct {
     __constant const struct View *view;
     __constant const struct Sampling *sampling;
-    __constant const struct PlaneSettings *settings;
     __constant const struct Orbit *orbit;
     __constant const scalar *k;
-    __constant const struct EscapeColors *colors;
+    __global const struct CutPlane *plane;
     __global const float *palette;
 } world;
 
@@ -32,9 +31,8 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     const vec right = VIEW_VEC(w.view, right, time), down = VIEW_VEC(w.view, down, time);
     shot s;
     s.point = vec_along(vec_along(VIEW_VEC(w.view, center, time), from_center_x + across, right), from_center_y + below, down);
-    const escaped e = plane_escape(s.point, active, SMOOTH, w.settings->periodicity, w.settings->iterations,
-                                   w.orbit, w.k);
-    s.radiance = escape_color(e, w.colors, w.palette);
+    const escaped e = plane_escape(s.point, active, w.plane->smooth, w.plane->periodicity, w.plane->iterations, w.orbit, w.k);
+    s.radiance = escape_color(e, w.plane, w.palette);
     s.hit = active;
     s.coverage = R(1.0);
     s.depth = R(0.0);
@@ -48,10 +46,9 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
 
 #include "packets.h"
 
-__kernel void cut_plane(PASS_BUFFERS, __constant const struct PlaneSettings *settings, __constant const struct Orbit *orbit,
-                        __constant const scalar *k, __constant const struct EscapeColors *colors,
-                        __global const float *palette, PASS_SPAN) {
-    const world w = {view, sampling, settings, orbit, k, colors, palette};
+__kernel void cut_plane(PASS_BUFFERS, __constant const struct Orbit *orbit, __constant const scalar *k,
+                        __global const struct CutPlane *plane, __global const float *palette, PASS_SPAN) {
+    const world w = {view, sampling, orbit, k, plane, palette};
     const pass span = PASS;
     render_packet((int)get_global_id(0) + first_packet, (int)get_global_id(1), span, w);
 }

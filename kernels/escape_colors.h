@@ -3,12 +3,7 @@
 #define CURVE_ROOT 1
 #define CURVE_LOG 2
 
-// (For planes in another renderer's picture, the colours are stored with the planes.)
-#ifndef ESCAPE_COLORS
-#define ESCAPE_COLORS __constant const struct EscapeColors
-#endif
-
-INLINE color escape_color(escaped e, ESCAPE_COLORS *colors, __global const float *palette) {
+INLINE color escape_color(escaped e, __global const struct CutPlane *colors, __global const float *palette) {
     real quantity;
     if (colors->curve == CURVE_LOG) {
         quantity = log(fmax(e.count, R(1.0))) * (real)(colors->inverse_limit);

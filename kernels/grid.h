@@ -13,9 +13,12 @@ typedef struct {
     __constant const struct Grid *about;
     __global const int *table;
     __global const int *blocks;   // of each stored brick two words, for its lower and upper half
-    __global const sample *values[4];
+    __global const uchar *values[4];   // bytes, or floats (`floats` in `about`)
     __global const uchar *normals[4];
 } grid;
+
+// One of four buffers. (In an array of pointers a number that is not known before would be a place in memory.)
+#define POOL(buffers, pool) ((pool) == 0 ? buffers[0] : (pool) == 1 ? buffers[1] : (pool) == 2 ? buffers[2] : buffers[3])
 
 // A place among the cells: which one, and where in it, 0 to 1.
 typedef struct {
@@ -61,33 +64,32 @@ INLINE ints corner_of(cell c) { return ((c.z & 7) * BRICK_SIDE + (c.y & 7)) * BR
 
 INLINE real between(real a, real b, real share) { return a + (b - a) * share; }
 
-INLINE void value_pair(__global const sample *values, ints index, real *first, real *second) {
-#if VALUE_IS_FLOAT
-    *first = gather_floats(values, index);
-    *second = gather_floats(values, index + 1);
-#else
-    gather_pair(values, index, first, second);
-#endif
+// The values at the corners of a cell in one buffer of stored bricks, x fastest, as they are kept (0 to 255 in 8 bits).
+INLINE void corner_values(__global const uchar *values, int floats, ints at, real *corners) {
+    if (floats) {
+        #pragma unroll
+        for (int i = 0; i < 8; ++i) {
+            const int further = (i & 1) + BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
+            corners[i] = gather_floats((__global const float *)values, at + further);
+        }
+    } else {
+        #pragma unroll
+        for (int i = 0; i < 8; i += 2) {
+            const int further = BRICK_SIDE * ((i >> 1) & 1) + BRICK_SIDE * BRICK_SIDE * (i >> 2);
+            gather_pair(values, at + further, corners + i, corners + i + 1);
+        }
+    }
 }
 
-// The value in one buffer of stored bricks, as it is kept (0 to 255 in 8 bits).
-INLINE real pool_value(__global const sample *values, cell c, ints at) {
-    real a, b, d, e;
-    value_pair(values, at, &a, &b);
-    value_pair(values, at + BRICK_SIDE, &d, &e);
-#if NEAREST
+INLINE real blended_value(const real *a, cell c) {
+    const real low = between(between(a[0], a[1], c.u), between(a[2], a[3], c.u), c.v);
+    return between(low, between(between(a[4], a[5], c.u), between(a[6], a[7], c.u), c.v), c.w);
+}
+
+INLINE real nearest_value(const real *a, cell c) {
     const mask right = less_equal(R(0.5), c.u), up = less_equal(R(0.5), c.v), deep = less_equal(R(0.5), c.w);
-    const real low = pick(up, pick(right, e, d), pick(right, b, a));
-#else
-    const real low = between(between(a, b, c.u), between(d, e, c.u), c.v);
-#endif
-    value_pair(values, at + BRICK_SIDE * BRICK_SIDE, &a, &b);
-    value_pair(values, at + BRICK_SIDE * BRICK_SIDE + BRICK_SIDE, &d, &e);
-#if NEAREST
-    return pick(deep, pick(up, pick(right, e, d), pick(right, b, a)), low);
-#else
-    return between(low, between(between(a, b, c.u), between(d, e, c.u), c.v), c.w);
-#endif
+    const real low = pick(up, pick(right, a[3], a[2]), pick(right, a[1], a[0]));
+    return pick(deep, pick(up, pick(right, a[7], a[6]), pick(right, a[5], a[4])), low);
 }
 
 // The sum of the corners' normals, each with its share of the cell.
@@ -107,38 +109,44 @@ INLINE vec pool_normal(__global const uchar *normals, cell c, ints at) {
     return vec_sub(sum, vec_scale(vec_of(R(1.0), R(1.0), R(1.0)), R(127.5) * all));
 }
 
-// The value at a place of stored bricks.
-INLINE real grid_value(cell c, ints slots, mask active, grid g) {
-    const ints corner = corner_of(c);
-#if POOLS == 1
-    return pool_value(g.values[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner);
-#else
-    real value = R(0.0);
-    #pragma unroll
-    for (int pool = 0; pool < TURNS(POOLS); ++pool) {
-        const ints place = slots - pool * g.about->pool_bricks;
-        const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
+// Slots counted from the first of a buffer, and the lanes whose slot it has.
+INLINE ints pool_slots(ints slots, int pool, mask *active, grid g) {
+    if (g.about->pools == 1) return slots;
+    const ints place = slots - pool * g.about->pool_bricks;
+    *active &= less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
+    return place;
+}
+
+// The value at a place of stored bricks in any of several buffers, or of the nearest voxel.
+CALLED real value_of_pools(const cell *c, ints slots, mask active, grid g) {
+    real value = R(0.0), corners[8];
+    for (int pool = 0; pool < g.about->pools; ++pool) {
+        mask here = active;
+        const ints place = pool_slots(slots, pool, &here, g);
         if (!any_lane(here)) continue;
-        value = pick(here, pool_value(g.values[pool], c, pick_ints(here, place, 0) * BRICK_STRIDE + corner), value);
+        corner_values(POOL(g.values, pool), g.about->floats, pick_ints(here, place, 0) * BRICK_STRIDE + corner_of(*c), corners);
+        value = pick(here, g.about->nearest ? nearest_value(corners, *c) : blended_value(corners, *c), value);
     }
     return value;
-#endif
+}
+
+// The value at a place of stored bricks.
+INLINE real grid_value(cell c, ints slots, mask active, grid g) {
+    if (!g.about->plain) return value_of_pools(&c, slots, active, g);
+    real corners[8];
+    corner_values(g.values[0], g.about->floats, pick_ints(active, slots, 0) * BRICK_STRIDE + corner_of(c), corners);
+    return blended_value(corners, c);
 }
 
 // The normal at a place of stored bricks, length 1, or 0 where there is none: blended from those of the cell's corners.
 INLINE vec grid_normal(cell c, ints slots, mask active, grid g) {
     const ints corner = corner_of(c);
-#if POOLS == 1
-    return vec_normalize(pool_normal(g.normals[0], c, pick_ints(active, slots, 0) * BRICK_STRIDE + corner));
-#else
     vec normal = vec_of(R(0.0), R(0.0), R(0.0));
-    #pragma unroll
-    for (int pool = 0; pool < TURNS(POOLS); ++pool) {
-        const ints place = slots - pool * g.about->pool_bricks;
-        const mask here = active & less(R(-0.5), to_reals(place)) & less(to_reals(place), (real)((scalar)g.about->pool_bricks));
+    for (int pool = 0; pool < g.about->pools; ++pool) {
+        mask here = active;
+        const ints place = pool_slots(slots, pool, &here, g);
         if (!any_lane(here)) continue;
-        normal = vec_pick(here, pool_normal(g.normals[pool], c, pick_ints(here, place, 0) * BRICK_STRIDE + corner), normal);
+        normal = vec_pick(here, pool_normal(POOL(g.normals, pool), c, pick_ints(here, place, 0) * BRICK_STRIDE + corner), normal);
     }
     return vec_normalize(normal);
-#endif
 }

@@ -22,7 +22,7 @@ INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tin
     if (!any_lane(active)) return found;
     const vec point = vec_along(r.origin, r.near, r.direction);
     const mask inside = orbit_inside(plane_place(point, set.planes), active, set.orbits->iterations, set.orbits, set.k);
-    for (int i = 0; i < PLANES; ++i) {
+    for (int i = 0; i < set.count; ++i) {
         const mask here = inside & active & equal(face, (real)((scalar)i));
         if (!any_lane(here)) continue;
         const escaped e = plane_look(point, here, i, set);
@@ -34,74 +34,48 @@ INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tin
     return found;
 }
 
-// Where a ray of the picture meets the quads, and what they are there; the largest number where it misses one.
-typedef struct {
-    real distance[PLANES], alpha[PLANES], count[PLANES];
-    color tint[PLANES];
-} plane_hits;
-
 // The nearest quad past the one at the distance `before` and place `after` in the list: of quads at one distance the list's
-// first is in front.
+// first is in front. The largest number where there is none.
 typedef struct {
     real before, after, distance, index, alpha, count;
     color tint;
     vec normal;
 } plane_hit;
 
-INLINE plane_hits planes_met(ray r, mask active, plane_set set) {
-    plane_hits hits;
-    for (int i = 0; i < PLANES; ++i) {
-        __global const struct CutPlane *plane = set.planes + i;
-        const vec normal = vec_splat(plane->normal);
-        const real climb = vec_dot(r.direction, normal);
-        const vec offset = vec_sub(vec_splat(plane->center), r.origin);
-        const real t = vec_dot(offset, normal) / pick(equal(climb, R(0.0)), (real)(REAL_SMALLEST), climb);
-        const vec there = vec_sub(vec_scale(r.direction, t), offset);
-        const mask met = active & less(R(0.0), t) &
-                         less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
-                         less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
-                         less(R(0.0), (real)(fmax(plane->opacity, plane->inside_opacity)));
-        real distance = (real)(REAL_LARGEST), alpha = R(0.0), count = R(0.0);
-        color tint = color_of(R(0.0), R(0.0), R(0.0));
-        if (any_lane(met)) {
-            const escaped e = plane_look(vec_along(r.origin, t, r.direction), met, i, set);
-            distance = pick(met, t, distance);
-            alpha = pick(met, pick(e.inside, (real)(plane->inside_opacity), (real)(plane->opacity)), alpha);
-            count = e.count;
-            tint = escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i);
-        }
-        // Places that the compiler knows: registers have no others, and few planes fit there.
-        for (int at = 0; at < PLANES; ++at) {
-            if (at != i) continue;
-            hits.distance[at] = distance;
-            hits.alpha[at] = alpha;
-            hits.count[at] = count;
-            hits.tint[at] = tint;
-        }
-    }
-    return hits;
+// How far along a ray of the picture a quad is met; the largest number where it is not.
+INLINE real quad_distance(ray r, __global const struct CutPlane *plane, mask active) {
+    const vec normal = vec_splat(plane->normal);
+    const real climb = vec_dot(r.direction, normal);
+    const vec offset = vec_sub(vec_splat(plane->center), r.origin);
+    const real t = vec_dot(offset, normal) / pick(equal(climb, R(0.0)), (real)(REAL_SMALLEST), climb);
+    const vec there = vec_sub(vec_scale(r.direction, t), offset);
+    const mask met = active & less(R(0.0), t) &
+                     less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
+                     less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
+                     less(R(0.0), (real)(fmax(plane->opacity, plane->inside_opacity)));
+    return pick(met, t, (real)(REAL_LARGEST));
 }
 
-INLINE plane_hit planes_next(const plane_hits *hits, real before, real after, plane_set set) {
-    plane_hit next;
-    next.before = before;
-    next.after = after;
-    next.distance = (real)(REAL_LARGEST);
-    next.index = R(-1.0);
-    next.alpha = R(0.0);
-    next.count = R(0.0);
-    next.tint = color_of(R(0.0), R(0.0), R(0.0));
-    next.normal = vec_of(R(0.0), R(0.0), R(0.0));
-    for (int i = 0; i < PLANES; ++i) {
-        const real index = (real)((scalar)i);
-        const mask further = less(before, hits->distance[i]) | (equal(before, hits->distance[i]) & less(after, index));
-        const mask nearer = further & less(hits->distance[i], next.distance);
-        next.distance = pick(nearer, hits->distance[i], next.distance);
+// Distances are found anew for each quad that is asked for: what would be kept of them has no bound, and the formula, which takes
+// longer, is asked once for each quad that is met.
+CALLED plane_hit planes_next(const ray *r, real before, real after, mask active, plane_set set) {
+    plane_hit next = {before, after, (real)(REAL_LARGEST), R(-1.0), R(0.0), R(0.0), color_of(R(0.0), R(0.0), R(0.0)), vec_of(R(0.0), R(0.0), R(0.0))};
+    for (int i = 0; i < set.count; ++i) {
+        const real distance = quad_distance(*r, set.planes + i, active), index = (real)((scalar)i);
+        const mask further = less(before, distance) | (equal(before, distance) & less(after, index));
+        const mask nearer = further & less(distance, next.distance);
+        next.distance = pick(nearer, distance, next.distance);
         next.index = pick(nearer, index, next.index);
-        next.alpha = pick(nearer, hits->alpha[i], next.alpha);
-        next.count = pick(nearer, hits->count[i], next.count);
-        next.tint = color_pick(nearer, hits->tint[i], next.tint);
-        next.normal = vec_pick(nearer, vec_splat(set.planes[i].normal), next.normal);
+    }
+    for (int i = 0; i < set.count; ++i) {
+        __global const struct CutPlane *plane = set.planes + i;
+        const mask here = equal(next.index, (real)((scalar)i));
+        if (!any_lane(here)) continue;
+        const escaped e = plane_look(vec_along(r->origin, next.distance, r->direction), here, i, set);
+        next.alpha = pick(here, pick(e.inside, (real)(plane->inside_opacity), (real)(plane->opacity)), next.alpha);
+        next.count = pick(here, e.count, next.count);
+        next.tint = color_pick(here, escape_color(e, plane, set.palettes + 3 * PALETTE_SIZE * i), next.tint);
+        next.normal = vec_pick(here, vec_splat(plane->normal), next.normal);
     }
     return next;
 }
@@ -109,7 +83,6 @@ INLINE plane_hit planes_next(const plane_hits *hits, real before, real after, pl
 // The quads along a ray of the picture, in front of and behind distance `object` (the largest number where nothing was hit).
 // `hidden`: the plane whose quad is behind it though it is at this very distance, or -1.
 INLINE plane_layers planes_seen(ray r, real object, real hidden, mask active, plane_set set) {
-    const plane_hits hits = planes_met(r, active, set);
     plane_layers layers;
     layers.front = color_of(R(0.0), R(0.0), R(0.0));
     layers.behind = layers.front;
@@ -119,8 +92,8 @@ INLINE plane_layers planes_seen(ray r, real object, real hidden, mask active, pl
     layers.normal = vec_scale(r.direction, R(-1.0));
     layers.count = R(0.0);
     real before = R(-1.0), after = R(-1.0);
-    for (int pass = 0; pass < PLANES; ++pass) {
-        const plane_hit next = planes_next(&hits, before, after, set);
+    for (int pass = 0; pass < set.count; ++pass) {
+        const plane_hit next = planes_next(&r, before, after, active, set);
         if (!any_lane(less(next.distance, (real)(REAL_LARGEST)))) break;
         before = next.distance;
         after = next.index;

@@ -39,7 +39,7 @@ INLINE vec normal_along(vec from, vec line, int halvings, mask *active, world w)
 
 // The normal of the solid's surface where it is nearest to a place that a ray has met; that which is blended where it has none near. The
 // first look goes along that one, the second along what the first has found.
-INLINE vec normal_there(vec point, vec blended, mask active, world w) {
+INLINE vec exact_normal(vec point, vec blended, mask active, world w) {
     const vec from = vec_along(vec_splat(w.settings->zoom_origin), (real)(w.settings->zoom), point);
     vec normal = blended;
     for (int i = 0; i < TURNS(2); ++i) {

@@ -80,9 +80,7 @@ INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, in
         const mask crosses = p->on_path & into_grid(p->origin, p->direction, lamp_far, w, &g, &far);
         color shines = color_of(R(0.0), R(0.0), R(0.0));
         const mask met = track(g, far, crosses, &random, w, &number, &value, &shines, looked);
-#if HAS_EMISSION
-        wander_adds(p, shines, bounce, crosses, w);
-#endif
+        if (w.settings->shines) wander_adds(p, shines, bounce, crosses, w);
         const mask ends = p->on_path & ~met;
         color past = before.shows;
         if (bounce > 0) {
@@ -117,9 +115,7 @@ INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, in
     return first;
 }
 
-INLINE shot take_path(const packet_pixels *at, real x, real y, real lens_x, real lens_y, real time, int sample, mask wanted, world w,
-                      real *steps) {
-    const ray r = camera_ray(x, y, lens_x, lens_y, time, w.view);
+INLINE shot take_path(const packet_pixels *at, ray r, real y, real time, int sample, mask wanted, world w, real *steps) {
     const color none = color_of(R(0.0), R(0.0), R(0.0));
     wanderer p = {r.origin, r.direction, color_of(R(1.0), R(1.0), R(1.0)), none, R(-1.0), R(1.0), wanted};
     real looked = R(0.0);

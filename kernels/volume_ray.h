@@ -4,18 +4,14 @@ typedef struct {
     __constant const struct Volume *settings;
     __constant const struct Material *material;
     __constant const struct Light *lights;
-    __global const float *transfer;   // TRANSFER_SIZE entries of TRANSFER_COLUMNS numbers: opacity of a step, colour, light that a step adds
+    __global const float *transfer;   // columns of TRANSFER_SIZE numbers: opacity of a step, colour, light that a step adds
     grid grid;
     __constant const struct Sampling *sampling;
     __constant const struct Orbit *orbits;   // the solid, and the formulas' constants; nothing where no program asks them
     __constant const scalar *k;
-#if HAS_PATHS
-    __global const float *bounds;        // of each stored brick the most extinction that may be met in it
-    __global const float *environment;   // see environment.h
-#endif
-#if PLANES > 0
+    __global const float *bounds;        // along paths: of each stored brick the most extinction that may be met in it ...
+    __global const float *environment;   // ... and see environment.h
     plane_set planes;
-#endif
 } world;
 
 // The places of a ray, a step apart from where it enters the grid on: first + number * step, in voxels from the middle of the
@@ -111,28 +107,33 @@ INLINE transfer_place transfer_at(real value, __constant const struct Volume *se
 }
 
 INLINE real transfer_column(transfer_place p, int column, __global const float *transfer) {
-    const ints at = TRANSFER_COLUMNS * p.first + column;
-    return between(gather_floats(transfer, at), gather_floats(transfer, at + TRANSFER_COLUMNS), p.share);
+    transfer += column * TRANSFER_SIZE;
+    return between(gather_floats(transfer, p.first), gather_floats(transfer, p.first + 1), p.share);
 }
 
 // The opacity of a step where the value is this; of paths the extinction.
 INLINE real opacity_of(real value, world w) { return transfer_column(transfer_at(value, w.settings), 0, w.transfer); }
 
-#if HAS_EMISSION
-// The light that a step adds by itself where the value is this.
+// The light that a step adds by itself where the value is this; there is none unless the grid `shines`.
 INLINE color emission_of(real value, world w) {
     const transfer_place p = transfer_at(value, w.settings);
     return color_of(transfer_column(p, 4, w.transfer), transfer_column(p, 5, w.transfer), transfer_column(p, 6, w.transfer));
 }
-#endif
 
 // The colour of a value, or that of a normal: the thesis's (n + 1) / 2.
 INLINE color tint_of(real value, vec normal, world w) {
     if (w.material->coloring == COLORING_NORMAL) return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-#if TINTED
+    if (!w.settings->tinted) {
+        __global const float *same = w.transfer + TRANSFER_SIZE;
+        return color_of((real)((scalar)same[0]), (real)((scalar)same[TRANSFER_SIZE]), (real)((scalar)same[2 * TRANSFER_SIZE]));
+    }
     const transfer_place p = transfer_at(value, w.settings);
     return color_of(transfer_column(p, 1, w.transfer), transfer_column(p, 2, w.transfer), transfer_column(p, 3, w.transfer));
-#else
-    return color_of((real)((scalar)w.transfer[1]), (real)((scalar)w.transfer[2]), (real)((scalar)w.transfer[3]));
-#endif
+}
+
+// A place without a normal faces the viewer, and so does the far side of what is transparent.
+INLINE vec facing_normal(vec normal, vec to_viewer) {
+    const mask none = less(vec_dot(normal, normal), R(0.5));
+    const mask away = less(vec_dot(normal, to_viewer), R(0.0));
+    return vec_pick(none, to_viewer, vec_pick(away, vec_scale(normal, R(-1.0)), normal));
 }

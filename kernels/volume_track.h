@@ -2,7 +2,8 @@
 // (Woodcock et al. 1965) finds where light is scattered, ratio tracking (Novak et al. 2014) what comes through.
 //
 // Lengths are numbers of a grid_ray, which here count sides of a voxel, as extinction does. What a ray meets `volume_bounds.h` tells of a
-// grid in bricks, and `clouds.h` of an object: `bound_at`, `value_met` and `extinction_at`.
+// grid in bricks, and `clouds.h` of an object: `bound_at`, `value_met` and `extinction_at`, and whether light
+// that the medium adds is counted on the way (`shines_itself`), which light (`emission_of`).
 #define MOST_FLIGHTS 1000000    // that may end within one ray
 
 // Random numbers of a lane, as many as it needs, whatever the others need.
@@ -57,10 +58,8 @@ INLINE mask track(grid_ray r, real far, mask active, stream *random, world w, re
         real here;
         const mask stored = value_met(r, *number, tries, w, &here);
         const real chance = pick(stored, extinction_at(r, here, w), R(0.0));
-#if HAS_EMISSION
         // One over the bound is how far apart, in the mean, such places are.
-        *shines = color_pick(stored, color_add(*shines, color_scale(emission_of(here, w), R(1.0) / bound)), *shines);
-#endif
+        if (shines_itself(w)) *shines = color_pick(stored, color_add(*shines, color_scale(emission_of(here, w), R(1.0) / bound)), *shines);
         const mask real_one = tries & less(stream_next(random, tries) * bound, chance);
         *value = pick(real_one, here, *value);
         met |= real_one;

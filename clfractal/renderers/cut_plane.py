@@ -4,30 +4,17 @@ from __future__ import annotations
 
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
-from clfractal.device.structs import Field, Struct
 from clfractal.renderers.carried import carried_text
-from clfractal.renderers.escape_colors import (
-    ESCAPE_COLORS,
-    escape_colors_record,
-    escape_defines,
-    escape_palette,
-)
+from clfractal.renderers.escape_colors import escape_defines, escape_palette
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
+from clfractal.renderers.planes import CUT_PLANE, only_plane
 from clfractal.renderers.records import VIEW
 from clfractal.renderers.surface import PALETTE_SIZE
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.solids import Body
-
-PLANE_SETTINGS = Struct(
-    "PlaneSettings",
-    [
-        Field("periodicity", "int", 0, "1: orbits that come back are found early"),
-        Field("iterations", "int", 0, "most applications of the formula"),
-    ],
-)
 
 
 def renderer_of(scene: Scene) -> CutPlaneRenderer:
@@ -38,14 +25,12 @@ def renderer_of(scene: Scene) -> CutPlaneRenderer:
 
 def program_text(scene: Scene, plan: Plan) -> FlatText:
     """The whole text of the scene's program."""
-    renderer = renderer_of(scene)
     body = Body.of(scene)
-    structs = "".join(struct.c_text() for struct in (VIEW, SAMPLING, ORBIT, PLANE_SETTINGS, ESCAPE_COLORS))
+    structs = "".join(struct.c_text() for struct in (VIEW, SAMPLING, ORBIT, CUT_PLANE))
     defines = {
         **pass_defines(plan),
         **body.defines,
         "PALETTE_SIZE": PALETTE_SIZE,
-        "SMOOTH": int(renderer.colors.mode == "smooth"),
     }
     generated = {
         **body.texts(files=("escape.h",), defines=escape_defines),
@@ -71,12 +56,10 @@ class CutPlaneKernel(TileKernel):
         scene, precision = self.scene, self.precision
         renderer = renderer_of(scene)
         iterations = renderer.iterations if renderer.iterations is not None else scene.formula.iterations
-        settings = {"periodicity": int(renderer.periodicity), "iterations": iterations}
         body = Body.of(scene)
         return [
-            PLANE_SETTINGS.value(precision, settings),
             body.records(precision),
             body.constants(precision),
-            escape_colors_record(renderer.colors, iterations, precision),
+            only_plane(renderer, iterations, precision),
             escape_palette(renderer.colors),
         ]

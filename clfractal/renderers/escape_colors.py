@@ -7,22 +7,18 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.orbit import Record
-from clfractal.device.structs import Field, Precision, Struct
+from clfractal.device.structs import Field
 from clfractal.formulas.language import Chain
 from clfractal.scene.cut_plane import EscapeColors
 
-ESCAPE_COLORS = Struct(
-    "EscapeColors",
-    [
-        Field("inverse_limit", "real", 0, "one over the most applications, or over their logarithm"),
-        Field("scale", "real", 0, "palettes from count 0 to the limit"),
-        Field("offset", "real", 0, "start in the palette"),
-        Field("inside", "real", 3, "linear Rec. 709"),
-        Field("repeat", "int", 0, "1: the palette begins again after its end; 0: its ends go on"),
-        Field("curve", "int", 0, "CURVE_LINEAR, CURVE_ROOT or CURVE_LOG"),
-    ],
-)
+ESCAPE_COLORS = [
+    Field("inverse_limit", "real", 0, "one over the most applications, or over their logarithm"),
+    Field("scale", "real", 0, "palettes from count 0 to the limit"),
+    Field("offset", "real", 0, "start in the palette"),
+    Field("inside", "real", 3, "linear Rec. 709"),
+    Field("repeat", "int", 0, "1: the palette begins again after its end; 0: its ends go on"),
+    Field("curve", "int", 0, "CURVE_LINEAR, CURVE_ROOT or CURVE_LOG"),
+]
 
 CURVES = ("linear", "root", "log")
 # Applications between two looks for an orbit that came back: few cost time, many find it late.
@@ -41,11 +37,6 @@ def escape_colors_values(colors: EscapeColors, iterations: int) -> dict[str, obj
         "repeat": int(colors.repeat),
         "curve": CURVES.index(colors.curve),
     }
-
-
-def escape_colors_record(colors: EscapeColors, iterations: int, precision: Precision) -> Record:
-    """The colours of counts up to `iterations`."""
-    return ESCAPE_COLORS.value(precision, escape_colors_values(colors, iterations))
 
 
 def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.escape_colors import (
     ESCAPE_COLORS,
@@ -15,7 +16,7 @@ from clfractal.renderers.escape_colors import (
     escape_palette,
 )
 from clfractal.scene.checks import used_boxes
-from clfractal.scene.cut_plane import CutPlane
+from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer, EscapeColors
 from clfractal.scene.model import Scene
 from clfractal.scene.plane import Placed, moved
 from clfractal.scene.volume import VolumeRenderer
@@ -36,8 +37,9 @@ CUT_PLANE = Struct(
         Field("cut", "int", 0, "1: the part of the set in front is removed"),
         Field("objects", "int", 2, "a bit for each object: that of one beside the set is removed likewise"),
         Field("smooth", "int", 0, "1: smooth counts"),
+        Field("periodicity", "int", 0, "1: orbits that come back are found early"),
         Field("iterations", "int", 0, "most applications of the formula"),
-        *ESCAPE_COLORS.fields,
+        *ESCAPE_COLORS,
     ],
 )
 
@@ -54,14 +56,6 @@ def plane_count(scene: Scene) -> int:
     return sum(1 for _ in all_planes(scene))
 
 
-def plane_defines(scene: Scene) -> dict[str, object]:
-    """What the text of `kernels/planes.h` depends on."""
-    return {
-        "PLANES": plane_count(scene),
-        "ESCAPE_COLORS": "__global const struct CutPlane",
-    }
-
-
 def has_faces(scene: Scene) -> bool:
     """Whether any plane cuts something, of which faces may be seen."""
     return any(plane.cut for plane in scene.cut_planes)
@@ -72,25 +66,47 @@ def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
     zoom, origin = zoom_of(scene)
     rows = [
         {
-            "center": placed.center,
-            "normal": placed.normal,
-            "side": placed.side,
-            "up": placed.up,
-            "half_width": placed.width / 2,
-            "half_height": placed.height / 2,
+            **_shown(placed, plane.colors, _iterations(scene, plane)),
             "opacity": plane.opacity,
             "inside_opacity": plane.opacity if plane.inside_opacity is None else plane.inside_opacity,
             "zoom": zoom,
             "zoom_origin": origin,
             "cut": int(plane.cuts_set),
             "objects": _cut_objects(scene, plane),
-            "smooth": int(plane.colors.mode == "smooth"),
-            "iterations": _iterations(scene, plane),
-            **escape_colors_values(plane.colors, _iterations(scene, plane)),
         }
         for plane, placed in all_planes(scene)
     ]
     return CUT_PLANE.array(precision, rows)
+
+
+def only_plane(renderer: CutPlaneRenderer, iterations: int, precision: Precision) -> Record:
+    """The plane of a picture that shows nothing else, with counts up to `iterations`."""
+    alone = {
+        "opacity": 1,
+        "inside_opacity": 1,
+        "zoom": 1,
+        "zoom_origin": (0, 0, 0),
+        "cut": 0,
+        "objects": (0, 0),
+    }
+    shown = _shown(renderer.plane.placed, renderer.colors, iterations)
+    return CUT_PLANE.array(precision, [{**shown, **alone, "periodicity": int(renderer.periodicity)}])
+
+
+def _shown(placed: Placed, colors: EscapeColors, iterations: int) -> dict[str, object]:
+    """Where a plane stands, and what it shows."""
+    return {
+        "center": placed.center,
+        "normal": placed.normal,
+        "side": placed.side,
+        "up": placed.up,
+        "half_width": placed.width / 2,
+        "half_height": placed.height / 2,
+        "smooth": int(colors.mode == "smooth"),
+        "periodicity": 1,
+        "iterations": iterations,
+        **escape_colors_values(colors, iterations),
+    }
 
 
 def plane_palettes(scene: Scene) -> npt.NDArray[np.float32]:

@@ -37,7 +37,6 @@ from clfractal.renderers.passes import pass_defines
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import (
     CUT_PLANE,
-    plane_defines,
     plane_palettes,
     plane_records,
 )
@@ -122,11 +121,6 @@ def path_defines(scene: Scene, plan: Plan) -> dict[str, object]:
 def formula_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """The defines of stages that ask the formula."""
     return {**state_defines(scene, plan), **Body.of(scene).defines}
-
-
-def face_and_plane_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """The defines of `kernels/see_planes.cl`."""
-    return {**formula_defines(scene, plan), **plane_defines(scene)}
 
 
 class SurfaceKernel(TileKernel):
@@ -240,7 +234,7 @@ _PROGRAMS = (
     _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), walk_defines, ()),
     _Program("colors", "color_spots.cl", ("color_spots",), formula_defines, ("trap_near.h",)),
     _Program("glow", "glow.cl", ("add_glow",), formula_defines, ("trap_near.h",)),
-    _Program("planes", "see_planes.cl", ("find_faces", "find_planes"), face_and_plane_defines, ("escape.h",)),
+    _Program("planes", "see_planes.cl", ("find_faces", "find_planes"), formula_defines, ("escape.h",)),
 )
 
 

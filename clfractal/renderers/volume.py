@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -19,11 +19,11 @@ from clfractal.renderers import records
 from clfractal.renderers.carried import carried_text
 from clfractal.renderers.environment import PackedEnvironment, packed_map
 from clfractal.renderers.escape_colors import escape_defines
-from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
+from clfractal.renderers.kernel import KernelArgument, ProgramText, Stage, TileKernel, flat_text
 from clfractal.renderers.kinds import kind_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
-from clfractal.renderers.planes import CUT_PLANE, plane_defines, plane_palettes, plane_records, zoom_of
+from clfractal.renderers.planes import CUT_PLANE, plane_count, plane_palettes, plane_records, zoom_of
 from clfractal.renderers.transfer import (
     MOST_OPACITY,
     SHINING_RATE,
@@ -33,7 +33,6 @@ from clfractal.renderers.transfer import (
     medium_table,
     mixed,
     table_bounds,
-    transfer_columns,
     value_limits,
 )
 from clfractal.scene.checks import used_boxes
@@ -68,6 +67,10 @@ GRID = Struct(
         Field("sides", "int", 3, "voxels along x, y and z"),
         Field("bricks", "int", 3, "bricks along x, y and z"),
         Field("pool_bricks", "int", 0, "stored bricks in each buffer"),
+        Field("pools", "int", 0, "buffers"),
+        Field("plain", "int", 0, "1: there is one buffer, and values are blended"),
+        Field("floats", "int", 0, "1: values are floats; 0: bytes"),
+        Field("nearest", "int", 0, "1: a place has the value of the nearest voxel; 0: values are blended"),
     ],
 )
 
@@ -90,6 +93,11 @@ VOLUME = Struct(
         Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("max_steps", "int", 0, "most places of a ray"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("plane_count", "int", 0, "number of cut planes"),
+        Field("shadows", "int", 0, "1: some light is blocked by the grid"),
+        Field("shines", "int", 0, "1: the grid adds light by itself"),
+        Field("tinted", "int", 0, "1: values have colours of their own; 0: the material's"),
+        Field("exact_normals", "int", 0, "1: surfaces have the formula's normals where rays meet them"),
         Field("zoom", "real", 0, "from the picture to where the formula is evaluated: a factor, ..."),
         Field("zoom_origin", "real", 3, "... and what is added"),
         Field(
@@ -110,36 +118,31 @@ def settings_of(scene: Scene) -> VolumeRenderer:
     return scene.renderer
 
 
-def program_text(scene: Scene, plan: Plan, grid: Grid) -> FlatText:
-    """The whole text of the program; the formula is part of it only where it is asked."""
-    settings = settings_of(scene)
+def program_text(scene: Scene, plan: Plan) -> FlatText:
+    """The whole text of the program; the scene's formula is part of it only where pictures ask it."""
     defines = {
         **pass_defines(plan),
         "REAL_IS_DOUBLE": int(ray_precision(scene, plan) == "float64"),
         "PALETTE_SIZE": 256,
         "TRANSFER_SIZE": TRANSFER_SIZE,
-        "TRANSFER_COLUMNS": transfer_columns(settings.transfer),
-        "HAS_EMISSION": int(settings.transfer.emission is not None),
-        "SURFACE": int(settings.transfer.opacity is None),
-        "VALUE_IS_FLOAT": int(grid.kind == "float"),
-        "NEAREST": int(settings.interpolation == "nearest"),
-        "POOLS": len(grid.values),
-        "TINTED": int(settings.transfer.color is not None),
-        "HAS_SHADOWS": int(
-            settings.shadows and any(light.shadow for light in scene.lights) and not has_paths(scene)
-        ),
-        "HAS_PATHS": int(has_paths(scene)),
-        **plane_defines(scene),
     }
-    structs = kind_text() + "".join(struct.c_text() for struct in STRUCTS)
-    body = Body.of(scene)
-    formulas = {"formula.h": "", "orbit.h": ""}
+    generated = {
+        "structs.h": kind_text() + "".join(struct.c_text() for struct in STRUCTS),
+        "carried.h": carried_text(),
+    }
     if asks_formula(scene):
-        formulas = body.texts(files=("escape.h",), defines=escape_defines)
+        body = Body.of(scene)
+        generated |= body.texts(files=("escape.h",), defines=escape_defines)
         defines |= body.defines
-    normals = f'#include "volume_{"exact" if has_exact_normals(scene) else "blended"}.h"\n'
-    generated = {"structs.h": structs, "carried.h": carried_text(), "volume_normals.h": normals, **formulas}
-    return flat_text("volume.cl", generated=generated, defines=defines)
+    return flat_text(f"{kernel_of(scene)}.cl", generated=generated, defines=defines)
+
+
+def kernel_of(scene: Scene) -> str:
+    """The kernel that renders a scene; each has a program of its own."""
+    if has_paths(scene):
+        return "volume_paths"
+    shown = "surface" if settings_of(scene).transfer.opacity is None else "medium"
+    return f"volume_formula_{shown}" if asks_formula(scene) else f"volume_{shown}"
 
 
 def has_exact_normals(scene: Scene) -> bool:
@@ -187,7 +190,10 @@ class VolumeKernel(TileKernel):
     _grid: Grid | None = None
 
     def texts(self) -> list[ProgramText]:
-        return [ProgramText(self.name, program_text(self.scene, self.plan, self.grid), (self.name,))]
+        return [ProgramText(self.name, program_text(self.scene, self.plan), (kernel_of(self.scene),))]
+
+    def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
+        yield Stage(kernel_of(self.scene))
 
     def own_arguments(self) -> list[KernelArgument]:
         scene, grid, precision = self.scene, self.grid, self.precision
@@ -203,14 +209,14 @@ class VolumeKernel(TileKernel):
             grid_record(scene, grid, precision),
             records.material_record(scene, precision, self._environment),
             records.light_records(scene, precision),
-            transfer_table(scene, value_range(scene, grid)),
+            np.ascontiguousarray(transfer_table(scene, value_range(scene, grid)).T),
             grid.table,
             blocks,
             *(_one_of(grid.values, pool) for pool in four),
             *(_one_of(grid.normals, pool) for pool in four),
             *_formula_arguments(scene, precision),
-            *(self._path_arguments() if has_paths(scene) else []),
-            *(_plane_arguments(scene, precision) if scene.cut_planes else []),
+            *self._path_arguments(),
+            *_plane_arguments(scene, precision),
         ]
 
     @cached_property
@@ -221,7 +227,9 @@ class VolumeKernel(TileKernel):
         return self.resources.once(f"environment {found.digest}", lambda: packed_map(found))
 
     def _path_arguments(self) -> list[KernelArgument]:
-        """The bricks' bounds, and the environment."""
+        """The bricks' bounds, and the environment; nothing where light does not go along paths."""
+        if not has_paths(self.scene):
+            return [np.zeros(1, np.float32), np.zeros(1, np.float32)]
         grid, packed = self.grid, self._environment
         ranges = self.resources.once(
             f"{self._grid_key} ranges",
@@ -305,6 +313,10 @@ def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[A
         "sides": grid.shape,
         "bricks": grid.bricks,
         "pool_bricks": grid.parts.part_slots,
+        "pools": len(grid.values),
+        "plain": int(len(grid.values) == 1 and settings_of(scene).interpolation != "nearest"),
+        "floats": int(grid.kind == "float"),
+        "nearest": int(settings_of(scene).interpolation == "nearest"),
     }
     return GRID.value(precision, values)
 
@@ -334,6 +346,11 @@ def volume_record(
         **_path_fields(scene, environment),
         "max_steps": int(np.ceil(longest / step)) + 2,
         "light_count": len(scene.lights),
+        "plane_count": plane_count(scene),
+        "shadows": int(settings.shadows and any(light.shadow for light in scene.lights)),
+        "shines": int(settings.transfer.emission is not None),
+        "tinted": int(settings.transfer.color is not None),
+        "exact_normals": int(has_exact_normals(scene)),
         "zoom": zoom,
         "zoom_origin": origin,
         "normal_step": NORMAL_STEP * voxel * zoom,
@@ -448,6 +465,8 @@ def _shining_length(extinctions: npt.NDArray[np.float64], step: float) -> npt.ND
 
 def _plane_arguments(scene: Scene, precision: Precision) -> list[KernelArgument]:
     """The cut planes, in the kernel's order."""
+    if not scene.cut_planes:
+        return [np.zeros(1, CUT_PLANE.dtype(precision)), np.zeros(1, np.float32)]
     return [plane_records(scene, precision), plane_palettes(scene)]
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 from clfractal.device import peak, probe, struct_layout
 from clfractal.device.source import FlatText, SourceMap
@@ -67,35 +65,23 @@ def _exact_normals(count: int, precision: Precision) -> FlatText:
             "renderer": {"type": "volume", "normals": "exact"},
         }
     )
-    grid: Any = SimpleNamespace(kind="byte", values=(None,))
-    return volume.program_text(
-        scene, make_plan(scene, precision=precision, lanes=count, channels=CHANNELS), grid
-    )
+    return volume.program_text(scene, make_plan(scene, precision=precision, lanes=count, channels=CHANNELS))
 
 
 def of_pictures(count: int, precision: Precision, pictures: Sequence[str]) -> Iterator[Named]:
     """The programs of renderers."""
     for name in pictures:
-        scene = scene_of(name, (16, 16))
-        if scene.renderer.type == "volume":
-            for values, pools in (("byte", 1), ("float", 3)):
-                for part, text in of_scene(scene, count, precision, values, pools):
-                    yield f"{part} {name} of {values}s in {pools}", text
-        else:
-            for part, text in of_scene(scene, count, precision):
-                yield f"{part} {name}", text
+        for part, text in of_scene(scene_of(name, (16, 16)), count, precision):
+            yield f"{part} {name}", text
 
 
-def of_scene(
-    scene: Scene, count: int, precision: Precision, values: str = "byte", pools: int = 1
-) -> Iterator[Named]:
-    """The programs that render a scene, each by what it does; a volume's for a grid of such values in so many buffers."""
+def of_scene(scene: Scene, count: int, precision: Precision) -> Iterator[Named]:
+    """The programs that render a scene, each by what it does."""
     plan = make_plan(scene, precision=precision, lanes=count, channels=CHANNELS)
     # What moves meanwhile makes no difference to the texts.
     plan = replace(plan, moving=scene.animation is not None and scene.animation.shutter > 0)
     if scene.renderer.type == "volume":
-        grid: Any = SimpleNamespace(kind=values, values=(None,) * pools)
-        yield "volume", volume.program_text(scene, plan, grid)
+        yield volume.kernel_of(scene), volume.program_text(scene, plan)
     elif scene.renderer.type == "cut_plane":
         yield "cut_plane", cut_plane.program_text(scene, plan)
     else:

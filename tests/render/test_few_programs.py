@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.renderers import cut_plane, volume
 from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.render.shots import PERSPECTIVE, plan_of, scene_of
@@ -43,6 +44,7 @@ FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "objects": ({"objects": {"ball": BALL, "sea": {"type": "water", "position": [0, 0, -2]}}}, {"objects"}),
     "cut": ({"cut_planes": [{"plane": PLANE, "cut": True}]}, {"planes"}),
     "quads": ({"cut_planes": [{"plane": PLANE}]}, {"planes"}),
+    "stack": ({"cut_planes": [{"plane": PLANE, "count": 9, "spacing": 0.1}]}, {"planes"}),
 }
 GLASS: dict[str, Any] = {"transmission": {"weight": 1, "dispersion_scale": 1}}
 MILK: dict[str, Any] = {"transmission": {"weight": 1, "depth": 1, "scatter": [1, 1, 1]}}
@@ -111,9 +113,91 @@ def test_layers_and_mattes_are_data(device: Device) -> None:
     )
 
 
-@pytest.mark.parametrize("features", [("trap", "thickness"), ("trap", "layer"), ("cut", "quads")])
+@pytest.mark.parametrize(
+    "features", [("trap", "thickness"), ("trap", "layer"), ("cut", "quads"), ("cut", "stack")]
+)
 def test_kinds_of_a_feature_are_one_program(features: tuple[str, str], device: Device) -> None:
     one, other = (texts(scene(FORMULA, **FEATURES[each][0]), device) for each in features)
+    assert one == other
+
+
+GRID = {"type": "volume", "box": {"center": [0, 0, 0], "size": 2.4}, "resolution": 16}
+MEDIUM = {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.5}]}
+SHINES = {
+    **MEDIUM,
+    "color": [{"at": 0, "color": [1, 0, 0]}],
+    "emission": [{"at": 0.5, "emission": [0, 1, 0]}],
+}
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "kernel"),
+    [
+        (
+            {"renderer": GRID},
+            {
+                "renderer": {
+                    **GRID,
+                    "interpolation": "nearest",
+                    "value": "coverage",
+                    "store": "float",
+                    "step": 0.7,
+                },
+                "lights": [{"direction": [1, 1, -1], "shadow": True}],
+                "coloring": {"by": "normal"},
+                "formula": {"name": "hast"},
+            },
+            "volume_surface",
+        ),
+        (
+            {"renderer": {**GRID, "transfer": MEDIUM}},
+            {"renderer": {**GRID, "transfer": SHINES, "shadows": False}},
+            "volume_medium",
+        ),
+        (
+            {"renderer": {**GRID, "transfer": MEDIUM}, "lighting": {"mode": "path"}},
+            {
+                "renderer": {**GRID, "transfer": SHINES},
+                "lighting": {"mode": "path"},
+                "environment": {"sky": {}},
+                "lights": LAMPS[3:],
+            },
+            "volume_paths",
+        ),
+        (
+            {"renderer": {**GRID, "normals": "exact"}},
+            {"renderer": GRID, "cut_planes": [{"plane": PLANE, "count": 3, "spacing": 0.1}]},
+            "volume_formula_surface",
+        ),
+        (
+            {"renderer": {**GRID, "transfer": MEDIUM}, "cut_planes": [{"plane": PLANE, "cut": True}]},
+            {
+                "renderer": {**GRID, "transfer": SHINES},
+                "cut_planes": [{"plane": PLANE, "count": 3, "spacing": 0.1}],
+            },
+            "volume_formula_medium",
+        ),
+    ],
+)
+def test_what_a_grid_shows_is_data(
+    one: dict[str, Any], other: dict[str, Any], kernel: str, device: Device
+) -> None:
+    """Only a program that asks the formula knows it."""
+    scenes = [scene(**each) for each in (one, other)]
+    assert [volume.kernel_of(each) for each in scenes] == [kernel] * 2
+    found = [volume.program_text(each, plan_of(each, device)).text for each in scenes]
+    assert found[0] == found[1]
+
+
+def test_what_a_cut_plane_shows_is_data(device: Device) -> None:
+    shown = [
+        {"mode": "smooth", "curve": "log"},
+        {"mode": "stepped", "palette": ["#ff0000", "#0000ff"], "repeat": True},
+    ]
+    scenes = [
+        scene(renderer={"type": "cut_plane", "plane": PLANE, "colors": each}, camera={}) for each in shown
+    ]
+    one, other = (cut_plane.program_text(each, plan_of(each, device)).text for each in scenes)
     assert one == other
 
 
