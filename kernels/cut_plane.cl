@@ -6,7 +6,7 @@
 #include "structs.h"
 #include "view.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "sampling.h"
 #include "color.h"
 #include "tiles.h"

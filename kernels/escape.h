@@ -6,13 +6,13 @@
 #include "escape_types.h"
 
 // The escape of points within `most` applications. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
-// of the distances of orbit.h; else they are whole, those of `orbit_count`.
+// of the distances of orbit.h; else they are whole, those of `formula_escape_count`.
 //
 // A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
 // will do: an orbit that comes near itself may still escape. `periodicity` 0 skips this test, for comparison.
-INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
+INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
                             __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
@@ -22,13 +22,11 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
     real count = (real)((scalar)min(FIRST_COUNT, most));
     mask alive = active & less_equal(square, radius_square);
     mask inside = active & ~active;
-#if !HAS_SHAPE
     state kept = z;
     real highest = square;  // |z|^2 since then
     int next_keep = FIRST_COUNT + PERIOD_CHECK;
     // Equal states have equal futures only where the turns repeat.
     int comparable = FIRST_COUNT >= REPEATS_FROM;
-#endif
     int n = FIRST_COUNT, limit = most;
     for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
         while (n < limit) {
@@ -37,18 +35,13 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
             for (; n < end; ++n) {
                 if (!any_lane(alive)) break;
                 z = state_pick(alive, apply(n, z, c, k), z);
-#if !LOGARITHMIC
-                square_before = pick(alive, square, square_before);
-#endif
+                if (!LOGARITHMIC) square_before = pick(alive, square, square_before);
                 square = state_square(z);
                 count += pick(alive, R(1.0), R(0.0));
                 alive &= less_equal(square, radius_square);
-#if !HAS_SHAPE
-                if (smooth) highest = fmax(highest, square);
-#endif
+                if (smooth && !HAS_SHAPE) highest = fmax(highest, square);
             }
-#if !HAS_SHAPE
-            if (periodicity) {
+            if (periodicity && !HAS_SHAPE) {
                 mask back = alive & same_bits(z.s0, kept.s0) & same_bits(z.s1, kept.s1) & same_bits(z.s2, kept.s2);
 #if STATE_SIZE > 3
                 back &= same_bits(z.s3, kept.s3);
@@ -66,15 +59,11 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
                     next_keep = 2 * n;
                 }
             }
-#endif
         }
         if (past_limit) break;
         // At the limit: inside, or on the way from the bailout to the distance bailout.
-#if HAS_SHAPE
-        inside |= alive & less_equal(solid_distance(z, k), R(0.0));
-#else
-        inside |= smooth ? alive & settled(square, orbit) : alive;
-#endif
+        if (HAS_SHAPE) inside |= alive & less_equal(solid_distance(z, k), R(0.0));
+        else inside |= smooth ? alive & settled(square, orbit) : alive;
         alive &= ~inside;
         limit = most + (orbit->longest - orbit->iterations);
     }
@@ -87,8 +76,56 @@ INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity,
         surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
         surface.square = square;
         surface.square_before = square_before;
-        count = smooth_count(last, surface, orbit);
+        count = formula_smooth_count(last, surface, orbit);
     }
     result.count = pick(inside, (real)((scalar)most), count);
     return result;
+}
+
+// Of several solids that are joined counts are the largest of what is beside each other, and the smaller of both where only what they
+// have in common is left. A formula has its own limit, unless the plane has one.
+INLINE escaped one_escape(vec own, mask active, int smooth, int periodicity, int limit, __constant const struct Orbit *o,
+                          __constant const scalar *k) {
+    escaped one = {R(0.0), active & ~active, R(0.0)};
+    if (o->kind != SOLID_FORMULA) {
+        solid_found found;
+        solid_simple(o, own, &found);
+        one.inside = active & found.inside;
+        return one;
+    }
+    return formula_escape(own, active, smooth, periodicity, limit, o, k + o->first);
+}
+
+CALLED escaped solids_escape(const vec *point, mask active, int smooth, int periodicity, int most,
+                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const real limit = (real)((scalar)most);
+    escaped all = {R(0.0), active & ~active, R(0.0)};
+    for (int i = 0; i < orbit->solids; ++i) {
+        __constant const struct Orbit *o = orbit + i;
+        const int own = most == orbit->iterations ? o->iterations : most;
+        const escaped one = one_escape(solid_own(o, *point), active, smooth, periodicity, own, o, k);
+        const real count = pick(one.inside, limit, fmin(one.count, limit));
+        all.applications += one.applications;
+        if (o->join == JOIN_CUT) {
+            all.inside &= ~one.inside;
+            all.count = pick(one.inside, R(0.0), all.count);
+        } else if (o->join == JOIN_INTERSECTION) {
+            all.inside &= one.inside;
+            all.count = fmin(all.count, count);
+        } else {
+            all.inside |= one.inside;
+            all.count = fmax(all.count, count);
+        }
+    }
+    if (orbit->flows) {
+        all.inside |= solids_inside(point, active, most, orbit, k).inside;
+        all.count = pick(all.inside, limit, all.count);
+    }
+    return all;
+}
+
+INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
+                            __constant const scalar *k) {
+    if (!JOINED) return formula_escape(point, active, smooth, periodicity, most, orbit, k);
+    return solids_escape(&point, active, smooth, periodicity, most, orbit, k);
 }

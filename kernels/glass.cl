@@ -5,7 +5,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "rays.h"
 #include "queue.h"
 #include "arguments.h"

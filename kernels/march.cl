@@ -6,7 +6,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "rays.h"
 #if SEARCH == SEARCH_STEPS
 #include "march_steps.h"

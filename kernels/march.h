@@ -47,14 +47,9 @@ INLINE sight march_place(const march *m) {
 
 // The scaled distance at which light is computed, in cones.
 INLINE real near_of(clearance here, __constant const struct March *settings) {
-#if SOLIDS > 1
-    return (real)(settings->near) * here.scale / (real)(settings->step_scale);
-#else
-    return (real)(settings->near);
-#endif
+    return JOINED ? (real)(settings->near) * here.scale / (real)(settings->step_scale) : (real)(settings->near);
 }
 
-#if HOLLOWS
 // The step in a hollow: nothing counts as near there, but for what is joined to it.
 INLINE void march_blind(const march *m, sight *s, __constant const struct March *settings) {
     const real step = (real)(settings->step), first = fmax(BLIND_FIRST * s->cone, BLIND_LEAST * step);
@@ -65,7 +60,6 @@ INLINE void march_blind(const march *m, sight *s, __constant const struct March 
     s->sure = pick(unknown & ~s->blind, free, s->radius);
     s->radius = pick(unknown, free, s->radius);
 }
-#endif
 
 #if FAR_BOUNDS
 // Estimates are made for the inside of the formula's ball. Farther out they may be too large: there no step leads into it. How far the
@@ -99,9 +93,9 @@ INLINE void march_measure(march *m, sight *s, int goal, __constant const struct 
     const mask close = seeks_sheets(m, goal) & less(m->radius_before, CLOSE * s->cone);
     s->radius = pick(capped, m->radius_before + pick(close, SURE_GROWTH, MOST_GROWTH) * growth, s->radius);
     s->restless = free & close & less(m->radius_before + CALM_GROWTH * growth, s->radius);
-#if HOLLOWS
-    march_blind(m, s, settings);
-#endif
+    s->blind = less(R(1.0), R(0.0));
+    s->sure = s->radius;
+    if (JOINED) march_blind(m, s, settings);
     s->near = pick(less(s->here.step, s->here.near), s->here.near * scale, s->radius);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));
@@ -110,7 +104,7 @@ INLINE void march_measure(march *m, sight *s, int goal, __constant const struct 
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
 INLINE void march_keep(march *m, const sight *s, mask outside, mask passed, mask inside, __constant const struct March *settings) {
     const real height = s->cone * near_of(s->here, settings);
-    const mask beside = outside & less(s->near, height) & ~BLIND(s);
+    const mask beside = outside & less(s->near, height) & ~s->blind;
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
     const mask between = beside & less(height, m->radius_before) & less(m->radius_before, (real)(REAL_LARGEST));
     const real back = pick(between, (height - s->near) / (m->radius_before - s->near), R(0.0));
@@ -137,9 +131,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     step = fmax(step, CREEP * s->cone);
 #endif
     m->limit = pick(overshot & s->here.end.inside, m->t, m->limit);
-#if HOLLOWS
     step = pick(s->blind, s->radius, step);
-#endif
 #if FAR_BOUNDS
     real around;
     step = fmin(step, march_to_ball(m, s, &around, settings));
@@ -148,7 +140,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
-    const real known = pick(BLIND(s) | at_ball(s), (real)(REAL_LARGEST), s->radius);
+    const real known = pick(s->blind | at_ball(s), (real)(REAL_LARGEST), s->radius);
     m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside & ~passed, known, m->radius_before);
     const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
     const real free = pick(is_blind(s->here), R(0.0), s->radius);
@@ -191,7 +183,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     // If this sphere does not touch the one before, something may lie between them, so go back to the end of the one
     // before (Keinert et al. 2014, sec. 3.1).
     const mask free = marching & less_equal((real)(REAL_LARGEST), m->high);
-    const mask overshot = free & ~m->landing & less((SURE(&s) + m->radius_before) * R(1.0001), m->step_before);
+    const mask overshot = free & ~m->landing & less((s.sure + m->radius_before) * R(1.0001), m->step_before);
     mask inside = marching & ~overshot & s.here.end.inside;
     mask early = inside & ~inside;
 #if POINTS > 1
@@ -211,7 +203,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     // (Not where it has only just begun.)
     const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
-    const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~BLIND(&s) & ~at_ball(&s);
+    const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~s.blind & ~at_ball(&s);
     real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
 #if POINTS > 1
     // Points begin near the solid: their first look may be the last.
@@ -219,7 +211,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     slope = pick(is_point & outside & ~knew, march_first_slope(m, &s, settings), slope);
 #endif
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
-    m->slope = pick(BLIND(&s), R(0.0), pick(at_ball(&s), SLOPE_AT_FIRST, m->slope));
+    m->slope = pick(s.blind, R(0.0), pick(at_ball(&s), SLOPE_AT_FIRST, m->slope));
     const mask passed = march_passed(m, &s, outside, inside, goal);
     march_keep(m, &s, outside, passed, inside, settings);
 

@@ -6,7 +6,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "rays.h"
 #include "march_state.h"
 #include "passed.h"

@@ -34,10 +34,8 @@ typedef struct {
     clearance here;
     real radius, near, cone;   // how far is free; how near the surface may be, see `clearance`
     mask restless;             // the distance has just grown, near the solid: it may be too large
-#if HOLLOWS
-    mask blind;   // nobody knows how far the solid is ...
-    real sure;    // ... but for what is free at least; else the radius
-#endif
+    mask blind;                // in a hollow nobody knows how far the solid is ...
+    real sure;                 // ... but for what is free at least; else the radius
 #if !HAS_DERIVATIVE
     surface_point surface;
 #endif
@@ -45,20 +43,11 @@ typedef struct {
 
 // Part of a distance that is safe to go.
 INLINE real step_scale_of(clearance here, __constant const struct March *settings) {
-#if SOLIDS > 1
-    return here.scale;
-#else
-    return (real)(settings->step_scale);
-#endif
+    return JOINED ? here.scale : (real)(settings->step_scale);
 }
 
-#if HOLLOWS
-#define SURE(s) ((s)->sure)
-#define BLIND(s) ((s)->blind)
-#else
-#define SURE(s) ((s)->radius)
-#define BLIND(s) less(R(1.0), R(0.0))
-#endif
+// What is cut out leaves hollows.
+#define HOLLOWS (JOINED && settings->hollows)
 
 // Where a ray may go so far only because of the ball around a formula: there it is not near a surface, however narrow the step.
 INLINE mask at_ball(const sight *s) { return less(s->radius, s->near); }

@@ -5,19 +5,10 @@
 
 // A node whose image, of radius r, comes near 0 in z: there a map of a degree above 1 has hardly any slope, as its middle
 // tells, but it has elsewhere in the node, and the distance would be too large.
-INLINE mask doubtful(real square, real radius_square) {
-#if LOGARITHMIC
+INLINE mask doubtful(real square, real radius_square, __constant const struct Orbit *orbit) {
+    if (!LOGARITHMIC) return less(R(1.0), R(0.0));
     return less(R(0.25) * square, radius_square) & less(square, R(4.0));
-#else
-    return less(R(1.0), R(0.0));
-#endif
 }
-
-#if HAS_SHAPE
-INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    return orbit_distance(point, equal(R(0.0), R(0.0)), orbit, k).step;
-}
-#else
 
 #if STATE_SIZE == 4
 #define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b + z.s3.a * z.s3.b)
@@ -25,9 +16,10 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
 #define STATE_DOT(a, b) (z.s0.a * z.s0.b + z.s1.a * z.s1.b + z.s2.a * z.s2.b)
 #endif
 
-// The distance as `orbit_distance` finds it, but the growth is that in any direction. The growth of |z| alone may vanish by
+// The distance as `formula_distance` finds it, but the growth is that in any direction. The growth of |z| alone may vanish by
 // chance: a ray that steps too far is told so by its next step, a node by nothing.
-INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real formula_node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (HAS_SHAPE) return formula_distance(point, equal(R(0.0), R(0.0)), orbit, k).step;
 #if HAS_DERIVATIVE
     state c, z;
     start(point, k, &c, &z);
@@ -44,9 +36,9 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
         if (n % ORBIT_LOOK == ORBIT_LOOK - 1 && orbit_cancelled(orbit)) break;
         if (n == orbit->iterations) near |= alive & settled(square, orbit);
 #if HAS_DERIVATIVE
-        near |= alive & doubtful(square, (reach * growth) * (reach * growth));
+        near |= alive & doubtful(square, (reach * growth) * (reach * growth), orbit);
 #else
-        near |= alive & doubtful(square, reach * reach * (STATE_DOT(dx, dx) + STATE_DOT(dy, dy) + STATE_DOT(dz, dz)));
+        near |= alive & doubtful(square, reach * reach * (STATE_DOT(dx, dx) + STATE_DOT(dy, dy) + STATE_DOT(dz, dz)), orbit);
 #endif
         alive &= ~near;
         if (!any_lane(alive)) break;
@@ -75,9 +67,7 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
     const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
     return pick(near, R(0.0), distance);
 }
-#endif
 
-#if LOGARITHMIC && !HAS_SHAPE
 #define CORNERS 8
 // One lane keeps its corners in registers, whose places the compiler has to know. Those of packets do not fit there.
 #if LANES == 1
@@ -104,8 +94,9 @@ INLINE real bend_square(state a, state b, state middle) {
 // A node is inside as a whole if, after every application, its image in z is near to a parallelepiped, as its corners and its
 // middle tell, and twice its size around the middle's is within the bailout. Where the dynamics contract, that image shrinks;
 // at the edge of a region of contraction it bends (for analytic maps by r/d, d the distance to the edge: Koebe's theorem).
-INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
+INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
                         __constant const scalar *k) {
+    if (!LOGARITHMIC || HAS_SHAPE) return candidates & ~candidates;
     state c[CORNERS + 1], z[CORNERS + 1];
     UNROLLED_ALONE
     for (int i = 0; i < TURNS(CORNERS); ++i) {
@@ -133,9 +124,71 @@ INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant c
     }
     return alive;
 }
-#else
+
+// How far a place is at least from one solid; below 0 how deep it is at least in a simple one. Distances of formulas are made
+// for the inside of their balls.
+INLINE real one_distance(vec point, real reach, __constant const struct Orbit *o, __constant const scalar *k) {
+    const vec own = solid_own(o, point);
+    if (o->kind != SOLID_FORMULA) {
+        solid_found found;
+        solid_simple(o, own, &found);
+        return found.far;
+    }
+    const vec arm = vec_sub(point, vec_splat(o->ball));
+    const real beyond = sqrt(vec_dot(arm, arm)) - (R(1.0) + SOLID_NEAR) * (real)(o->ball_radius);
+    const mask within = less_equal(beyond, R(0.0));
+    if (!any_lane(within)) return beyond;
+    const real scale = (real)(o->scale / o->step_scale);
+    const real found = formula_node_distance(own, reach / scale, o, k + o->first);
+    return pick(within, found * scale * (real)(fmin(o->step_scale, S(1.0))), beyond);
+}
+
+INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (!JOINED) return formula_node_distance(point, reach, orbit, k);
+    real all = one_distance(point, reach, orbit, k);
+    for (int i = 1; i < orbit->solids; ++i) {
+        __constant const struct Orbit *o = orbit + i;
+        const real more = one_distance(point, reach, o, k);
+        if (o->join == JOIN_CUT) all = fmax(all, -more);
+        else if (o->join == JOIN_INTERSECTION) all = fmax(all, more);
+        // What flows together grows by a quarter of the width, in distances that may be half of the true ones.
+        else all = fmin(all, more) - (o->join == JOIN_SMOOTH ? (real)(o->smoothness) : R(0.0));
+    }
+    return all;
+}
+
+// Which nodes lie in one solid as a whole; `outside`: which beside it, of what is cut out.
+INLINE mask one_holds(vec middle, vec half_side, mask candidates, mask *outside, __constant const struct Orbit *o,
+                      __constant const scalar *k) {
+    const vec own = solid_own(o, middle);
+    const real reach = sqrt(vec_dot(half_side, half_side));
+    if (o->kind != SOLID_FORMULA) {
+        solid_found found;
+        solid_simple(o, own, &found);
+        *outside = less(reach, found.far);
+        return candidates & less(found.far, -reach);
+    }
+    // The box along the formula's own axes around the node.
+    const vec x = vec_splat(o->own_x), y = vec_splat(o->own_y), z = vec_splat(o->own_z);
+#define HALF_ALONG(a) (fabs(a.x) * half_side.x + fabs(a.y) * half_side.y + fabs(a.z) * half_side.z)
+    const vec own_half = vec_of(HALF_ALONG(x), HALF_ALONG(y), HALF_ALONG(z));
+    const vec arm = vec_sub(middle, vec_splat(o->ball));
+    mask held = candidates & less(sqrt(vec_dot(arm, arm)) + reach, (real)(o->ball_radius));
+    *outside = candidates & ~candidates;
+    if (o->join == JOIN_CUT) *outside = candidates & less(reach, one_distance(middle, reach, o, k));
+    return any_lane(held) ? formula_node_inside(own, own_half, held, o, k + o->first) : held;
+}
+
 INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
                         __constant const scalar *k) {
-    return candidates & ~candidates;
+    if (!JOINED) return formula_node_inside(middle, half_side, candidates, orbit, k);
+    mask beside, all = one_holds(middle, half_side, candidates, &beside, orbit, k);
+    for (int i = 1; i < orbit->solids; ++i) {
+        const int join = orbit[i].join;
+        const mask more = one_holds(middle, half_side, candidates, &beside, orbit + i, k);
+        if (join == JOIN_CUT) all &= beside;
+        else if (join == JOIN_INTERSECTION) all &= more;
+        else all |= more;
+    }
+    return all;
 }
-#endif

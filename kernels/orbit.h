@@ -2,7 +2,8 @@
 //
 // From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
 // LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, apply,
-// apply_derivative, dual_start, dual_apply, state_pick, dual_state_pick, state_values, state_square, solid_distance.
+// apply_derivative, dual_start, dual_apply, state_pick, dual_state_pick, state_square, solid_distance. Of several formulas they are
+// of the one whose constants are given, and what these do not have in common is read from its `orbit`.
 //
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
@@ -17,17 +18,17 @@
 // level set of G at L = log(bailout) / degree^iterations. The map of a half plane that bends space most, w -> w^2, has the
 // distance (G^2 - L^2) / (2 G |grad G|). Far outside the distance is at most (1 - exp(-G)) / |grad G|, that of a ball.
 INLINE real distance_from_growth(real square, real relative, real count, __constant const struct Orbit *orbit) {
-#if LOGARITHMIC
-    const real height = R(0.34657359028) * quick_log2(square);  // half of log 2
-    const real counts_left = (real)((scalar)orbit->iterations) - count;
-    const real level = (real)(orbit->log_bailout) * quick_exp2(-counts_left * (real)(orbit->log2_degree)) / height;
-    const real far = height * quick_exp2(-count * (real)(orbit->log2_degree));
-    const real share = (R(1.0) - level * level) / (R(1.0) + far * (R(0.5) + R(0.0833333333) * far));
-    const real distance = R(0.5) * height * relative * share;
-#else
-    const real radius = sqrt(square);
-    const real distance = (R(1.0) - (real)(orbit->solid_radius) / radius) * relative;
-#endif
+    real distance;
+    if (LOGARITHMIC) {
+        const real height = R(0.34657359028) * quick_log2(square);  // half of log 2
+        const real counts_left = (real)((scalar)orbit->iterations) - count;
+        const real level = (real)(orbit->log_bailout) * quick_exp2(-counts_left * (real)(orbit->log2_degree)) / height;
+        const real far = height * quick_exp2(-count * (real)(orbit->log2_degree));
+        const real share = (R(1.0) - level * level) / (R(1.0) + far * (R(0.5) + R(0.0833333333) * far));
+        distance = R(0.5) * height * relative * share;
+    } else {
+        distance = (R(1.0) - (real)(orbit->solid_radius) / sqrt(square)) * relative;
+    }
     // An overflow of the derivative means that the surface is nearer than the number type can resolve.
     return fmax(pick(is_nan(distance), R(0.0), distance), R(0.0));
 }
@@ -51,7 +52,7 @@ INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, 
 }
 
 // Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
-INLINE orbit_counted orbit_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE orbit_counted formula_escape_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
@@ -75,7 +76,7 @@ INLINE orbit_counted orbit_count(vec point, mask active, __constant const struct
 
 // Which points belong to the solid of `limit` applications: the inside of the distances below, without the distance. The
 // solids of fewer applications hold those of more (but for an orbit that comes back from beyond the distance bailout).
-INLINE orbit_end orbit_solid(vec point, mask active, int limit, __constant const struct Orbit *orbit,
+INLINE orbit_end formula_end(vec point, mask active, int limit, __constant const struct Orbit *orbit,
                              __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
@@ -94,17 +95,13 @@ INLINE orbit_end orbit_solid(vec point, mask active, int limit, __constant const
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
-#if HAS_SHAPE
-    alive = active & less_equal(solid_distance(z, k), R(0.0));
-#else
-    alive &= settled(square, orbit);
-#endif
+    alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & settled(square, orbit);
     const orbit_end result = {count, alive};
     return result;
 }
 
-INLINE mask orbit_inside(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    return orbit_solid(point, active, limit, orbit, k).inside;
+INLINE mask formula_inside(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    return formula_end(point, active, limit, orbit, k).inside;
 }
 
 #if HAS_DERIVATIVE
@@ -139,19 +136,20 @@ INLINE void scalar_orbit_apply(scalar_orbit *o, int n, __constant const struct O
 INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     mask inside = o->inside;
     if (orbit->longest <= orbit->iterations) inside |= o->alive & settled(o->square, orbit);
-#if HAS_SHAPE
-    const real solid = solid_distance(o->z, k);
-    const real distance = fmax(solid / o->growth, R(0.0));
-    inside = active & less_equal(solid, R(0.0));
-#else
-    const real distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
-#endif
+    real distance;
+    if (HAS_SHAPE) {
+        const real solid = solid_distance(o->z, k);
+        distance = fmax(solid / o->growth, R(0.0));
+        inside = active & less_equal(solid, R(0.0));
+    } else {
+        distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
+    }
     const real step = pick(inside, R(0.0), distance);
     const clearance result = {step, {o->count, inside}, step};
     return result;
 }
 
-INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
+INLINE clearance formula_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
                                        __constant const scalar *k) {
     scalar_orbit o;
     scalar_orbit_begin(&o, point, active, orbit, k);
@@ -165,7 +163,7 @@ INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const 
 
 // The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
 // on the other packet's meanwhile.
-INLINE void orbit_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
+INLINE void formula_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
                                    __constant const scalar *k) {
     scalar_orbit a, b;
     scalar_orbit_begin(&a, points[0], active[0], orbit, k);
@@ -190,7 +188,7 @@ INLINE void orbit_scalar_distances(const vec *points, const mask *active, cleara
 // The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
 // a place beside it may be some applications farther. By them space is stretched once more, and where it is stretched unevenly their level
 // sets face elsewhere. So no gradient `of` the surface is that of a z after `gradient_limit`.
-INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
+INLINE clearance formula_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
                                      __constant const scalar *k, surface_point *surface) {
     dual_state c, z;
     dual_start(point, k, &c, &z);
@@ -217,20 +215,21 @@ INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant 
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
     if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
-#if HAS_SHAPE
-    // The last solid's distance in z, over how fast it changes per scene unit.
-    const dual solid = dual_solid_distance(z, k);
-    surface->gradient = vec_of(solid.dx, solid.dy, solid.dz);
-    const real solid_growth = vec_dot(surface->gradient, surface->gradient);
-    const real distance = fmax(solid.v * pick(less(R(0.0), solid_growth), R(1.0) / sqrt(solid_growth), R(0.0)), R(0.0));
-    inside = active & less_equal(solid.v, R(0.0));
-#else
-    // J^T z / |z|^2: dividing by |z|^2 first keeps the squares within range.
-    const vec relative = dual_state_gradient(z, R(1.0) / square);
-    const real relative_square = vec_dot(relative, relative);
-    surface->gradient = vec_pick(left, at_limit, relative);
-    const real distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
-#endif
+    real distance;
+    if (HAS_SHAPE) {
+        // The last solid's distance in z, over how fast it changes per scene unit.
+        const dual solid = dual_solid_distance(z, k);
+        surface->gradient = vec_of(solid.dx, solid.dy, solid.dz);
+        const real solid_growth = vec_dot(surface->gradient, surface->gradient);
+        distance = fmax(solid.v * pick(less(R(0.0), solid_growth), R(1.0) / sqrt(solid_growth), R(0.0)), R(0.0));
+        inside = active & less_equal(solid.v, R(0.0));
+    } else {
+        // J^T z / |z|^2: dividing by |z|^2 first keeps the squares within range.
+        const vec relative = dual_state_gradient(z, R(1.0) / square);
+        const real relative_square = vec_dot(relative, relative);
+        surface->gradient = vec_pick(left, at_limit, relative);
+        distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
+    }
     surface->square = square;
     surface->square_before = square_before;
     const real step = pick(inside, R(0.0), distance);
@@ -240,32 +239,27 @@ INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant 
 
 // Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
 // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
-INLINE real smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real formula_smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
     const real log_radius = (real)(orbit->log_distance_bailout);
-#if LOGARITHMIC
-    const real over = log2(R(0.5) * log(fmax(surface.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
-#else
-    const real over = (R(0.5) * log(surface.square) - log_radius) / (R(0.5) * log(surface.square / surface.square_before));
-#endif
+    real over;
+    if (LOGARITHMIC) over = log2(R(0.5) * log(fmax(surface.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
+    else over = (R(0.5) * log(surface.square) - log_radius) / (R(0.5) * log(surface.square / surface.square_before));
     const real smooth = end.count - pick(is_nan(over), R(0.0), clamp(over, R(0.0), R(1.0)));
     return pick(end.inside, (real)((scalar)orbit->iterations), smooth);
 }
 
 // The potential G = log|z_n| / degree^n, which falls towards the solid. Linear maps have none: 0, as near as can be.
-INLINE real potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
-#if LOGARITHMIC
+INLINE real formula_potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+    if (!LOGARITHMIC) return R(0.0);
     return R(0.34657359028) * quick_log2(surface.square) * exp2(-end.count * (real)(orbit->log2_degree));
-#else
-    return R(0.0);
-#endif
 }
 
 // The distance used for marching: the cheapest that the formula offers.
-INLINE clearance orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance formula_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
 #if HAS_DERIVATIVE
-    return orbit_scalar_distance(point, active, orbit, k);
+    return formula_scalar_distance(point, active, orbit, k);
 #else
     surface_point ignored;
-    return orbit_dual_distance(point, active, OF_DISTANCE, orbit, k, &ignored);
+    return formula_dual_distance(point, active, OF_DISTANCE, orbit, k, &ignored);
 #endif
 }

@@ -1,10 +1,6 @@
-// What is found out about orbits, whichever formula they are of.
+// What is found out about orbits, whichever formula they are of. With JOINED, of the generated text, several solids are asked as one
+// (solids.h); else a formula by itself, of which nothing is known that is told of the nearest of several.
 #include "numbers/quick.h"
-#ifndef SOLIDS
-#define SOLIDS 1  // solids that are joined, see solids.h
-#define JOINS_SMOOTHLY 0
-#define HOLLOWS 0
-#endif
 
 // How an orbit ended.
 typedef struct {
@@ -23,21 +19,14 @@ typedef struct {
     real step;  // distance that is safe to go, in scene units; 0 inside
     orbit_end end;
     real near;  // how near the surface may be: the same, or more where only the ball around a formula is known
-#if SOLIDS > 1
-    real scale; // of several solids: the step scale of the nearest one
-#endif
-#if HOLLOWS
+    // Of several solids:
+    real scale; // the step scale of the nearest one
     real most;  // where a formula was cut out the distance is not known: it is `step` at least, and this at most
-#endif
 } clearance;
 
 // Where a distance is not known.
 INLINE mask is_blind(clearance here) {
-#if HOLLOWS
-    return less(here.step, here.most);
-#else
-    return less(R(1.0), R(0.0));
-#endif
+    return JOINED ? less(here.step, here.most) : less(R(1.0), R(0.0));
 }
 
 // What is known of a point on the surface, from one orbit over dual numbers.
@@ -45,15 +34,12 @@ typedef struct {
     vec gradient;        // of the distance or the surface, not normalised: points away from the solid
     real square;         // the last |z|^2 ...
     real square_before;  // ... and the one before it
-#if SOLIDS > 1
-    real count;          // of several solids: the count of the nearest one ...
+    // Of several solids:
+    real count;          // the count of the nearest one ...
     real of;             // ... its number ...
-    real solid;           // ... and that of what the surface belongs to: the same, or what has cut it
-#endif
-#if JOINS_SMOOTHLY
-    real share;           // where two solids flow together: the other one's part of the colour ...
+    real solid;          // ... and that of what the surface belongs to: the same, or what has cut it
+    real share;          // where two solids flow together: the other one's part of the colour ...
     real other_square, other_square_before, other_count, other_of, other_solid;  // ... and the same of that one
-#endif
 } surface_point;
 
 // Whose gradient is asked for: the distance's, of the last z; or that of the surface which is shown.

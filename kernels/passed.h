@@ -57,14 +57,8 @@ INLINE real march_slope(const march *m, const sight *s, int goal, __constant con
     return pick(seeks_sheets(m, goal) & less(facing, R(0.0)), fmin(m->slope, here), m->slope);
 }
 
-// The slope where none has been measured yet; a distance of degree 1 is the true one.
-#if SOLIDS > 1 || LOGARITHMIC
-#define FIRST_SLOPE FACING_SLOPE
-#else
-#define FIRST_SLOPE R(1.0)
-#endif
-
+// The slope where none has been measured yet.
 INLINE real march_first_slope(const march *m, const sight *s, __constant const struct March *settings) {
-    return FIRST_SLOPE * step_scale_of(s->here, settings) * ray_facing(m, s);
+    return (real)(settings->first_slope) * step_scale_of(s->here, settings) * ray_facing(m, s);
 }
 #endif

@@ -5,7 +5,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 
 // Points are stored as all x, then all y, then all z, each `stride` numbers long; `stride` is a multiple of LANES.
 INLINE vec load_point(__global const scalar *points, int stride, int first) {
@@ -34,17 +34,15 @@ INLINE void store_whole(__global int *result, int first, mask value) {
     for (int lane = 0; lane < LANES; ++lane) result[first + lane] = each[lane];
 }
 
-// result: escape counts, then 1 for points that never escaped.
+// Of a formula by itself. result: escape counts, then 1 for points that never escaped.
 __kernel void escape_counts(__global const scalar *points, __global int *result, int stride,
                             __constant const struct Orbit *orbit, __constant const scalar *k) {
     if (orbit_cancelled(orbit)) return;
     const int first = (int)get_global_id(0) * LANES;
     const vec point = load_point(points, stride, first);
-#if SOLIDS == 1
-    const orbit_counted end = orbit_count(point, equal(R(0.0), R(0.0)), orbit, k);
+    const orbit_counted end = formula_escape_count(point, equal(R(0.0), R(0.0)), orbit, k);
     store_whole(result, first, end.count);
     store_whole(result, stride + first, -end.inside);
-#endif
 }
 
 // result: the marching distance, the Jacobian's distance, the Jacobian's gradient x, y, z (length 1; inside it is that of |z|
@@ -66,7 +64,5 @@ __kernel void distances(__global const scalar *points, __global scalar *result, 
     store_plane(result, 4 * stride + first, normal.z);
     store_plane(result, 5 * stride + first, smooth_count(full.end, surface, orbit));
     store_plane(result, 6 * stride + first, pick(full.end.inside, R(1.0), R(0.0)));
-#if SOLIDS > 1
-    store_plane(result, 7 * stride + first, surface.solid);
-#endif
+    if (JOINED) store_plane(result, 7 * stride + first, surface.solid);
 }

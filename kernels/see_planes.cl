@@ -5,7 +5,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "camera.h"
 #include "sampling.h"
 #include "shade.h"

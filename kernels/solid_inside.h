@@ -12,17 +12,12 @@ INLINE real apart_square(state z, state past) {
     return state_square(apart);
 }
 
-// Which points belong to the solid: as `orbit_inside` at the iteration limit, in fewer operations. An orbit that comes back to
+// Which points belong to the solid: as `formula_inside` at the iteration limit, in fewer operations. An orbit that comes back to
 // the very same z never escapes (Brent 1980, "An improved Monte Carlo factorization algorithm", sec. 2: compare with a z that is
 // renewed at powers of two). Packets are tested every few applications, and lanes that escaped continue without effect. One
 // lane ends at once, and has neither arrays nor loops of a constant count (see TURNS in lanes.h).
-#if HAS_SHAPE
-INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    const mask all_lanes = equal(R(0.0), R(0.0));
-    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = orbit_inside(points[p], all_lanes, orbit->iterations, orbit, k);
-}
-#elif LANES == 1
-INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+#if LANES == 1
+INLINE void orbits_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const real farthest = orbit->distance_square;
     const int limit = orbit->iterations;
     state c, z;
@@ -39,19 +34,18 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
         if (n + 1 < look) continue;
         look += CHUNK;
         if ((++looks & 1023) == 0 && orbit_cancelled(orbit)) break;
-#if LOGARITHMIC
+        if (!LOGARITHMIC) continue;
         if (comparable && equal(apart_square(z, past), R(0.0)) && settled(square, orbit)) break;
         if (looks == renewed) {
             past = z;
             renewed *= 2;
             comparable = n + 1 >= REPEATS_FROM;
         }
-#endif
     }
     inside[0] = alive & settled(square, orbit);
 }
 #else
-INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void orbits_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
     const mask all_lanes = equal(R(0.0), R(0.0));
     const real farthest = (real)(orbit->distance_square);
     const int limit = orbit->iterations;
@@ -86,12 +80,10 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
         ++chunks;
         #pragma unroll
         for (int p = 0; p < TURNS(PACKETS); ++p) {
-#if LOGARITHMIC
-            if (comparable) {
+            if (LOGARITHMIC && comparable) {
                 periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & settled(square[p], orbit);
             }
-            if (chunks == renewed) past[p] = z[p];
-#endif
+            if (LOGARITHMIC && chunks == renewed) past[p] = z[p];
             open |= alive[p] & ~periodic[p];
         }
         if (chunks == renewed) {
@@ -113,3 +105,63 @@ INLINE void solid_inside(const vec *points, mask *inside, __constant const struc
     for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = periodic[p] | (alive[p] & settled(square[p], orbit));
 }
 #endif
+
+INLINE void formula_all_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (!HAS_SHAPE) {
+        orbits_inside(points, inside, orbit, k);
+        return;
+    }
+    const mask all_lanes = equal(R(0.0), R(0.0));
+    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = formula_inside(points[p], all_lanes, orbit->iterations, orbit, k);
+}
+
+// As `solids_inside`: a formula is asked only where its ball is near.
+INLINE void one_inside(const vec *points, mask *inside, __constant const struct Orbit *o, __constant const scalar *k) {
+    vec own[PACKETS];
+    for (int p = 0; p < TURNS(PACKETS); ++p) own[p] = solid_own(o, points[p]);
+    if (o->kind != SOLID_FORMULA) {
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
+            solid_found found;
+            solid_simple(o, own[p], &found);
+            inside[p] = found.inside;
+        }
+        return;
+    }
+    const real radius = (R(1.0) + SOLID_NEAR) * (real)(o->ball_radius);
+    mask near[PACKETS], any_near = less(R(1.0), R(0.0));
+    for (int p = 0; p < TURNS(PACKETS); ++p) {
+        const vec arm = vec_sub(points[p], vec_splat(o->ball));
+        near[p] = less(vec_dot(arm, arm), radius * radius);
+        inside[p] = less(R(1.0), R(0.0));
+        any_near |= near[p];
+    }
+    if (!any_lane(any_near)) return;
+    formula_all_inside(own, inside, o, k + o->first);
+    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] &= near[p];
+}
+
+INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (!JOINED) {
+        formula_all_inside(points, inside, orbit, k);
+        return;
+    }
+    if (orbit->flows) {
+        // Only their distances tell what is inside.
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
+            surface_point ignored;
+            inside[p] = solids_distance(points + p, equal(R(0.0), R(0.0)), ASK_STEP, orbit, k, &ignored).end.inside;
+        }
+        return;
+    }
+    one_inside(points, inside, orbit, k);
+    for (int i = 1; i < orbit->solids; ++i) {
+        mask more[PACKETS];
+        one_inside(points, more, orbit + i, k);
+        const int join = orbit[i].join;
+        for (int p = 0; p < TURNS(PACKETS); ++p) {
+            if (join == JOIN_CUT) inside[p] &= ~more[p];
+            else if (join == JOIN_INTERSECTION) inside[p] &= more[p];
+            else inside[p] |= more[p];
+        }
+    }
+}

@@ -1,4 +1,4 @@
-// How solids are joined: one more to all before it. From the build: JOINS_SMOOTHLY; HOLLOWS, whether a formula is cut out.
+// How solids are joined: one more to all before it. 
 //
 // A cut is the larger of the one distance and of the other's negative, an intersection the larger of both (Hart 1996, "Sphere
 // tracing").
@@ -11,7 +11,6 @@ INLINE surface_point surface_pick(mask m, surface_point yes, surface_point no) {
     return s;
 }
 
-#if JOINS_SMOOTHLY
 // What is known of a surface as that of the other one.
 INLINE void surface_beside(surface_point *surface, surface_point other) {
     surface->other_square = other.square;
@@ -47,9 +46,7 @@ INLINE surface_point surface_flowing(surface_point all, surface_point more, mask
     found.share = pick(stays, all.share, pick(closer, first, of_more) / (first + of_more));
     return found;
 }
-#endif
 
-#if HOLLOWS
 // In a hollow what is joined to it later counts as the nearest this near: a part of the radius of its ball.
 #define HOLLOW_NEAR R(0.1)
 
@@ -68,26 +65,19 @@ INLINE void solid_hollow(solid_found *all, solid_found more) {
     all->apart = all->far;
     all->inside &= ~more.inside;
 }
-#endif
 
 // How near a solid has to be so that its surface is the nearest, not those before it.
 INLINE real nearest_before(__constant const struct Orbit *o, const solid_found *all) {
-#if HOLLOWS
     const scalar size = o->kind == SOLID_FORMULA ? o->ball_radius : fmax(fmax(o->sides[0], o->sides[1]), o->sides[2]);
     return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->apart);
-#else
-    return all->apart;
-#endif
 }
 
 // Joins one more solid to those before it. `rounding`: what a place is not known better than.
 INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid_found more, real rounding) {
-#if HOLLOWS
     if (o->join == JOIN_CUT && o->kind == SOLID_FORMULA) {
         solid_hollow(all, more);
         return;
     }
-#endif
     if (o->join == JOIN_CUT) {
         more.far = more.near = more.apart = -more.far;
         more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
@@ -102,12 +92,10 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
             more.surface.square_before = all->surface.square_before;
             more.surface.count = all->surface.count;
             more.surface.of = all->surface.of;
-#if JOINS_SMOOTHLY
             // It has a colour of its own, but the counts of both that flow together there.
             more.surface.share = all->surface.share;
             surface_beside(&more.surface, surface_of_other(all->surface));
             more.surface.other_solid = more.surface.solid;
-#endif
         }
         all->surface = surface_pick(counts, more.surface, all->surface);
         all->scale = pick(counts, more.scale, all->scale);
@@ -119,16 +107,12 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         return;
     }
     const mask nearer = less(more.apart, nearest_before(o, all));
-#if JOINS_SMOOTHLY
     if (o->join == JOIN_SMOOTH) {
         // The smooth minimum of Quilez, of distances as they are: between both, a quarter of the width is added at most.
         const real width = (real)(o->smoothness), a = all->far / all->scale, b = more.far / more.scale;
         const real share = fmax(width - fabs(a - b), R(0.0)) / width;
         const mask closer = less(b, a);
-        mask flows = less(R(0.0), share);
-#if HOLLOWS
-        flows &= ~in_hollow(*all);
-#endif
+        const mask flows = less(R(0.0), share) & ~in_hollow(*all);
         const real others = R(0.5) * share, of_more = pick(closer, R(1.0) - others, others);
         const vec gradient = vec_along(vec_scale(all->surface.gradient, R(1.0) - of_more), of_more, more.surface.gradient);
         const real lower = fmin(a, b) - R(0.25) * width * share * share, scale = fmin(all->scale, more.scale);
@@ -143,7 +127,6 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));
         return;
     }
-#endif
     all->surface = surface_pick(nearer, more.surface, all->surface);
     all->scale = pick(nearer, more.scale, all->scale);
     all->far = fmin(all->far, more.far);

@@ -1,8 +1,6 @@
-// Several solids as one: formulas that have places of their own, and simple solids, joined one after the other. What looks for a
-// surface, or asks how an orbit goes, asks this as it asks the functions of one formula (orbit.h).
-//
-// From the generated text: SOLIDS, the number of solids, the first of which is the scene's own formula; EACH_TEXT(DO), which does
-// something for the number of each text of a formula (`orbit_dual_distance_0` and so on).
+// What looks for a surface, or asks how an orbit goes, asks this: a formula by itself (orbit.h), or with JOINED several solids as one,
+// which are a list: formulas that have places of their own, and simple solids, joined one after the other. The first is the scene's own
+// formula.
 //
 // Distances here are those that rays may go: of formulas with their step scale. They are 0 inside, and below 0 in simple solids.
 
@@ -17,10 +15,10 @@
 #define ASK_SURFACE 2
 #define ASK_ESTIMATE 3
 #define ASK_BEHIND 4
-#define ASKS_SURFACE(asks) (asks == ASK_SURFACE || (HOLLOWS && asks == ASK_BEHIND))
+#define ASKS_SURFACE(asks) (asks == ASK_SURFACE || asks == ASK_BEHIND)
 #define ASKS_GRADIENT(asks) (asks == ASK_GRADIENT || ASKS_SURFACE(asks))
-#define ASKS_FAR(asks) (asks == ASK_ESTIMATE || JOINS_SMOOTHLY)  // what flows together must not flow to the ball
 
+#include "orbit.h"
 #include "memory.h"
 #include "simple_solids.h"
 #include "solid_joins.h"
@@ -28,15 +26,7 @@
 // One solid. With a gradient wanted the Jacobian's distance; else the formula's own, which is asked in the lanes that are near.
 INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask active, int asks, real *cost,
                            __constant const scalar *k) {
-    solid_found found;
-    const real none = R(0.0);
-    found.surface.square = found.surface.square_before = found.surface.count = none;
-    found.surface.of = found.surface.solid = none;
-#if JOINS_SMOOTHLY
-    found.surface.share = none;
-    surface_beside(&found.surface, found.surface);
-#endif
-    found.surface.gradient = vec_of(none, none, none);
+    solid_found found = {R(0.0)};
     const vec own = solid_own(o, point);
     if (o->kind != SOLID_FORMULA) {
         solid_simple(o, own, &found);
@@ -50,24 +40,16 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     found.inside = active & ~active;
     found.surface.gradient = vec_normalize(arm);
     const mask beside = active & less(found.far, (real)(o->reach));
-    const mask within = ASKS_FAR(asks) ? beside : active & less(found.far, SOLID_NEAR * (real)(o->ball_radius));
+    // What flows together must not flow to the ball.
+    const mask within = asks == ASK_ESTIMATE || o->flows ? beside : active & less(found.far, SOLID_NEAR * (real)(o->ball_radius));
     const mask near = asks == ASK_STEP ? within : beside;
     if (!any_lane(near)) return found;
     clearance here = {R(0.0), {R(0.0), near}, R(0.0)};
     surface_point there = found.surface;
     const int of = ASKS_SURFACE(asks) ? OF_SURFACE : OF_DISTANCE;
     k += o->first;
-#if HAS_DERIVATIVE
-#define ASK_TEXT(i)                                                                                        \
-    case i:                                                                                                \
-        if (ASKS_GRADIENT(asks)) here = orbit_dual_distance_##i(own, near, of, o, k, &there);              \
-        else here = orbit_scalar_distance_##i(own, near, o, k);                                            \
-        break;
-#else
-#define ASK_TEXT(i)                                                                                        \
-    case i: here = orbit_dual_distance_##i(own, near, of, o, k, &there); break;
-#endif
-    switch (o->text) { EACH_TEXT(ASK_TEXT) }
+    if (HAS_DERIVATIVE && !ASKS_GRADIENT(asks)) here = formula_distance(own, near, o, k);
+    else here = formula_dual_distance(own, near, of, o, k, &there);
     // (Outside the ball an estimate may be much too large.)
     const real most = pick(less(R(0.0), found.far), found.apart, (real)(REAL_LARGEST));
     const real estimate = fmin(here.step * (real)(o->scale), most);
@@ -76,19 +58,17 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
     found.near = pick(within, estimate, found.near);
     found.inside = within & here.end.inside;
     found.surface.count = here.end.count;
-    *cost += pick(near, here.end.count, none);
+    *cost += pick(near, here.end.count, R(0.0));
     if (HAS_DERIVATIVE && !ASKS_GRADIENT(asks)) return found;
     // Where the ball cuts the set, the surface is the ball's.
     const mask cut = here.end.inside & ~within;
     found.surface.gradient = vec_pick(near & ~cut, solid_turned(o, there.gradient), found.surface.gradient);
-#if HOLLOWS
     if (asks == ASK_BEHIND) {
         // No wall is as deep in a set as this, and no gradient counts there.
         found.far = pick(found.inside, -(real)(REAL_LARGEST), found.far);
         found.near = found.apart = found.far;
-        found.surface.gradient = vec_pick(found.inside, vec_of(none, none, none), found.surface.gradient);
+        found.surface.gradient = vec_pick(found.inside, vec_of(R(0.0), R(0.0), R(0.0)), found.surface.gradient);
     }
-#endif
     found.surface.square = there.square;
     found.surface.square_before = there.square_before;
     return found;
@@ -100,7 +80,7 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, __cons
     solid_found all;
     real cost = R(0.0);
     const real rounding = R(8.0) * (real)(REAL_EPSILON) * (fabs(point->x) + fabs(point->y) + fabs(point->z));
-    for (int i = 0; i < SOLIDS; ++i) {
+    for (int i = 0; i < orbit->solids; ++i) {
         __constant const struct Orbit *o = orbit + i;
         solid_found one = solid_ask(o, *point, active, asks, &cost, k);
         one.most = one.far;
@@ -114,45 +94,45 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, __cons
     const mask inside = active & all.inside;
     const real step = pick(inside, R(0.0), fmax(all.far, R(0.0)) / all.scale);
     const real near = pick(inside, R(0.0), fmax(all.near, R(0.0)) / all.scale);
-    clearance result = {step, {cost, inside}, near, all.scale};
-#if HOLLOWS
-    result.most = pick(in_hollow(all), all.most / all.scale, result.step);
-#endif
+    const clearance result = {step, {cost, inside}, near, all.scale, pick(in_hollow(all), all.most / all.scale, step)};
     return result;
 }
 
 INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
                                      __constant const scalar *k, surface_point *surface) {
+    if (!JOINED) return formula_dual_distance(point, active, of, orbit, k, surface);
     return solids_distance(&point, active, of == OF_SURFACE ? ASK_SURFACE : ASK_GRADIENT, orbit, k, surface);
 }
 
 // The estimate, which rays may go within the balls of formulas only; the most that it may be in hollows.
 INLINE clearance orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (!JOINED) return formula_distance(point, active, orbit, k);
     surface_point ignored;
     clearance found = solids_distance(&point, active, ASK_ESTIMATE, orbit, k, &ignored);
-#if HOLLOWS
     found.step = found.most;
-#endif
     return found;
 }
 
-#if HOLLOWS
 // Behind the walls of hollows: their gradients and counts. There is no gradient where a place is in another solid, or still in the hollow.
 INLINE clearance orbit_behind(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
                               surface_point *surface) {
     return solids_distance(&point, active, ASK_BEHIND, orbit, k, surface);
 }
-#endif
 
 #if HAS_DERIVATIVE
 INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
                                        __constant const scalar *k) {
+    if (!JOINED) return formula_scalar_distance(point, active, orbit, k);
     surface_point ignored;
     return solids_distance(&point, active, ASK_STEP, orbit, k, &ignored);
 }
 
 INLINE void orbit_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
                                    __constant const scalar *k) {
+    if (!JOINED) {
+        formula_scalar_distances(points, active, found, orbit, k);
+        return;
+    }
     for (int i = 0; i < 2; ++i) found[i] = orbit_scalar_distance(points[i], active[i], orbit, k);
 }
 #endif
@@ -160,14 +140,12 @@ INLINE void orbit_scalar_distances(const vec *points, const mask *active, cleara
 // Which points belong to the solid of `limit` applications, if that is not the scene's own limit; then each has its own.
 CALLED orbit_end solids_inside(const vec *point, mask active, int limit, __constant const struct Orbit *orbit,
                              __constant const scalar *k) {
-#if JOINS_SMOOTHLY
-    if (limit == orbit->iterations) {
+    if (orbit->flows && limit == orbit->iterations) {
         surface_point ignored;
         return solids_distance(point, active, ASK_STEP, orbit, k, &ignored).end;
     }
-#endif
     orbit_end all = {R(0.0), active & ~active};
-    for (int i = 0; i < SOLIDS; ++i) {
+    for (int i = 0; i < orbit->solids; ++i) {
         __constant const struct Orbit *o = orbit + i;
         const vec own = solid_own(o, *point);
         mask inside = all.inside & ~all.inside;
@@ -181,9 +159,7 @@ CALLED orbit_end solids_inside(const vec *point, mask active, int limit, __const
             const mask near = active & less(vec_dot(arm, arm), radius * radius);
             if (any_lane(near)) {
                 const int most = limit == orbit->iterations ? o->iterations : limit;
-                orbit_end end;
-#define SOLID_TEXT(i) case i: end = orbit_solid_##i(own, near, most, o, k + o->first); break;
-                switch (o->text) { EACH_TEXT(SOLID_TEXT) }
+                const orbit_end end = formula_end(own, near, most, o, k + o->first);
                 all.count += pick(near, end.count, R(0.0));
                 inside = near & end.inside;
             }
@@ -197,6 +173,7 @@ CALLED orbit_end solids_inside(const vec *point, mask active, int limit, __const
 
 INLINE orbit_end orbit_solid(vec point, mask active, int limit, __constant const struct Orbit *orbit,
                              __constant const scalar *k) {
+    if (!JOINED) return formula_end(point, active, limit, orbit, k);
     return solids_inside(&point, active, limit, orbit, k);
 }
 
@@ -209,14 +186,11 @@ INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, __co
     real smooth = R(0.0);
     end.count = surface.count;
     *told = end.inside & ~end.inside;
-    for (int i = 0; i < SOLIDS; ++i) {
+    for (int i = 0; i < orbit->solids; ++i) {
         __constant const struct Orbit *o = orbit + i;
         const mask here = equal(surface.of, (real)((scalar)i));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
-        real found;
-#define SMOOTH_TEXT(i) case i: found = smooth_count_##i(end, surface, o); break;
-        switch (o->text) { EACH_TEXT(SMOOTH_TEXT) }
-        smooth = pick(here, found, smooth);
+        smooth = pick(here, formula_smooth_count(end, surface, o), smooth);
         *told |= here;
     }
     return smooth;
@@ -224,31 +198,26 @@ INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, __co
 
 // The smooth escape count of the formula that is nearest; where two flow together, between theirs.
 INLINE real smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+    if (!JOINED) return formula_smooth_count(end, surface, orbit);
     mask told;
     const real own = smooth_of_one(end, surface, &told, orbit);
-#if JOINS_SMOOTHLY
     const mask flows = less(R(0.0), surface.share);
     if (!any_lane(flows)) return own;
     mask other_told;
     const real other = smooth_of_one(end, surface_of_other(surface), &other_told, orbit);
     return shared(own, other, flows & told, flows & other_told, surface.share);
-#else
-    return own;
-#endif
 }
 
 // The potential of the formula that is nearest, as if its ball were as large as the whole scene's; 0 on walls.
 INLINE real potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+    if (!JOINED) return formula_potential(end, surface, orbit);
     real all = R(0.0);
     end.count = surface.count;
-    for (int i = 0; i < SOLIDS; ++i) {
+    for (int i = 0; i < orbit->solids; ++i) {
         __constant const struct Orbit *o = orbit + i;
         const mask here = equal(surface.of, (real)((scalar)i)) & equal(surface.solid, (real)((scalar)o->object));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
-        real found;
-#define POTENTIAL_TEXT(i) case i: found = potential_##i(end, surface, o); break;
-        switch (o->text) { EACH_TEXT(POTENTIAL_TEXT) }
-        all = pick(here, found * (real)(o->potential_share), all);
+        all = pick(here, formula_potential(end, surface, o) * (real)(o->potential_share), all);
     }
     return all;
 }

@@ -14,7 +14,6 @@ INLINE real share_below(vec a, real most, real none) {
     return clamp((none - sqrt(vec_dot(a, a))) / (none - most), R(0.0), R(1.0));
 }
 
-#if HOLLOWS
 #define BEHIND_NEARER R(0.25)   // part of the height behind a wall at which the place is looked for next
 
 // A wall of a hollow is seen from where no distance is known. It has the gradient and the counts of a place behind it, as far as light is
@@ -42,7 +41,6 @@ INLINE void surface_of_walls(ray r, encounter *met, mask walls, __constant const
     }
     *normal = vec_pick(walls, vec_normalize(*normal), *normal);
 }
-#endif
 
 // The surface where a march has ended: how far it is before it, at `touch`, and its normal, which may be that at the hit.
 INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant const struct March *settings,
@@ -127,9 +125,7 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
 #else
     surface_point surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
 #endif
-#if HOLLOWS
-    surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
-#endif
+    if (JOINED) surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
     // No gradient: inside the solid already where the ray begins, or an extremum. What the bounds cut has their normal; else face
     // the viewer.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.end.inside;
@@ -142,13 +138,10 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     const real away = vec_dot(normal, r.direction);
     met->normal = vec_pick(less(R(0.1), away), vec_along(normal, R(-2.0) * away, r.direction), normal);
     met->smooth = smooth_count(there.end, surface, orbit);
-#if SOLIDS > 1
+    if (!JOINED) return;
     met->solid = surface.solid;
-#endif
-#if JOINS_SMOOTHLY
     met->other = surface.other_solid;
     met->part = surface.share;
-#endif
 }
 
 // Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and with POLISH where

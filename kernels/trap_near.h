@@ -10,7 +10,7 @@ INLINE real trap_distance(trap near, state z) {
 
 // How near z comes to a trap after one application or more, the one that leaves the bailout included. An orbit that is
 // outside from the start has only its start.
-INLINE real orbit_near(trap near, vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real formula_near(trap near, vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     const real at_start = trap_distance(near, z);
@@ -24,4 +24,26 @@ INLINE real orbit_near(trap near, vec point, mask active, __constant const struc
         alive &= less_equal(state_square(z), (real)(orbit->bailout_square));
     }
     return pick(less(nearest, (real)(REAL_LARGEST)), nearest, at_start);
+}
+
+// How near the orbit of a point comes to a trap, under the formula that is nearest to the point; where two flow together, between theirs.
+INLINE real orbit_near(trap near, vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (!JOINED) return formula_near(near, point, active, orbit, k);
+    surface_point nearest;
+    solids_distance(&point, active, ASK_ESTIMATE, orbit, k, &nearest);
+    real found = (real)(REAL_LARGEST), other = found;
+    mask told = active & ~active, other_told = told;
+    for (int i = 0; i < orbit->solids; ++i) {
+        __constant const struct Orbit *o = orbit + i;
+        const real number = (real)((scalar)i);
+        const mask here = active & equal(nearest.of, number);
+        const mask beside = active & less(R(0.0), nearest.share) & equal(nearest.other_of, number);
+        if (o->kind != SOLID_FORMULA || !any_lane(here | beside)) continue;
+        const real one = formula_near(near, solid_own(o, point), here | beside, o, k + o->first);
+        found = pick(here, one, found);
+        other = pick(beside, one, other);
+        told |= here;
+        other_told |= beside;
+    }
+    return shared(found, other, told, other_told, nearest.share);
 }

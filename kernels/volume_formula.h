@@ -1,6 +1,6 @@
 // What pictures of grids ask the formula by themselves: planes, and normals where rays meet a surface.
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "escape.h"
 #include "escape_colors.h"
 

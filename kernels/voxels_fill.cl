@@ -5,7 +5,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "voxels.h"
 
 #if FILL_KIND == FILL_ITERATIONS

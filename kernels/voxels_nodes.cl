@@ -6,7 +6,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "voxels.h"
 #include "node_proof.h"
 

@@ -7,7 +7,7 @@
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "solids.h"
 #include "normals.h"
 #include "voxels.h"
 

@@ -14,6 +14,9 @@ from clfractal.formulas.language import Chain
 
 Record = np.ndarray[Any, np.dtype[np.void]]
 
+SOLID_KINDS = {"formula": 0, "plane": 1, "sphere": 2, "box": 3, "cylinder": 4}
+JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
+
 ORBIT = Struct(
     "Orbit",
     [
@@ -34,8 +37,12 @@ ORBIT = Struct(
         # Of one of several solids that are joined (`kernels/solids.h`); else 0.
         Field("kind", "int", 0, "one of SOLID_KINDS"),
         Field("join", "int", 0, "one of JOINS"),
-        Field("text", "int", 0, "of a formula: the number of its text ..."),
-        Field("first", "int", 0, "... and where its constants begin"),
+        Field("solids", "int", 0, "how many there are"),
+        Field("flows", "int", 0, "1: some of them flow together"),
+        Field("first", "int", 0, "of a formula: where its constants begin"),
+        Field("first_count", "int", 0, "FIRST_COUNT of this formula, LOGARITHMIC and HAS_SHAPE"),
+        Field("logarithmic", "int", 0, ""),
+        Field("has_shape", "int", 0, ""),
         Field("object", "int", 0, "the number of the object, from 1; 0: the scene's own formula"),
         Field("middle", "real", 3, "its middle, or a point of a plane, scene units"),
         Field("own_x", "real", 3, "from scene units to its own ones"),
@@ -51,6 +58,10 @@ ORBIT = Struct(
         Field("smoothness", "real", 0, "width of a smooth union, scene units"),
         Field(CANCELLED, "int", 0, "1: the work was cancelled, and long orbits end at once"),
     ],
+    kinds=[
+        *((f"SOLID_{kind.upper()}", number) for kind, number in SOLID_KINDS.items()),
+        *((f"JOIN_{join.split('_')[0].upper()}", number) for join, number in JOINS.items()),
+    ],
 )
 
 MOST_APPLICATIONS = 2_000_000_000
@@ -63,7 +74,10 @@ EXTRA_APPLICATIONS = 24
 
 # A formula by itself: its own space is the scene's.
 _ALONE: dict[str, object] = {
-    **dict.fromkeys(("kind", "join", "text", "first", "object"), 0),
+    **dict.fromkeys(
+        ("kind", "join", "flows", "first", "first_count", "logarithmic", "has_shape", "object"), 0
+    ),
+    "solids": 1,
     **dict.fromkeys(("ball_radius", "reach", "potential_share", "smoothness"), 0.0),
     **dict.fromkeys(("middle", "sides", "ball"), (0.0, 0.0, 0.0)),
     "own_x": (1.0, 0.0, 0.0),

@@ -33,14 +33,16 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Struct:
-    """A struct of `fields`, in order, laid out by the rules of C."""
+    """A struct of `fields`, in order, laid out by the rules of C; `kinds`: numbers that they hold, by their names in C."""
 
     name: str
     fields: tuple[Field, ...]
+    kinds: tuple[tuple[str, int], ...]
 
-    def __init__(self, name: str, fields: Iterable[Field]) -> None:
+    def __init__(self, name: str, fields: Iterable[Field], kinds: Iterable[tuple[str, int]] = ()) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "fields", tuple(fields))
+        object.__setattr__(self, "kinds", tuple(kinds))
         names = [field.name for field in self.fields]
         if not names or len(set(names)) != len(names):
             raise ValueError(f"struct {name}: needs fields with different names")
@@ -86,6 +88,8 @@ class Struct:
         return result
 
     def _c_lines(self, precision: Precision | None) -> Iterator[str]:
+        for kind, number in self.kinds:
+            yield f"#define {kind} {number}"
         yield f"typedef struct {self.name} {{"
         for field in self.fields:
             real = _C_REAL[precision] if precision is not None else "scalar"

@@ -17,6 +17,7 @@ from typing import Literal
 
 from clfractal.formulas.decisions import Decisions, Question, replayed
 from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
+from clfractal.formulas.functions import Facts, state_functions
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
 from clfractal.formulas.turns import Span
@@ -26,25 +27,43 @@ DualMap = Literal["operations", "jacobian", "cheapest"]
 
 
 @dataclass(frozen=True, slots=True)
+class Leaf:
+    """A formula among several: what its functions' names begin with, and of how many numbers the state of all is."""
+
+    name: str
+    width: int
+
+
+@dataclass(frozen=True, slots=True)
 class FormulaText:
     """A chain in OpenCL C.
 
     Attributes:
-        text: the definitions that `kernels/orbit.h` expects before it. Equal texts are one object.
+        text: the definitions that `kernels/orbit.h` expects before it; of a leaf its functions alone. Equal texts are one
+            object.
         constants: values of the run-time array `k`, in order; never empty.
-        logarithmic: the degree is above 1, so that distances follow |z| log|z|.
-        has_derivative: every link carries a scalar rule, so marching needs no Jacobian.
     """
 
     text: str
     constants: tuple[float, ...]
-    logarithmic: bool
-    has_derivative: bool
+    facts: Facts
+
+    @property
+    def logarithmic(self) -> bool:
+        """The degree is above 1, so that distances follow |z| log|z|."""
+        return self.facts.logarithmic
+
+    @property
+    def has_derivative(self) -> bool:
+        """Every link carries a scalar rule, so marching needs no Jacobian."""
+        return self.facts.has_derivative
 
 
 @lru_cache(maxsize=16)
-def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap = "cheapest") -> FormulaText:
-    """The chain's functions over `real` and `dual`.
+def write_formula(
+    chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap = "cheapest", leaf: Leaf | None = None
+) -> FormulaText:
+    """The chain's functions over `real` and `dual`; as a leaf, under names of its own.
 
     `scalar_rule=False` leaves out the formulas' own derivative, so that marching uses the Jacobian throughout.
     A map that uses the point (`point_x`) is always written operation by operation.
@@ -52,14 +71,14 @@ def write_formula(chain: Chain, *, scalar_rule: bool = True, dual_map: DualMap =
     Writing takes milliseconds, so texts are kept. For other parameter values the text is the same if all
     decisions are that were made while writing it; then only the constants are computed.
     """
-    key = (*(link.structure for link in chain.links), scalar_rule, dual_map)
+    key = (*(link.structure for link in chain.links), scalar_rule, dual_map, leaf)
     with _LOCK:
         known = list(_WRITTEN.get(key, ()))
     for written in reversed(known):
         found = written.filled(chain)
         if found is not None:
             return found
-    written = _ChainWriter(chain, scalar_rule, dual_map).write()
+    written = _ChainWriter(chain, scalar_rule, dual_map, leaf).write()
     result = written.filled(chain)
     assert result is not None, "a text fits the chain that it was written for"
     with _LOCK:
@@ -84,7 +103,6 @@ class _Written:
     It is compared with chains of the same formulas, counts, additions and live parameters only.
 
     Attributes:
-        logarithmic: whether the degree is above 1.
         offset: which components of f(0) are added at the start; None if iteration starts at z = 0.
         repeats: how often each link's map is applied; None if it is passed at run time.
         questions: what each link's parameters were asked.
@@ -92,8 +110,7 @@ class _Written:
     """
 
     text: str
-    logarithmic: bool
-    has_derivative: bool
+    facts: Facts
     offset: tuple[bool, ...] | None
     repeats: tuple[int | None, ...]
     questions: tuple[tuple[Question, ...], ...]
@@ -101,7 +118,7 @@ class _Written:
 
     def filled(self, chain: Chain) -> FormulaText | None:
         """The text with the chain's constants; None if the chain has another text."""
-        if (chain.degree > 1) != self.logarithmic or _offset(chain) != self.offset:
+        if (chain.degree > 1) != self.facts.logarithmic or _offset(chain) != self.offset:
             return None
         constants = [0.0] * max(len(self.owners), 1)
         for link, repeat, questions in zip(chain.links, self.repeats, self.questions, strict=True):
@@ -112,7 +129,7 @@ class _Written:
         for slot, owner in enumerate(self.owners):
             if isinstance(owner, tuple):
                 constants[slot] = _passed(chain, *owner)
-        return FormulaText(self.text, tuple(constants), self.logarithmic, self.has_derivative)
+        return FormulaText(self.text, tuple(constants), self.facts)
 
 
 # The texts of the formulas that were used last, each with the oldest first.
@@ -162,11 +179,14 @@ def operations_per_application(chain: Chain) -> float:
 
 
 class _ChainWriter:
-    def __init__(self, chain: Chain, scalar_rule: bool, dual_map: DualMap) -> None:
+    def __init__(self, chain: Chain, scalar_rule: bool, dual_map: DualMap, leaf: Leaf | None) -> None:
         self.chain = chain
+        self.leaf = leaf
+        self.name = "" if leaf is None else leaf.name
         self.dual_map = dual_map
         self.links: Sequence[Link] = chain.links
         self.size = chain.size
+        self.width = chain.size if leaf is None else leaf.width
         self.constants = Constants()
         self.decisions = [Decisions(link.bound) for link in self.links]
         has_rule = all(link.bound.derivative is not None for link in self.links)
@@ -175,30 +195,28 @@ class _ChainWriter:
         self.starts_at_zero = chain.add == "point" and self.offset is None
 
     def write(self) -> _Written:
-        logarithmic = self.chain.degree > 1
-        head = [
-            f"#define STATE_SIZE {self.size}",
-            f"#define FIRST_COUNT {1 if self.offset is not None else 0}",
-            f"#define LOGARITHMIC {int(logarithmic)}",
-            f"#define HAS_DERIVATIVE {int(self.has_derivative)}",
-            f"#define HAS_SHAPE {int(self.chain.shape_index is not None)}",
-        ]
-        parts = [_state_functions(self.size)]
+        parts: list[str] = []
         number_types: tuple[NumberType, ...] = ("real", "dual")
         for number_type in number_types:
             parts.append(self._start(number_type))
             parts.extend(self._apply(index, number_type) for index in range(len(self.links)))
             parts.append(self._dispatch(number_type, derivative=False))
-            if self.chain.shape_index is not None:
-                parts.append(self._solid_distance(self.chain.shape_index, number_type))
+            parts.append(self._solid_distance(self.chain.shape_index, number_type))
         if self.has_derivative:
             parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
             parts.append(self._dispatch("real", derivative=True))
-        head.append(f"#define HAS_CALLS {int(any(map(_CALLS.search, parts)))}")
+        facts = Facts(
+            self.width,
+            int(self.offset is not None),
+            self.chain.degree > 1,
+            self.has_derivative,
+            self.chain.shape_index is not None,
+            any(map(_CALLS.search, parts)),
+        )
+        head = [facts.text(), state_functions(self.width)] if self.leaf is None else []
         return _Written(
             _one("\n".join([*head, *parts]) + "\n"),
-            logarithmic,
-            self.has_derivative,
+            facts,
             self.offset,
             tuple(None if self._repeats_at_run_time(link) else link.bound.repeat for link in self.links),
             tuple(tuple(each.questions) for each in self.decisions),
@@ -272,9 +290,7 @@ class _ChainWriter:
             cost = _cost([*local.lines, *(f" = {row};" for row in rows)])
             if self.dual_map == "jacobian" or cost < _cost(emitter.lines):
                 emitter, mapped = local, [Value(row, "varying") for row in rows]
-        head = (
-            f"INLINE {state} {number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
-        )
+        head = f"INLINE {state} {self.name}{number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
         times = str(bound.repeat)
         if self._repeats_at_run_time(self.links[index]):
             times = f"(int)(k[{self.constants.slot((index, 'repeat', 0))}])"
@@ -333,25 +349,30 @@ class _ChainWriter:
         mapped = self._map(emitter, bound)
         growth = emitter.emit(bound.derivative)
         texts = self._add_constant(index, "real", emitter, mapped)
-        head = f"INLINE state derivative_apply_{index}(state z, state c, real *growth, __constant const scalar *k) {{"
+        name = f"{self.name}derivative_apply_{index}"
+        head = f"INLINE state {name}(state z, state c, real *growth, __constant const scalar *k) {{"
         tail = f"const state next = {{{', '.join(texts)}}};\n    *growth = {growth.text};\n    return next;"
         return _function(head, emitter.lines, tail)
 
-    def _solid_distance(self, index: int, number_type: NumberType) -> str:
+    def _solid_distance(self, index: int | None, number_type: NumberType) -> str:
+        """The shape's; nobody asks for that of a formula without one."""
+        prefix, state = ("", "state") if number_type == "real" else ("dual_", "dual_state")
+        name = f"{self.name}{prefix}solid_distance"
+        head = f"INLINE {number_type} {name}({state} z, __constant const scalar *k) {{"
+        if index is None:
+            return _function(head, [], f"return {self._full(number_type, Value('R(0.0)', 'constant'))};")
         bound = self.links[index].bound
         assert bound.formula.shape is not None
         emitter = self._emitter(index, number_type)
         emitter.lets = dict(bound.formula.let)
         value = self._full(number_type, emitter.emit(bound.formula.shape))
-        prefix, state = ("", "state") if number_type == "real" else ("dual_", "dual_state")
-        head = f"INLINE {number_type} {prefix}solid_distance({state} z, __constant const scalar *k) {{"
         return _function(head, emitter.lines, f"return {value};")
 
     # --- the chain ---
 
     def _dispatch(self, number_type: NumberType, *, derivative: bool) -> str:
         """`apply`: the link whose turn it is, the same for every lane because counts run together."""
-        prefix = "derivative" if derivative else number_type
+        prefix = self.name + ("derivative" if derivative else number_type)
         name = "apply_derivative" if derivative else "apply" if number_type == "real" else "dual_apply"
         state = "state" if number_type == "real" else "dual_state"
         extra, passed = (", real *growth", ", growth") if derivative else ("", "")
@@ -362,7 +383,7 @@ class _ChainWriter:
             for index, link in enumerate(self.links[:-1]):
                 before += link.count
                 lines.append(f"if (turn < {before}) return {prefix}_apply_{index}(z, c{passed}, k);")
-        head = f"INLINE {state} {name}(int n, {state} z, {state} c{extra}, __constant const scalar *k) {{"
+        head = f"INLINE {state} {self.name}{name}(int n, {state} z, {state} c{extra}, __constant const scalar *k) {{"
         return _function(head, lines, f"return {prefix}_apply_{len(self.links) - 1}(z, c{passed}, k);")
 
     def _start(self, number_type: NumberType) -> str:
@@ -387,9 +408,10 @@ class _ChainWriter:
         if self.size == 4:
             fourth = emitter.emit(bound.formula.slice or Number(0.0))
             lines += [*emitter.lines, f"c->s3 = {self._full(number_type, fourth)};"]
+        zero = "R(0.0)" if number_type == "real" else "dual_constant(R(0.0))"
+        lines += [f"c->s{i} = {zero};" for i in range(self.size, self.width)]
         if self.starts_at_zero:
-            zero = "R(0.0)" if number_type == "real" else "dual_constant(R(0.0))"
-            lines += [f"z->s{i} = {zero};" for i in range(self.size)]
+            lines += [f"z->s{i} = {zero};" for i in range(self.width)]
         else:
             lines.append("*z = *c;")
             for i, added in enumerate(self.offset or ()):
@@ -398,7 +420,9 @@ class _ChainWriter:
                     component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
                     lines.append(f"{component} += {slot};")
         name = "start" if number_type == "real" else "dual_start"
-        head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
+        head = (
+            f"INLINE void {self.name}{name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
+        )
         return _function(head, lines, None)
 
 
@@ -460,34 +484,3 @@ def _turn(spans: Sequence[Span]) -> list[str]:
 def _function(head: str, lines: Sequence[str], tail: str | None) -> str:
     body = "".join(f"    {line}\n" for line in lines)
     return f"{head}\n{body}" + (f"    {tail}\n" if tail else "") + "}\n"
-
-
-def _state_functions(size: int) -> str:
-    """The state of an orbit, by components so that every one can live in a register."""
-    fields = [f"s{i}" for i in range(size)]
-
-    def each(text: str, join: str = ", ") -> str:
-        return join.join(text.replace("@", field) for field in fields)
-
-    return f"""\
-typedef struct {{
-    real {", ".join(fields)};
-}} state;
-typedef struct {{
-    dual {", ".join(fields)};
-}} dual_state;
-INLINE state state_pick(mask m, state yes, state no) {{
-    const state r = {{{each("pick(m, yes.@, no.@)")}}};
-    return r;
-}}
-INLINE dual_state dual_state_pick(mask m, dual_state yes, dual_state no) {{
-    const dual_state r = {{{each("dual_where(m, yes.@, no.@)")}}};
-    return r;
-}}
-INLINE real state_square(state z) {{ return {each("z.@ * z.@", " + ")}; }}
-INLINE real dual_state_square(dual_state z) {{ return {each("z.@.v * z.@.v", " + ")}; }}
-// J^T z times a factor: half the gradient of |z|^2 by the point.
-INLINE vec dual_state_gradient(dual_state z, real factor) {{
-    return vec_of({", ".join(each(f"(factor * z.@.v) * z.@.d{axis}", " + ") for axis in "xyz")});
-}}
-"""

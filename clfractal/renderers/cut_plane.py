@@ -29,11 +29,10 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
     structs = "".join(struct.c_text() for struct in (VIEW, SAMPLING, ORBIT, CUT_PLANE))
     defines = {
         **pass_defines(plan),
-        **body.defines,
         "PALETTE_SIZE": PALETTE_SIZE,
     }
     generated = {
-        **body.texts(files=("escape.h",), defines=escape_defines),
+        **body.texts(escape_defines),
         "structs.h": structs,
         "carried.h": carried_text(),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +51,8 @@ def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:
     return np.ascontiguousarray(named_table(colors.palette), np.float32)
 
 
-def escape_defines(chain: Chain) -> dict[str, object]:
+def escape_defines(chains: Sequence[Chain]) -> dict[str, object]:
     """What the text of `kernels/escape.h` depends on."""
-    cycle = chain.cycle_length
-    return {"PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle), "REPEATS_FROM": chain.repeats_from}
+    cycle = math.lcm(*(chain.cycle_length for chain in chains))
+    repeats = max(chain.repeats_from for chain in chains)
+    return {"PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle), "REPEATS_FROM": repeats}

@@ -28,6 +28,7 @@ from clfractal.renderers.state import PARTS, along_paths, normal_count
 from clfractal.renderers.waves import meets_objects, met_numbers
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
+from clfractal.solids import has_hollows
 
 MARCH = Struct(
     "March",
@@ -49,6 +50,10 @@ MARCH = Struct(
         ),
         Field("cone_share", "real", 0, "part of a scaled distance that is free for all of a block"),
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
+        Field("hollows", "int", 0, "1: what is cut out leaves hollows, in which no distance is known"),
+        Field(
+            "first_slope", "real", 0, "of a scaled distance along its gradient, where none has been measured"
+        ),
         Field("step", "real", 0, "step of the search by steps, scene units"),
         Field("touch_share", "real", 0, "hit distance of a pixel's shared march, in footprints over detail"),
         Field(
@@ -108,6 +113,8 @@ CONE_MARGIN, CONE_SHARE = 1.5, 0.8
 TOUCH = 0.7
 # In footprints: how far behind a proved touch the points of its pixel need no proof. The set is up to four estimates away.
 KNOWN_REACH = 4.0
+# Of a scaled distance along its gradient: where a surface is smooth, it is half of the true one.
+FIRST_SLOPE = 0.5
 # In footprints: how far before the end of their pixel's march the points begin.
 POINT_START = 0.5
 
@@ -187,6 +194,9 @@ def march_record(
         "cone_margin": max(CONE_MARGIN * fineness.near, 1.5 * touch),
         "cone_share": CONE_SHARE,
         "max_steps": renderer.max_steps,
+        "hollows": int(has_hollows(scene)),
+        # A distance of degree 1 is the true one.
+        "first_slope": FIRST_SLOPE if scene.joined or scene.chain.degree > 1 else 1.0,
         "step": renderer.step if renderer.step is not None else radius / 100,
         "touch_share": touch,
         # The search by steps begins at the eye, and goes both ways from the touch.

@@ -122,7 +122,7 @@ def nearest(
 def program_text(body: Body, lanes: int, precision: Precision) -> FlatText:
     """The whole text of the program for a body's points."""
     generated = {**body.texts(), "structs.h": struct_text()}
-    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines}
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
     return flatten("points.cl", generated=generated, defines=defines, user=["formula.h"])
 
 

@@ -53,7 +53,7 @@ from clfractal.renderers.waves import (
 )
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.solids import Body
+from clfractal.solids import Body, Turns
 
 PALETTE_SIZE = 256
 # Distance evaluations that bring a point to a fixed part of its footprint from the set.
@@ -75,7 +75,6 @@ def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "POINTS": several_points(scene),
         # A binary search ends where the surface is; a march, somewhere within the point's footprint.
         "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
-        **Body.of(scene).defines,
     }
 
 
@@ -116,11 +115,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
 def path_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     """The defines of stages of paths."""
     return {**state_defines(scene, plan), **scattering_defines()}
-
-
-def formula_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """The defines of stages that ask the formula."""
-    return {**state_defines(scene, plan), **Body.of(scene).defines}
 
 
 class SurfaceKernel(TileKernel):
@@ -209,19 +203,21 @@ class _Program:
     """A program: its entry point, the kernels that it may have, and the defines of its text.
 
     Attributes:
-        formula: the kernel files beside `orbit.h` by which it asks the formula; None: it knows none.
+        formula: whether it asks the formula.
+        turns: and the defines that depend on the formula's turns.
     """
 
     name: str
     entry: str
     kernels: tuple[str, ...]
     defines: Callable[[Scene, Plan], dict[str, object]]
-    formula: tuple[str, ...] | None = None
+    formula: bool = False
+    turns: Turns | None = None
 
 
 # A scene needs those whose stages it launches.
 _PROGRAMS = (
-    _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines, ()),
+    _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines, formula=True),
     _Program("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
     _Program("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
     _Program("spots", "find_spots.cl", ("find_spots",), state_defines),
@@ -230,11 +226,18 @@ _PROGRAMS = (
     _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
     _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
     _Program("media", "media.cl", ("cross_media", "pass_clouds"), path_defines),
-    _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines, ()),
-    _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), walk_defines, ()),
-    _Program("colors", "color_spots.cl", ("color_spots",), formula_defines, ("trap_near.h",)),
-    _Program("glow", "glow.cl", ("add_glow",), formula_defines, ("trap_near.h",)),
-    _Program("planes", "see_planes.cl", ("find_faces", "find_planes"), formula_defines, ("escape.h",)),
+    _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines, formula=True),
+    _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), walk_defines, formula=True),
+    _Program("colors", "color_spots.cl", ("color_spots",), state_defines, formula=True),
+    _Program("glow", "glow.cl", ("add_glow",), state_defines, formula=True),
+    _Program(
+        "planes",
+        "see_planes.cl",
+        ("find_faces", "find_planes"),
+        state_defines,
+        formula=True,
+        turns=escape_defines,
+    ),
 )
 
 
@@ -260,9 +263,8 @@ def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
         # All that there are: what is kept of a program has every kernel that any scene may launch.
         kernels = tuple(name for name in each.kernels if plan.lanes == 1 or name not in OF_SINGLE_LANES)
         generated = _structs()
-        if each.formula is not None:
-            turns = escape_defines if "escape.h" in each.formula else None
-            generated = {**body.texts(files=each.formula, defines=turns), **generated}
+        if each.formula:
+            generated = {**body.texts(each.turns), **generated}
         flat = flat_text(each.entry, generated=generated, defines=defines(each.defines))
         texts.append(ProgramText(each.name, flat, kernels))
     return texts

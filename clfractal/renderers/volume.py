@@ -131,9 +131,7 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
         "carried.h": carried_text(),
     }
     if asks_formula(scene):
-        body = Body.of(scene)
-        generated |= body.texts(files=("escape.h",), defines=escape_defines)
-        defines |= body.defines
+        generated |= Body.of(scene).texts(escape_defines)
     return flat_text(f"{kernel_of(scene)}.cl", generated=generated, defines=defines)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -138,9 +139,9 @@ def nodes_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
     return Recipe(
         "voxels_nodes.cl",
         "classify_nodes",
-        _body_defines(body, lanes, precision),
+        _number_defines(lanes, precision),
         precision,
-        _texts(body, "node_proof.h"),
+        body.texts(_turns),
         1,
         (1, max(NODE_POINTS // lanes, 1)),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
@@ -155,13 +156,13 @@ def fill_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Pre
         "voxels_fill.cl",
         "fill_bricks",
         {
-            **_body_defines(body, lanes, precision),
+            **_number_defines(lanes, precision),
             **{f"FILL_{name.upper()}": number for number, name in enumerate(FILL_KINDS)},
             "FILL_KIND": FILL_KINDS.index(renderer.value),
             **_sample_defines(sample),
         },
         precision,
-        _texts(body, *(("solid_count.h",) if renderer.value == "iterations" else ())),
+        body.texts(_turns),
         items,
         (items, 1),
         (_BUFFER, _BUFFER, _INT, _BUFFER, _FLOAT, *[_BUFFER] * 4),
@@ -225,30 +226,26 @@ def normals_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: 
         "voxels_normals.cl",
         "refine_normals",
         {
-            **_body_defines(body, lanes, precision),
+            **_number_defines(lanes, precision),
             **{f"NORMALS_{name.upper()}": number for number, name in enumerate(NORMALS)},
             "NORMALS": NORMALS.index(renderer.normals),
         },
         precision,
-        _texts(body),
+        body.texts(_turns),
         1,
         (1, 1),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
     )
 
 
-def _texts(body: Body, *files: str) -> dict[str, str]:
-    return body.texts(files=("solid_inside.h", *files), defines=_turns)
+def _number_defines(lanes: int, precision: Precision) -> dict[str, object]:
+    return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
 
 
-def _body_defines(body: Body, lanes: int, precision: Precision) -> dict[str, object]:
-    return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **body.defines}
-
-
-def _turns(chain: Chain) -> dict[str, object]:
-    """How a formula's turns repeat themselves."""
-    cycle = chain.cycle_length
-    return {"CHUNK": cycle * -(-CHUNK // cycle), "REPEATS_FROM": chain.repeats_from}
+def _turns(chains: Sequence[Chain]) -> dict[str, object]:
+    """How the turns of formulas repeat themselves."""
+    cycle = math.lcm(*(chain.cycle_length for chain in chains))
+    return {"CHUNK": cycle * -(-CHUNK // cycle), "REPEATS_FROM": max(chain.repeats_from for chain in chains)}
 
 
 def _sample_defines(sample: Kind) -> dict[str, object]:

@@ -24,7 +24,9 @@ _DEFINED = re.compile(
     r"^(?:(?:INLINE|CALLED) \w+|__kernel void|#define|#undef) (\w+)|^(?:\}|typedef [\w(), ]+) (\w+);|^STAGE\((\w+)\)",
     re.MULTILINE,
 )
-_INCLUDES = re.compile(r'^#include "(?:lanes|vectors|structs|formula|orbit|numbers/\w+)\.h"\n', re.MULTILINE)
+_INCLUDES = re.compile(
+    r'^#include "(?:lanes|vectors|structs|formula|orbit|solids|numbers/\w+)\.h"\n', re.MULTILINE
+)
 
 HEAD = "".join(
     f'#include "{name}"\n'
@@ -57,7 +59,7 @@ def compile_text(
     flat = flatten(
         "batch.cl",
         generated={"batch.cl": text, "structs.h": struct_text()},
-        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
+        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "JOINED": 0},
     )
     return compiler.compile_source(device, flat.text, [*program.math_flags(precision), *flags])
 

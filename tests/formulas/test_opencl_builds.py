@@ -17,17 +17,16 @@ import pytest
 
 from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose, has_float64
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.files.channels import CHANNELS
 from clfractal.formulas import catalog
-from clfractal.formulas.opencl import write_formula
 from clfractal.pictures.tiles import Region
 from clfractal.renderers import surface
-from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.plan import Plan
+from clfractal.renderers.points import program_text
 from clfractal.scene.load import load_scene
+from clfractal.solids import Body
 from tests.formulas.opencl_batch import kernel_file, numbered
 
 SCENE = """\
@@ -47,12 +46,7 @@ def device() -> Device:
 
 
 def points_text(name: str, precision: Precision, lanes: int) -> str:
-    formula = write_formula(catalog.load_chain(name))
-    return flatten(
-        "points.cl",
-        generated={"formula.h": formula.text, "structs.h": struct_text()},
-        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
-    ).text
+    return program_text(Body(catalog.load_chain(name), 1), lanes, precision).text
 
 
 def surface_texts(name: str, precision: Precision, lanes: int, coloring: str = "iterations") -> list[str]:

@@ -52,7 +52,6 @@ kernels/look.h: render/objects_light render/surface_light
 kernels/march_steps.h: render/searches
 kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
 kernels/solids*: render/joined
-kernels/joined_*: voxels/joined_voxels
 kernels/solid_inside.h: voxels/
 kernels/solid_count.h: voxels/
 kernels/node_proof.h: voxels/

@@ -49,7 +49,7 @@ def device() -> Device:
 
 @lru_cache
 def program() -> Any:
-    tail = kernel_file("orbit.h") + kernel_file("points.cl")
+    tail = "".join(map(kernel_file, ("orbit.h", "solids.h", "points.cl")))
     return compile_text(
         device(), batch_text([write_formula(chain_of(n)) for n in CHAINS], tail), "float64", 1
     )

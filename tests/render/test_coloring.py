@@ -106,7 +106,7 @@ def compiled(text: str, precision: Precision, lanes: int) -> Any:
 def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> Any:
     """A kernel behind the scene's formula and the headers. What changes only numbers builds nothing anew."""
     head = kind_text() + "#define PALETTE_SIZE 256\n"
-    headers = "".join(kernel_file(name) for name in ("orbit.h", "coloring.h", "shade.h"))
+    headers = "".join(kernel_file(name) for name in ("orbit.h", "solids.h", "coloring.h", "shade.h"))
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)
 
 

@@ -65,7 +65,24 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
     "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"walks", "media"}),
     "skin": ({"materials": {"m": SKIN}, "material": {"name": "m"}}, {"walks", "media"}),
 }
-# Programs that know the formula, and how its solids are joined.
+# What may be joined to a formula, and in which ways: beside the formulas all of it is data.
+HAST = {"type": "formula", "formula": {"name": "hast", "iterations": 9}, "position": [1, 0, 0]}
+JOINED: dict[str, dict[str, Any]] = {
+    "cut": {"hole": {"type": "sphere", "join": "cut"}},
+    "intersection": {"part": {"type": "cylinder", "join": "intersection"}},
+    "flowing": {"drop": {"type": "box", "join": "smooth_union", "smoothness": 0.2}},
+    "several": {
+        "hole": {"type": "box", "join": "cut"},
+        "drop": {"type": "sphere", "join": "smooth_union"},
+        "half": {"type": "plane", "join": "intersection"},
+    },
+    "a hollow": {"mould": {"type": "formula", "formula": FORMULA, "join": "cut"}},
+    "twice": {
+        "one": {"type": "formula", "formula": FORMULA, "scale": 0.5},
+        "other": {"type": "formula", "formula": {**FORMULA, "iterations": 9}, "position": [1, 0, 0]},
+    },
+}
+# Programs that know the formula, and whether anything is joined to it.
 OF_FORMULA = {"rays", "colors", "glow", "planes", "glass", "walks"}
 
 
@@ -226,6 +243,29 @@ def test_stages_without_a_formula_are_the_same_for_all(device: Device) -> None:
         assert {name: text for name, text in found.items() if name not in OF_FORMULA} == {
             name: text for name, text in plain.items() if name not in OF_FORMULA
         }
+
+
+# What asks the formula: rays, colours, a glow, planes.
+ASKING: dict[str, Any] = {
+    "coloring": {"by": "trap"},
+    "glow": {"by": "trap"},
+    **FEATURES["quads"][0],
+}
+
+
+@pytest.mark.parametrize("joined", JOINED)
+def test_joins_are_data(joined: str, device: Device) -> None:
+    known, other = (texts(scene(FORMULA, objects=JOINED[each], **ASKING), device) for each in ("cut", joined))
+    assert other == known
+    assert set(known) >= OF_FORMULA - {"glass", "walks"}
+
+
+@pytest.mark.parametrize("join", ["union", "cut", "smooth_union", "intersection"])
+def test_only_the_formulas_in_a_scene_are_text(join: str, device: Device) -> None:
+    objects = {"other": {**HAST, "join": join}, **JOINED["several"], "again": {**HAST, "scale": 0.3}}
+    known = texts(scene(FORMULA, objects={"other": HAST}, **ASKING), device)
+    assert texts(scene(FORMULA, objects=objects, **ASKING), device) == known
+    assert known["rays"] != texts(scene(FORMULA, objects=JOINED["cut"], **ASKING), device)["rays"]
 
 
 # Features that still make texts of their own: none may join them.

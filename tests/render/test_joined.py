@@ -253,5 +253,5 @@ def test_a_moving_formula_compiles_once(device: Device) -> None:
     one = {"type": "formula", "formula": formula}
     both = scene_of(formula, PERSPECTIVE, objects={"a": one, "b": {**one, "position": [3, 0, 0]}})
     march = program_texts(both, plan_of(both, device))[0].flat.text
-    assert "orbit_solid_0" in march
-    assert "orbit_solid_1" not in march, "equal texts are one"
+    assert "leaf_0_apply(" in march
+    assert "leaf_1_apply(" not in march, "equal texts are one"

@@ -38,7 +38,7 @@ def usable(precision: Precision) -> bool:
 
 def only(kernel: str) -> str:
     """`points.cl` after the formula, with one of its two kernels: the other would be compiled for nothing."""
-    text = kernel_file("orbit.h") + kernel_file("points.cl")
+    text = "".join(map(kernel_file, ("orbit.h", "solids.h", "points.cl")))
     parts = re.split(r"^(?=__kernel )", text, flags=re.MULTILINE)
     kept = [part for part in parts[1:] if part.startswith(f"__kernel void {kernel}(")]
     assert len(kept) == 1

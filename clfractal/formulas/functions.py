@@ -1,0 +1,68 @@
+"""What kernels know of a formula beside its functions, and what its functions stand behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What `kernels/orbit.h` has to know of a formula before it.
+
+    Attributes:
+        size: numbers of its state.
+        first_count: applications that the starting state already counts.
+        logarithmic: the degree is above 1, so that distances follow |z| log|z|.
+        has_derivative: every link carries a scalar rule, so marching needs no Jacobian.
+        has_shape: the last solid is told by a shape.
+        has_calls: of exp, sin and their like.
+    """
+
+    size: int
+    first_count: int
+    logarithmic: bool
+    has_derivative: bool
+    has_shape: bool
+    has_calls: bool
+
+    def text(self) -> str:
+        """As defines."""
+        return (
+            f"#define STATE_SIZE {self.size}\n"
+            f"#define FIRST_COUNT {self.first_count}\n"
+            f"#define LOGARITHMIC {int(self.logarithmic)}\n"
+            f"#define HAS_DERIVATIVE {int(self.has_derivative)}\n"
+            f"#define HAS_SHAPE {int(self.has_shape)}\n"
+            f"#define HAS_CALLS {int(self.has_calls)}\n"
+        )
+
+
+def state_functions(size: int) -> str:
+    """The state of an orbit, by components so that every one can live in a register."""
+    fields = [f"s{i}" for i in range(size)]
+
+    def each(text: str, join: str = ", ") -> str:
+        return join.join(text.replace("@", field) for field in fields)
+
+    return f"""\
+typedef struct {{
+    real {", ".join(fields)};
+}} state;
+typedef struct {{
+    dual {", ".join(fields)};
+}} dual_state;
+INLINE state state_pick(mask m, state yes, state no) {{
+    const state r = {{{each("pick(m, yes.@, no.@)")}}};
+    return r;
+}}
+INLINE dual_state dual_state_pick(mask m, dual_state yes, dual_state no) {{
+    const dual_state r = {{{each("dual_where(m, yes.@, no.@)")}}};
+    return r;
+}}
+INLINE real state_square(state z) {{ return {each("z.@ * z.@", " + ")}; }}
+INLINE real dual_state_square(dual_state z) {{ return {each("z.@.v * z.@.v", " + ")}; }}
+// J^T z times a factor: half the gradient of |z|^2 by the point.
+INLINE vec dual_state_gradient(dual_state z, real factor) {{
+    return vec_of({", ".join(each(f"(factor * z.@.v) * z.@.d{axis}", " + ") for axis in "xyz")});
+}}
+"""

@@ -1,0 +1,112 @@
+"""Several formulas in one text: the functions of each under names of its own, and those that choose between them.
+
+Before the constants of each stands the number of its leaf: whoever is given constants asks the formula whose they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from clfractal.formulas.functions import Facts, state_functions
+from clfractal.formulas.language import Chain
+from clfractal.formulas.opencl import FormulaText, Leaf, write_formula
+
+# What a formula is asked: the type of the answer, the function, and its parameters before the constants and behind them.
+_ASKED = (
+    ("void", "start", "vec point", "state *c, state *z"),
+    ("void", "dual_start", "vec point", "dual_state *c, dual_state *z"),
+    ("state", "apply", "int n, state z, state c", ""),
+    ("dual_state", "dual_apply", "int n, dual_state z, dual_state c", ""),
+    ("real", "solid_distance", "state z", ""),
+    ("dual", "dual_solid_distance", "dual_state z", ""),
+)
+_ASKED_DERIVATIVE = ("state", "apply_derivative", "int n, state z, state c, real *growth", "")
+
+
+@dataclass(frozen=True, slots=True)
+class Together:
+    """Formulas in one text.
+
+    Attributes:
+        text: the definitions that `kernels/orbit.h` expects before it.
+        formulas: of each formula its functions and constants; equal functions are there once.
+        firsts: where the constants of each begin.
+        constants: all of them, each formula's behind its leaf.
+    """
+
+    text: str
+    formulas: tuple[FormulaText, ...]
+    firsts: tuple[int, ...]
+    constants: tuple[float, ...]
+
+
+@lru_cache(maxsize=16)
+def write_together(chains: tuple[Chain, ...]) -> Together:
+    """The text of all; the scalar rules of their own are in it if all have one."""
+    scalar_rule = all(write_formula(chain).has_derivative for chain in chains)
+    width = max(chain.size for chain in chains)
+    leaves: list[FormulaText] = []
+    found: list[FormulaText] = []
+    firsts: list[int] = []
+    constants: list[float] = []
+    for chain in chains:
+        for number in range(len(leaves) + 1):
+            leaf = Leaf(_name(number), width)
+            written = write_formula(chain, scalar_rule=scalar_rule, leaf=leaf)
+            if number == len(leaves):
+                leaves.append(written)
+            if leaves[number].text == written.text:
+                break
+        found.append(written)
+        constants.append(number)
+        firsts.append(len(constants))
+        constants += written.constants
+    asked = [*_ASKED, _ASKED_DERIVATIVE] if scalar_rule else _ASKED
+    text = "\n".join(
+        [
+            _facts([leaf.facts for leaf in leaves]),
+            state_functions(width),
+            *(leaf.text for leaf in leaves),
+            *(_choice(len(leaves), *each) for each in asked),
+        ]
+    )
+    return Together(text, tuple(found), tuple(firsts), tuple(constants))
+
+
+def _name(leaf: int) -> str:
+    return f"leaf_{leaf}_"
+
+
+def _facts(each: list[Facts]) -> str:
+    """The facts as defines: what is not the same of all formulas stands in the record of each."""
+    first = each[0]
+    values: dict[str, object] = {
+        "STATE_SIZE": first.size,
+        "FIRST_COUNT": first.first_count,
+        "LOGARITHMIC": int(first.logarithmic),
+        "HAS_DERIVATIVE": int(first.has_derivative),
+        "HAS_SHAPE": int(first.has_shape),
+        # Orbits of several solids do not run side by side.
+        "HAS_CALLS": 1,
+    }
+    if any(facts.first_count != first.first_count for facts in each):
+        values["FIRST_COUNT"] = "(orbit->first_count)"
+    if any(facts.logarithmic != first.logarithmic for facts in each):
+        values["LOGARITHMIC"] = "(orbit->logarithmic)"
+    if any(facts.has_shape != first.has_shape for facts in each):
+        values["HAS_SHAPE"] = "(orbit->has_shape)"
+    return "".join(f"#define {name} {value}\n" for name, value in values.items())
+
+
+def _choice(leaves: int, answer: str, function: str, before: str, behind: str) -> str:
+    """The function of the formula whose constants are given."""
+    parameters = ", ".join(filter(None, (before, "__constant const scalar *k", behind)))
+    passed = ", ".join(each.split()[-1].lstrip("*") for each in parameters.split(", "))
+    returned, ended = ("", " return;") if answer == "void" else ("return ", "")
+    lines = [
+        f"    if ((int)k[-1] == {leaf}) {{ {returned}{_name(leaf)}{function}({passed});{ended} }}\n"
+        for leaf in range(1, leaves)
+    ]
+    lines.append(f"    {returned}{_name(0)}{function}({passed});\n")
+    return f"INLINE {answer} {function}({parameters}) {{\n{''.join(lines)}}}\n"
