@@ -3,8 +3,8 @@
 // All fields of the struct are as wide as a number, or fill up one.
 #define POSE_NUMBERS ((int)(sizeof(struct View) / sizeof(scalar)))
 
-INLINE real view_number(__constant const scalar *number, real time, int spans) {
-    if (spans == 0) return (real)(*number);
+// Called, since every ray from the eye asks for dozens of numbers, and the loop would stand in the text as often.
+CALLED real view_number_at(__constant const scalar *number, real time, int spans) {
     scalar each[LANES];
     lanes_store(time * (real)((scalar)spans), each);
     for (int lane = 0; lane < LANES; ++lane) {
@@ -13,6 +13,10 @@ INLINE real view_number(__constant const scalar *number, real time, int spans) {
         each[lane] = before + (each[lane] - (scalar)pose) * (after - before);
     }
     return lanes_load(each);
+}
+
+INLINE real view_number(__constant const scalar *number, real time, int spans) {
+    return spans == 0 ? (real)(*number) : view_number_at(number, time, spans);
 }
 
 INLINE vec view_vec(__constant const scalar *numbers, real time, int spans) {

@@ -391,7 +391,7 @@ def test_exit_statuses() -> None:
 def test_environment_variables() -> None:
     told = {code(row[0]) for row in table("command-line.md", "Environment variables")}
     ours = {select.ENVIRONMENT_VARIABLE, lanes.LANES_VARIABLE, cache.ENVIRONMENT_VARIABLE}
-    ours |= {settings.ENVIRONMENT_VARIABLE, own.FOLDERS_VARIABLE}
+    ours |= {settings.ENVIRONMENT_VARIABLE, own.FOLDERS_VARIABLE, cache.SIZE_VARIABLE}
     assert ours == {name for name in told if name.startswith("CLFRACTAL_")}
     sources = "\n".join(path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py"))
     assert set(re.findall(r'"(CLFRACTAL_\w+)"', sources)) == ours | {"CLFRACTAL_TEST_ABORT"}

@@ -35,6 +35,7 @@ _ORDER = (
     "probe",
     "formulas",
     "devices",
+    "precompile",
     "bench",
     "voxelize",
     "mesh",

@@ -85,6 +85,28 @@ def devices(
 
 
 @app.command()
+def precompile(
+    context: typer.Context,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[SCENE]...",
+            help="Scene files, or pictures that clfractal wrote.  [default: all formulas and scenes of the library]",
+        ),
+    ] = None,
+    device: DeviceOption = None,
+    precision: Precision = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Compile programs before pictures and windows wait for them; they are kept in the cache."""
+    from clfractal.commands.precompile import precompile as work
+
+    shell = shell_of(context, quiet=quiet, verbose=verbose)
+    return lambda: work(tuple(scenes or ()), device, precision, shell)
+
+
+@app.command()
 def formulas(
     context: typer.Context,
     name: Annotated[

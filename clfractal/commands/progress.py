@@ -164,6 +164,29 @@ def _left(state: Progress) -> str:
     return f"{hours:d}:{minutes:02d}:{seconds:02d} left" if hours else f"{minutes:d}:{seconds:02d} left"
 
 
+def counting_bar(shell: Shell, doing: str, total: int) -> Bar:
+    """A bar for so many things, on a terminal; it is refreshed by hand."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    shell.clear_status()
+    bar = Bar(
+        TextColumn(doing),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=Console(file=shell.errors),
+        auto_refresh=False,
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    bar.add_task(doing, total=total)
+    bar.start()
+    return bar
+
+
 def _new_bar(shell: Shell, tiles: int) -> Bar:
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn

@@ -25,14 +25,20 @@ from clfractal.device.cache_folder import folder as folder
 from clfractal.errors import CacheWarning
 from clfractal.files import system
 
-# A program has some 200 KB; the oldest go first.
-MAXIMUM_BLOBS = 1000
+SIZE_VARIABLE = "CLFRACTAL_CACHE_MB"
+"""Megabytes that compiled programs may take in the cache; 0: none is kept."""
+USUAL_MEGABYTES = 500
+"""A program has some 200 to 500 KB: all that a library of scenes needs are 100 MB."""
+_MEGABYTE = 1_000_000
+_MOST_MEGABYTES = 1_000_000
 
 _MAGIC = b"clfractal-blob-1\n"
 _DIGEST_BYTES = 32
 _NEW = ".new-"
 _ABANDONED_S = 3600.0  # age of a file that nobody writes any more
-_told: set[str] = set()  # folders that take nothing more
+_told: set[str] = set()  # folders that take nothing more, and limits that are none
+_used: set[Path] = set()
+"""Entries that this process has loaded or stored: they are not dropped for others."""
 
 
 def key_of(*parts: object) -> str:
@@ -53,19 +59,45 @@ def load_blob(key: str) -> bytes | None:
         return None
     with contextlib.suppress(OSError):
         os.utime(path)  # the time of last use decides what is dropped first
+    _used.add(path)
     return payload
 
 
 def store_blob(key: str, payload: bytes) -> bool:
-    """Keep `payload` under `key`, and say whether that was possible. Readers see all of it or nothing."""
-    path = _blob_path(key)
+    """Keep `payload` under `key`, and say whether that was possible. Readers see all of it or nothing.
+
+    What was used longest ago goes where it would be more than `limit` in all, but nothing that this process uses.
+    """
+    path, stored = _blob_path(key), _MAGIC + hashlib.sha256(payload).digest() + payload
     try:
-        _drop_oldest(path.parent)
-        _replace(path, _MAGIC + hashlib.sha256(payload).digest() + payload)
+        if not _make_room(path, len(stored)):
+            return False
+        _replace(path, stored)
     except OSError as error:
         _tell(error)
         return False
+    _used.add(path)
     return True
+
+
+def limit() -> int:
+    """How many bytes of programs are kept; a variable that is no such number is told once, by a `CacheWarning`."""
+    given = os.environ.get(SIZE_VARIABLE, "").strip()
+    if not given:
+        return USUAL_MEGABYTES * _MEGABYTE
+    # (A float may also be written as nan, inf or 1e9.)
+    if re.fullmatch(r"\d{1,7}(\.\d{0,6})?", given, re.ASCII) and float(given) <= _MOST_MEGABYTES:
+        return int(float(given) * _MEGABYTE)
+    _warn(
+        f"{SIZE_VARIABLE}={given}",
+        f"{SIZE_VARIABLE} must be megabytes from 0 to {_MOST_MEGABYTES}, got {given[:60]!r}; using {USUAL_MEGABYTES}",
+    )
+    return USUAL_MEGABYTES * _MEGABYTE
+
+
+def size() -> int:
+    """How many bytes of programs there are."""
+    return sum(bytes_of for _, bytes_of, _ in _entries(folder() / "programs"))
 
 
 def drop_blob(key: str) -> None:
@@ -102,13 +134,15 @@ def _sum_of(facts: dict[str, Any]) -> str:
 
 def _tell(error: OSError) -> None:
     root = str(folder())
-    if root not in _told:
-        _told.add(root)
-        warnings.warn(
-            f"the cache folder {root!r} takes nothing more: {error.strerror or error}; working without it",
-            CacheWarning,
-            stacklevel=3,
-        )
+    _warn(
+        root, f"the cache folder {root!r} takes nothing more: {error.strerror or error}; working without it"
+    )
+
+
+def _warn(subject: str, line: str) -> None:
+    if subject not in _told:
+        _told.add(subject)
+        warnings.warn(line, CacheWarning, stacklevel=4)
 
 
 def _blob_path(key: str) -> Path:
@@ -128,8 +162,41 @@ def _replace(path: Path, content: bytes) -> None:
         raise
 
 
-def _drop_oldest(blobs: Path) -> None:
-    """Makes room: drops what was used longest ago, what killed processes left, and what PoCL kept for earlier versions."""
+def _make_room(wanted: Path, more: int) -> bool:
+    """Drops what was used longest ago, so that there is room for so many bytes, and what nobody uses any more.
+
+    Says whether there is room. Other processes may make some at the same time; what they have loaded they need no longer.
+    """
+    _drop_left(wanted.parent)
+    most = limit()
+    if more > most:
+        return False
+    found = [entry for entry in _entries(wanted.parent) if entry[2] != wanted]
+    total = more + sum(bytes_of for _, bytes_of, _ in found)
+    for _, bytes_of, entry in sorted(found):
+        if total <= most:
+            break
+        if entry not in _used:
+            with contextlib.suppress(OSError):
+                entry.unlink(missing_ok=True)
+                total -= bytes_of
+    return total <= most
+
+
+def _entries(blobs: Path) -> list[tuple[float, int, Path]]:
+    """The time of last use, the size and the path of each entry."""
+    found: list[tuple[float, int, Path]] = []
+    with contextlib.suppress(OSError), os.scandir(blobs) as entries:
+        for entry in entries:
+            if entry.name.endswith(".bin"):
+                with contextlib.suppress(OSError):  # another process makes room, too
+                    status = entry.stat()
+                    found.append((status.st_mtime, status.st_size, blobs / entry.name))
+    return found
+
+
+def _drop_left(blobs: Path) -> None:
+    """Drops what killed processes left, and what PoCL kept for earlier versions."""
     now = time.time()
     for left in (*blobs.glob(f"{_NEW}*"), *blobs.parent.glob(f"{_NEW}*")):
         with contextlib.suppress(OSError):
@@ -140,16 +207,6 @@ def _drop_oldest(blobs: Path) -> None:
             shutil.rmtree(left, ignore_errors=True)
         elif left.name.startswith("tempfile"):
             left.unlink(missing_ok=True)
-    entries = list(blobs.glob("*.bin"))
-    if len(entries) < MAXIMUM_BLOBS:
-        return
-    ages: list[tuple[float, Path]] = []
-    for entry in entries:
-        with contextlib.suppress(OSError):  # another process makes room, too
-            ages.append((entry.stat().st_mtime, entry))
-    for _, entry in sorted(ages)[: len(entries) - MAXIMUM_BLOBS * 3 // 4]:
-        with contextlib.suppress(OSError):
-            entry.unlink()
 
 
 @contextlib.contextmanager

@@ -249,19 +249,20 @@ class Children:
                 self._changed.notify_all()
 
 
-def _processors() -> int:
+def processors() -> int:
+    """How many this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-pool = Children(_processors())
+pool = Children(processors())
 
 
 def _after_fork() -> None:
     global pool
     pool.forget()
-    pool = Children(_processors())
+    pool = Children(processors())
 
 
 @atexit.register

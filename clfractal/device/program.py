@@ -130,6 +130,11 @@ def loaded(device: Device, text: str, *, flags: Sequence[str], warm: Sequence[Wa
     return None if program is None else Program(device, program, _milliseconds(start), cached=True)
 
 
+def is_kept(device: Device, text: str, *, flags: Sequence[str], warm: Sequence[Warm] = ()) -> bool:
+    """Whether the cache on the disk has the program of a text, as `build` gives it; then it counts as used."""
+    return cache.load_blob(_key(device, *_as_compiled(device, text, flags), warm)) is not None
+
+
 def _as_compiled(device: Device, text: str, flags: Sequence[str]) -> tuple[str, Sequence[str]]:
     """The text and the flags that a device's compiler is given."""
     if cannot_run_optimised_code(device.info):

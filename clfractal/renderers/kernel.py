@@ -102,6 +102,10 @@ class TileKernel(ABC):
     def texts(self) -> list[ProgramText]:
         """The programs."""
 
+    def possible_texts(self) -> list[ProgramText]:
+        """These, and those of all stages that other scenes with the same formula launch."""
+        return self.texts()
+
     def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
         """The kernels of a launch, in order, for samples from the first up to the second."""
         yield Stage(self.name)

@@ -126,6 +126,9 @@ class SurfaceKernel(TileKernel):
     def texts(self) -> list[ProgramText]:
         return program_texts(self.scene, self.plan)
 
+    def possible_texts(self) -> list[ProgramText]:
+        return program_texts(self.scene, self.plan, all_stages=True)
+
     def stages(self, samples: tuple[int, int]) -> Iterator[Stage]:
         return surface_stages(self.scene, self.plan, samples)
 
@@ -251,14 +254,14 @@ def _structs() -> dict[str, str]:
     }
 
 
-def program_texts(scene: Scene, plan: Plan) -> list[ProgramText]:
-    """The texts of the programs whose stages the scene launches."""
+def program_texts(scene: Scene, plan: Plan, *, all_stages: bool = False) -> list[ProgramText]:
+    """The texts of the programs whose stages the scene launches, or of all."""
     body = Body.of(scene)
     launched = {stage.kernel for stage in surface_stages(scene, plan, (0, 1))}
     defines = cache(lambda of: of(scene, plan))
     texts = []
     for each in _PROGRAMS:
-        if launched.isdisjoint(each.kernels):
+        if not all_stages and launched.isdisjoint(each.kernels):
             continue
         # All that there are: what is kept of a program has every kernel that any scene may launch.
         kernels = tuple(name for name in each.kernels if plan.lanes == 1 or name not in OF_SINGLE_LANES)

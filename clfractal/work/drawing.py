@@ -5,14 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from clfractal.device import program
+from clfractal.device import children, program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.kernels import Lease
 from clfractal.device.launch import Pace
@@ -89,6 +89,15 @@ class OutputBuffers:
             self.sets.append(OutputSet(results, statistics_part, film_part, places_buffer))
 
 
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A program that a view may need: its text, the compiler's flags, and its first launches."""
+
+    text: ProgramText
+    flags: tuple[str, ...]
+    warm: tuple[Warm, ...]
+
+
 class Drawing:
     """A view's program and arguments on a device, ready to be launched."""
 
@@ -127,10 +136,7 @@ class Drawing:
         plan, built_before = view.plan, self.device.loaded.building.milliseconds
         kernel = _kernel_of(view.scene.renderer.type)(view, resources)
         arguments = kernel.arguments()
-        self.packets = TILE_PIXELS // plan.lanes
-        self.group = max(GROUP_PIXELS[plan.lanes] // plan.lanes, 1)
-        self.capacity = max(1, min(CAPACITY, tiles))
-        self.wave = wave_of(kernel, self.device, self.capacity)
+        self._divide(kernel, tiles)
         film = self.capacity * len(plan.channels) * TILE_PIXELS * 4
         statistics = self.capacity * self.packets * 4 * len(STATISTICS)
         sizes = [_size(argument) for argument in arguments]
@@ -154,6 +160,19 @@ class Drawing:
             named = [(made, text.kernels) for text, made in zip(self._texts, built, strict=True)]
             self._kernels = Lease(self.device, named, 2 + number_count(kernel))
         self._stages = Stages(self.device, kernel, self.wave, self.group, self._kernels)
+
+    def wanted(self, view: PlannedView, resources: Resources) -> list[Wanted]:
+        """The programs of all stages that pictures of the view's formula may have; nothing is built. Not for volumes."""
+        kernel = _kernel_of(view.scene.renderer.type)(view, resources)
+        self._divide(kernel, 1)
+        # A map may take seconds to make, and is no part of a program.
+        plain = replace(view, scene=view.scene.model_copy(update={"environment": None}))
+        sizes = [_size(each) for each in _kernel_of(view.scene.renderer.type)(plain, resources).arguments()]
+        flags = program.math_flags(view.plan.precision)
+        return [
+            Wanted(text, flags, tuple(self._warm(kernel, name, sizes) for name in text.kernels))
+            for text in kernel.possible_texts()
+        ]
 
     @property
     def watched(self) -> list[Watched]:
@@ -225,6 +244,13 @@ class Drawing:
         film = told(found[head:].view(np.float32).reshape(shape), self.view.plan.channels, self.view.scene)
         return film, statistics.sum(axis=0, dtype=np.uint64)
 
+    def _divide(self, kernel: TileKernel, tiles: int) -> None:
+        """Into packets, groups and waves."""
+        self.packets = TILE_PIXELS // kernel.plan.lanes
+        self.group = max(GROUP_PIXELS[kernel.plan.lanes] // kernel.plan.lanes, 1)
+        self.capacity = max(1, min(CAPACITY, tiles))
+        self.wave = wave_of(kernel, self.device, self.capacity)
+
     def _built(self, kernel: TileKernel, sizes: list[int], resources: Resources) -> list[program.Program]:
         """The kernel's programs: those before, if their texts are the same."""
         # A volume's rays may be float32 whatever its grid was filled with: then the texts are the same, and the flags not.
@@ -254,18 +280,18 @@ class Drawing:
                 waits=resources.waits,
             )
 
-        # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all.
+        # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all. Those begin first
+        # that take longest, which are the longest texts, since a compiler that is left with one at the end is waited for.
         ended = threading.Event()
-        pool = ThreadPoolExecutor(len(texts))
+        pool = ThreadPoolExecutor(min(len(texts), children.processors()))
         try:
             # Oclgrind's checks of memory are lost with the thread that they began in.
             if is_simulator(self.device.info):
                 built = list(map(build, texts, warm))
             else:
-                built = [
-                    each.result()
-                    for each in [pool.submit(build, *each) for each in zip(texts, warm, strict=True)]
-                ]
+                jobs = sorted(zip(texts, warm, strict=True), key=lambda job: -len(job[0].flat.text))
+                under_way = {job[0].name: pool.submit(build, *job) for job in jobs}
+                built = [under_way[text.name].result() for text in texts]
         except BaseException:
             ended.set()
             raise

@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
+import warnings
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -39,13 +42,88 @@ def test_one_changed_byte_is_noticed(empty_cache: Path) -> None:
         assert cache.load_blob("a") is None, position
 
 
-def test_the_oldest_entries_go(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "MAXIMUM_BLOBS", 8)
-    for number in range(12):
-        cache.store_blob(f"{number:02d}", b"binary")
-    kept = list(empty_cache.rglob("*.bin"))
-    assert len(kept) <= 8
-    assert cache.load_blob("11") == b"binary"
+def stored_by_another(entries: Iterable[str], megabytes: float = 0.1) -> None:
+    """Another process keeps entries; the first was used longest ago."""
+    code = (
+        "import sys; from clfractal.device import cache\n"
+        "for key in sys.argv[2:]: assert cache.store_blob(key, bytes(int(float(sys.argv[1]) * 1e6)))"
+    )
+    names = list(entries)
+    subprocess.run([sys.executable, "-c", code, str(megabytes), *names], check=True)
+    for age, name in enumerate(reversed(names), start=1):
+        path = cache.folder() / "programs" / f"{name}.bin"
+        if path.exists():
+            os.utime(path, (time.time() - 100 * age,) * 2)
+
+
+def names(folder: Path) -> set[str]:
+    return {path.stem for path in folder.rglob("*.bin")}
+
+
+def test_what_was_used_longest_ago_goes(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(cache.SIZE_VARIABLE, "0.55")
+    stored_by_another("abcde")
+    assert names(empty_cache) == set("abcde")
+    assert cache.load_blob("a") is not None  # it is no longer the oldest
+    assert cache.store_blob("f", bytes(100_000))
+    assert names(empty_cache) == set("acdef")
+    assert cache.size() <= cache.limit() == 550_000
+
+
+def test_what_this_process_uses_does_not_go(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(cache.SIZE_VARIABLE, "0.35")
+    stored_by_another("abc")
+    for name in "abc":
+        assert cache.load_blob(name) is not None
+        os.utime(empty_cache / "programs" / f"{name}.bin", (1, 1))
+    assert not cache.store_blob("d", bytes(100_000))
+    assert names(empty_cache) == set("abc")
+    stored_by_another("e")  # which uses none of them
+    assert "e" in names(empty_cache)
+    assert len(names(empty_cache)) == 3
+
+
+def test_an_entry_takes_its_own_place(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(cache.SIZE_VARIABLE, "0.35")
+    for _ in range(3):
+        assert cache.store_blob("a", bytes(300_000))
+
+
+def test_nothing_is_kept_where_the_limit_is_0(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(cache.SIZE_VARIABLE, "0")
+    assert not cache.store_blob("a", b"binary")
+    assert cache.load_blob("a") is None
+    assert cache.size() == 0
+
+
+@pytest.mark.parametrize("given", ["-1", "many", "nan", "inf", "1e99", "9" * 400, "1000001", "\u0661"])
+def test_a_limit_that_is_none_is_told_once(
+    given: str, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cache, "_told", set())
+    monkeypatch.setenv(cache.SIZE_VARIABLE, given)
+    with pytest.warns(CacheWarning, match="^CLFRACTAL_CACHE_MB must be megabytes from 0 to 1000000, got "):
+        assert cache.store_blob("a", b"binary")
+    with warnings.catch_warnings(action="error"):
+        assert cache.store_blob("b", b"binary")
+    assert cache.load_blob("a") == b"binary"
+
+
+def test_processes_that_make_room_do_not_disturb_each_other(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(cache.SIZE_VARIABLE, "0.05")
+    code = (
+        "import sys; from clfractal.device import cache\n"
+        "for i in range(60):\n"
+        "    key = f'{i % 30}'\n"
+        "    cache._used.clear()\n"
+        "    assert cache.store_blob(key, key.encode() * 2000)\n"
+        "    assert cache.load_blob(f'{(i * 7) % 30}') in (None, f'{(i * 7) % 30}'.encode() * 2000)"
+    )
+    children = [subprocess.Popen([sys.executable, "-W", "error", "-c", code]) for _ in range(3)]
+    assert [child.wait() for child in children] == [0, 0, 0]
+    assert cache.size() <= 2 * cache.limit()
 
 
 def test_facts_add_up(empty_cache: Path) -> None:

@@ -1,0 +1,148 @@
+"""`clfractal precompile`: what is compiled, kept and told."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from clfractal import resources
+from clfractal.formulas import catalog
+from clfractal.work.precompile import library_scenes
+from tests.shell import SCENE, Ended, InProcess, command, environment, process
+from tests.test_interrupt import LIMIT_SECONDS, _interrupts_are_not_ignored
+
+__all__ = ["_interrupts_are_not_ignored"]
+
+TOLD = re.compile(r".*: (\d+) programs, (\d+) of them compiled now; [\d.]+ s, the cache has ([\d.]+) MB\n")
+
+
+def given(folder: Path, **more: str) -> dict[str, str]:
+    """A cache of its own, and lanes that need not be measured."""
+    return {"CLFRACTAL_CACHE": str(folder / "cache"), "CLFRACTAL_LANES": "1", **more}
+
+
+def entries(folder: Path) -> set[str]:
+    return {path.name for path in (folder / "cache" / "programs").iterdir()}
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ended]:
+    """A folder with a scene whose programs are compiled."""
+    folder = tmp_path_factory.mktemp("compiled")
+    (folder / "a.yaml").write_text(SCENE)
+    return folder, process(["precompile", "a.yaml"], folder, given(folder))
+
+
+def test_the_last_line_tells_what_was_done(compiled: tuple[Path, Ended]) -> None:
+    folder, ended = compiled
+    assert (ended.status, ended.out) == (0, "")
+    told = TOLD.fullmatch(ended.err.splitlines(keepends=True)[-1])
+    assert told is not None, ended.err
+    assert int(told[1]) == int(told[2]) >= 10
+    # Beside these the window has two.
+    assert len(entries(folder)) == int(told[1]) + 2
+    size = sum(path.stat().st_size for path in (folder / "cache" / "programs").iterdir())
+    assert float(told[3]) == pytest.approx(size / 1e6, abs=0.06)
+
+
+def test_nothing_is_compiled_twice(compiled: tuple[Path, Ended]) -> None:
+    folder, _ = compiled
+    before = entries(folder)
+    again = TOLD.fullmatch(process(["precompile", "a.yaml"], folder, given(folder)).err)
+    assert again is not None
+    assert again[2] == "0"
+    assert entries(folder) == before
+    assert process(["precompile", "a.yaml", "--quiet"], folder, given(folder)) == Ended(0, "", "")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "fog={density: 0.1, scattering: {}}",
+        "lighting={mode: path}",
+        "coloring={by: trap, trap: {shape: sphere}}",
+        "glow={by: trap}",
+        "objects={ball: {type: sphere, position: [1.5, 0, 0], radius: 0.3}}",
+        "cut_planes=[{plane: {center: [0, 0, 0], normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]",
+    ],
+)
+def test_what_is_switched_on_is_compiled(compiled: tuple[Path, Ended], change: str) -> None:
+    folder, _ = compiled
+    before = entries(folder)
+    ended = process(["render", "a.yaml", "-o", "a.png", "-q", "--set", change], folder, given(folder))
+    assert ended == Ended(0, "", "")
+    assert entries(folder) == before
+
+
+def test_a_limit_that_is_too_small_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(SCENE.replace("camera:", "renderer: {type: cut_plane}\ncamera:"))
+    ended = process(["precompile", "a.yaml"], tmp_path, given(tmp_path, CLFRACTAL_CACHE_MB="0"))
+    assert ended.status == 0
+    assert ended.err.endswith(
+        "programs are not kept: the cache takes no more than 0 MB; CLFRACTAL_CACHE_MB sets the limit\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["none.yaml"], "none.yaml"),
+        (["a.yaml", "--device", "nothing"], "nothing"),
+        (["a.yaml", "--precision", "half"], "--precision"),
+        (["bad.yaml"], "bad.yaml:2"),
+    ],
+)
+def test_mistakes_are_one_line(
+    arguments: list[str],
+    part: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.yaml").write_text(SCENE)
+    (tmp_path / "bad.yaml").write_text(SCENE.replace("mandelbulb", "mandelbub"))
+    assert InProcess(capsys)("precompile", *arguments).is_one_line(2, part)
+
+
+def test_an_interrupt_keeps_what_is_done(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(SCENE)
+    running = subprocess.Popen(
+        command("precompile", "a.yaml"),
+        cwd=tmp_path,
+        env=environment(given(tmp_path)),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    programs, deadline = tmp_path / "cache" / "programs", time.monotonic() + 60
+    while not programs.exists() or len(list(programs.glob("*.bin"))) < 4:  # the window's two come first
+        assert running.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    begun = time.monotonic()
+    running.send_signal(signal.SIGINT)
+    _, told = running.communicate(timeout=60)
+    assert time.monotonic() - begun < LIMIT_SECONDS
+    assert running.returncode == 130
+    last = told.splitlines()[-1]
+    assert re.fullmatch(r"clfractal: interrupted with \d+ of \d+ done; what is compiled is kept", last)
+    kept = entries(tmp_path)
+    assert kept
+    assert all(name.endswith(".bin") for name in kept)
+    ended = TOLD.fullmatch(
+        process(["precompile", "a.yaml"], tmp_path, given(tmp_path)).err.splitlines(True)[-1]
+    )
+    assert ended is not None
+    assert 0 < int(ended[2]) < int(ended[1])
+
+
+def test_the_library_has_every_formula_and_scene() -> None:
+    files = sorted(resources.folder("scenes").glob("*.yaml"))[:2]
+    found = [scene.formula.name for scene in library_scenes(files)]
+    assert found[:-2] == list(catalog.names())
+    assert len(found) == len(catalog.names()) + 2
