@@ -12,7 +12,7 @@
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
 // will do: an orbit that comes near itself may still escape. `periodicity` 0 skips this test, for comparison.
-INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
+INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
                             __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
@@ -34,7 +34,7 @@ INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicit
             const int end = min(n + PERIOD_CHECK, limit);
             for (; n < end; ++n) {
                 if (!any_lane(alive)) break;
-                z = state_pick(alive, apply(n, z, c, k), z);
+                z = state_pick(alive, apply_by(usual, n, z, c, k), z);
                 if (!LOGARITHMIC) square_before = pick(alive, square, square_before);
                 square = state_square(z);
                 count += pick(alive, R(1.0), R(0.0));
@@ -80,6 +80,19 @@ INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicit
     }
     result.count = pick(inside, (real)((scalar)most), count);
     return result;
+}
+
+CALLED void other_escape(const vec *point, const mask *active, int smooth, int periodicity, int most, escaped *found,
+                         __constant const struct Orbit *orbit, __constant const scalar *k) {
+    *found = escape_by(0, *point, *active, smooth, periodicity, most, orbit, k);
+}
+
+INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
+                              __constant const scalar *k) {
+    if (has_usual_values(k)) return escape_by(1, point, active, smooth, periodicity, most, orbit, k);
+    escaped found;
+    other_escape(&point, &active, smooth, periodicity, most, &found, orbit, k);
+    return found;
 }
 
 // Of several solids that are joined counts are the largest of what is beside each other, and the smaller of both where only what they

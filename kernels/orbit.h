@@ -1,9 +1,9 @@
 // Orbits of points under the formula, as one loop over a packet: escape counts, inside tests, distances and gradients.
 //
 // From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
-// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, apply,
-// apply_derivative, dual_start, dual_apply, state_pick, dual_state_pick, state_square, solid_distance. Of several formulas they are
-// of the one whose constants are given, and what these do not have in common is read from its `orbit`.
+// LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, dual_start, apply,
+// apply_derivative and dual_apply (each also as ..._by), has_usual_values, state_pick, dual_state_pick, state_square, solid_distance.
+// Of several formulas they are of the one whose constants are given, and what these do not have in common is read from its `orbit`.
 //
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
@@ -74,10 +74,13 @@ INLINE orbit_counted formula_escape_count(vec point, mask active, __constant con
     return result;
 }
 
+// Orbits are written for the `usual` values of a formula's exponents and conditions, which are literals then, and for any: a branch
+// around the whole orbit, since what others call moves all registers into memory.
+
 // Which points belong to the solid of `limit` applications: the inside of the distances below, without the distance. The
 // solids of fewer applications hold those of more (but for an orbit that comes back from beyond the distance bailout).
-INLINE orbit_end formula_end(vec point, mask active, int limit, __constant const struct Orbit *orbit,
-                             __constant const scalar *k) {
+INLINE orbit_end end_by(int usual, vec point, mask active, int limit, __constant const struct Orbit *orbit,
+                        __constant const scalar *k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
@@ -89,7 +92,7 @@ INLINE orbit_end formula_end(vec point, mask active, int limit, __constant const
             if (orbit_cancelled(orbit)) break;
             look += ORBIT_LOOK;
         }
-        const state next = apply(n, z, c, k);
+        const state next = apply_by(usual, n, z, c, k);
         z = state_pick(alive, next, z);
         square = pick(alive, state_square(next), square);
         count = pick(alive, (real)((scalar)(n + 1)), count);
@@ -98,6 +101,11 @@ INLINE orbit_end formula_end(vec point, mask active, int limit, __constant const
     alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & settled(square, orbit);
     const orbit_end result = {count, alive};
     return result;
+}
+
+INLINE orbit_end formula_end(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (has_usual_values(k)) return end_by(1, point, active, limit, orbit, k);
+    return end_by(0, point, active, limit, orbit, k);
 }
 
 INLINE mask formula_inside(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
@@ -122,9 +130,9 @@ INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, __consta
     o->inside = o->alive & ~o->alive;
 }
 
-INLINE void scalar_orbit_apply(scalar_orbit *o, int n, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, __constant const struct Orbit *orbit, __constant const scalar *k) {
     real next_growth = o->growth;
-    const state next = apply_derivative(n, o->z, o->c, &next_growth, k);
+    const state next = apply_derivative_by(usual, n, o->z, o->c, &next_growth, k);
     o->z = state_pick(o->alive, next, o->z);
     o->growth = pick(o->alive, next_growth, o->growth);
     o->square = pick(o->alive, state_square(next), o->square);
@@ -149,22 +157,27 @@ INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant
     return result;
 }
 
-INLINE clearance formula_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
-                                       __constant const scalar *k) {
+INLINE clearance scalar_distance_by(int usual, vec point, mask active, __constant const struct Orbit *orbit,
+                                    __constant const scalar *k) {
     scalar_orbit o;
     scalar_orbit_begin(&o, point, active, orbit, k);
     for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
         if (n == look && orbit_look(n, &look, o.square, &o.alive, &o.inside, orbit)) break;
         if (!any_lane(o.alive)) break;
-        scalar_orbit_apply(&o, n, orbit, k);
+        scalar_orbit_apply(usual, &o, n, orbit, k);
     }
     return scalar_orbit_end(&o, active, orbit, k);
 }
 
+INLINE clearance formula_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (has_usual_values(k)) return scalar_distance_by(1, point, active, orbit, k);
+    return scalar_distance_by(0, point, active, orbit, k);
+}
+
 // The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
 // on the other packet's meanwhile.
-INLINE void formula_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
-                                   __constant const scalar *k) {
+INLINE void scalar_distances_by(int usual, const vec *points, const mask *active, clearance *found,
+                                __constant const struct Orbit *orbit, __constant const scalar *k) {
     scalar_orbit a, b;
     scalar_orbit_begin(&a, points[0], active[0], orbit, k);
     scalar_orbit_begin(&b, points[1], active[1], orbit, k);
@@ -175,11 +188,21 @@ INLINE void formula_scalar_distances(const vec *points, const mask *active, clea
         // One of them may go on for long.
         const int first = any_lane(a.alive), second = any_lane(b.alive);
         if (!(first | second)) break;
-        if (first) scalar_orbit_apply(&a, n, orbit, k);
-        if (second) scalar_orbit_apply(&b, n, orbit, k);
+        if (first) scalar_orbit_apply(usual, &a, n, orbit, k);
+        if (second) scalar_orbit_apply(usual, &b, n, orbit, k);
     }
     found[0] = scalar_orbit_end(&a, active[0], orbit, k);
     found[1] = scalar_orbit_end(&b, active[1], orbit, k);
+}
+
+CALLED void other_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
+                                   __constant const scalar *k) {
+    scalar_distances_by(0, points, active, found, orbit, k);
+}
+INLINE void formula_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
+                                     __constant const scalar *k) {
+    if (has_usual_values(k)) scalar_distances_by(1, points, active, found, orbit, k);
+    else other_scalar_distances(points, active, found, orbit, k);
 }
 #endif
 
@@ -188,8 +211,8 @@ INLINE void formula_scalar_distances(const vec *points, const mask *active, clea
 // The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
 // a place beside it may be some applications farther. By them space is stretched once more, and where it is stretched unevenly their level
 // sets face elsewhere. So no gradient `of` the surface is that of a z after `gradient_limit`.
-INLINE clearance formula_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
-                                     __constant const scalar *k, surface_point *surface) {
+INLINE clearance dual_distance_by(int usual, vec point, mask active, int of, __constant const struct Orbit *orbit,
+                                  __constant const scalar *k, surface_point *surface) {
     dual_state c, z;
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
@@ -207,7 +230,7 @@ INLINE clearance formula_dual_distance(vec point, mask active, int of, __constan
             }
         }
         if (!any_lane(alive)) break;
-        const dual_state next = dual_apply(n, z, c, k);
+        const dual_state next = dual_apply_by(usual, n, z, c, k);
         z = dual_state_pick(alive, next, z);
         square_before = pick(alive, square, square_before);
         square = pick(alive, dual_state_square(next), square);
@@ -235,6 +258,18 @@ INLINE clearance formula_dual_distance(vec point, mask active, int of, __constan
     const real step = pick(inside, R(0.0), distance);
     const clearance result = {step, {count, inside}, step};
     return result;
+}
+
+CALLED void other_dual_distance(const vec *point, const mask *active, int of, clearance *found, surface_point *surface,
+                                __constant const struct Orbit *orbit, __constant const scalar *k) {
+    *found = dual_distance_by(0, *point, *active, of, orbit, k, surface);
+}
+INLINE clearance formula_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
+                                       __constant const scalar *k, surface_point *surface) {
+    if (has_usual_values(k)) return dual_distance_by(1, point, active, of, orbit, k, surface);
+    clearance found;
+    other_dual_distance(&point, &active, of, &found, surface, orbit, k);
+    return found;
 }
 
 // Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially

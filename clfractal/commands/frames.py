@@ -20,7 +20,7 @@ formula: {{name: mandelbulb, parameters: {{power: 8, theta_phase: 0.01}}, iterat
 {_SIZE}camera: {{position: [0, -3, 0], target: [0, 0, 0], up: [0, 0, 1], fov: 53.13}}
 lights: [{{direction: [0.5, 0.6, -0.62], shadow: true}}]
 """
-_LIVE = _BULB.replace("power: 8,", "power: 7.5,").replace("iterations", "live: [power], iterations")
+_LIVE = _BULB.replace("power: 8,", "power: 7.5,")
 _FOG = f"""\
 version: 1
 formula: {{name: hast, parameters: {{power: 2}}, iterations: 40}}

@@ -29,7 +29,7 @@ from clfractal.work.variations import (
     Variation,
     candidates,
     nothing_to_vary,
-    preview_scene,
+    small_scene,
     worthwhile,
 )
 from clfractal.work.varied import Kind, Strength
@@ -124,7 +124,7 @@ def _vary(order: Order, choice: Choice, shell: Shell) -> None:
             f"clfractal: interrupted with {len(pictures)} of {choice.count} variations written"
         )
         for name, variation in zip(names, _worthwhile(scene, drawn, choice.count, engine), strict=False):
-            film = engine.render(preview_scene(variation.scene, *size), channels=_CHANNELS)
+            film = engine.render(small_scene(variation.scene, *size), channels=_CHANNELS)
             text = write_document(to_folder.plain(variation.scene))
             if not choice.is_sheet:
                 # The picture holds the variation itself, rather than what made the picture small and quick.
@@ -188,7 +188,7 @@ def _worthwhile(scene: Scene, drawn: Iterator[Variation], count: int, engine: En
     """Those variations of which a very small picture shows something; all, if even the scene's own shows nothing."""
 
     def shows(each: Scene) -> bool:
-        return worthwhile(engine.render(preview_scene(each, *PREVIEW_SIZE), samples=1, channels=_CHANNELS))
+        return worthwhile(engine.render(small_scene(each, *PREVIEW_SIZE), samples=1, channels=_CHANNELS))
 
     if not shows(scene):
         yield from drawn

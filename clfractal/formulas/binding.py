@@ -28,8 +28,8 @@ def bind(
 ) -> BoundFormula:
     """The formula with values for its parameters; values that are not given are the defaults.
 
-    `julia` (one number for each variable) adds this constant in place of the point. `live` names parameters whose
-    values never become part of the code.
+    `julia` (one number for each variable) adds this constant in place of the point. `live` names parameters,
+    and has no effect.
 
     Raises:
         FormulaError: an unknown parameter, a value out of range, a julia of the wrong length, or values that
@@ -46,13 +46,13 @@ def bind(
                 unknown_name("parameter", str(name), known), inside(where, "parameters", str(name))
             )
         values[name] = parameter.check(value, inside(where, "parameters", name))
+    _check_live(live, known, inside(where, "live"))
     bound = BoundFormula(
         formula,
         values,
         _check_julia(formula, julia, inside(where, "julia")),
         check_radius(bailout, inside(where, "bailout")),
         check_radius(distance_bailout, inside(where, "distance_bailout")),
-        _check_live(live, known, inside(where, "live")),
     )
     _check_derived(bound, where)
     _check_constants(bound, where)
@@ -70,13 +70,12 @@ def check_radius(value: object, where: Where) -> float | None:
     return float(value)
 
 
-def _check_live(live: object, known: Sequence[str], where: Where) -> frozenset[str]:
+def _check_live(live: object, known: Sequence[str], where: Where) -> None:
     if not isinstance(live, (list, tuple)):
         raise FormulaError("must be a list of names of parameters", where)
     for index, name in enumerate(live):
         if name not in known:
             raise FormulaError(unknown_name("parameter", str(name), known), inside(where, str(index)))
-    return frozenset(live)
 
 
 def _check_julia(formula: Formula, julia: object, where: Where) -> tuple[float, ...] | None:

@@ -32,7 +32,7 @@ class Link:
     @property
     def structure(self) -> tuple[object, ...]:
         """What its text depends on beside values of parameters."""
-        return (self.bound.formula, self.bound.add, self.turns, self.bound.live)
+        return (self.bound.formula, self.bound.add, self.turns)
 
     @property
     def turns(self) -> tuple[int, int, int | None]:
@@ -73,20 +73,6 @@ class Chain:
             if not 0 <= link.start <= MAX_START or (link.stop is not None and link.stop <= link.start):
                 raise FormulaError(f"start must be 0 to {MAX_START} and below stop", Where())
         _ = self.spans
-        self._check_live()
-
-    def _check_live(self) -> None:
-        """Refuses values of live parameters that only another text could show."""
-        first = self.first
-        if first.live and first.add == "point" and not first.formula.point_map and first.start is None:
-            raise FormulaError(f"f(0) is not a finite number with {_live_values(first)}", Where())
-        for link in self.lasting:
-            if link.bound.depends_on_live(link.bound.formula.degree) and self.degree <= 1:
-                raise FormulaError(
-                    f"degree must be above 1 where it follows from a live parameter, got {self.degree:g}"
-                    f" with {_live_values(link.bound)}",
-                    Where(),
-                )
 
     @cached_property
     def key(self) -> tuple[object, ...]:
@@ -211,10 +197,6 @@ class Chain:
     def step_scale(self) -> float:
         """Part of an estimated distance that is safe to step: the links' smallest."""
         return self.step_scale_override or min(link.bound.step_scale for link in self.links)
-
-
-def _live_values(bound: BoundFormula) -> str:
-    return ", ".join(f"{name} = {value:g}" for name, value in bound.values.items() if name in bound.live)
 
 
 def single(bound: BoundFormula, source: Mapping[str, Any] | None = None) -> Chain:

@@ -2,8 +2,9 @@
 
 Every value is classified by what it depends on, and costs accordingly:
 
-- *constant*: only parameters. Evaluated on the host; a value that shapes no code is passed at run time in the array `k`.
-  What a live parameter is in never shapes code: neither a value of 0 or 1, nor a condition, nor a whole exponent.
+- *constant*: only parameters. Evaluated on the host and passed at run time in the array `k`, so that no value of a
+  parameter shapes code. Where code would differ both ways are written, and a branch that all lanes take alike chooses:
+  by the truth of a condition, or by what an exponent is.
 - *flat*: the state, but with slope zero everywhere (`floor`, `sign`, a `where` of constants): a plain `real`.
 - *varying*: the state: `real` or `dual`, as the number type says.
 
@@ -13,36 +14,34 @@ Equal operations on equal operands become one statement, so formulas may repeat 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeGuard
 
-from clfractal.formulas.decisions import Decisions
 from clfractal.formulas.evaluate import evaluate_constant
 from clfractal.formulas.nodes import COMPARISONS, Call, Name, Node, Number, names_in, substitute
+from clfractal.formulas.products import Value, literal, power_over_root, whole_complex_power, whole_power
 
 NumberType = Literal["real", "dual"]
 _LIFTED = frozenset(("atan2", "min", "max", "mod"))
 _COMPLEX_POWERS = frozenset(("cpow_re", "cpow_im"))
 # Functions that cost so much that they are not written twice where operands can be chosen in place of results.
 _COSTLY = _COMPLEX_POWERS | {*("pow", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2")}
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    """An operand: C text, and what it is. `number` is set for literals, `node` for constants of either sort."""
-
-    text: str
-    kind: Literal["constant", "flat", "varying"]
-    node: Node | None = None
-    number: float | None = None
+# The largest whole exponent whose power is made of products.
+_WHOLE = 1024
 
 
 @dataclass(slots=True)
 class Constants:
-    """Gives places to what the host passes at run time: `k[i]` in the text. Values come later."""
+    """Gives places to what the host passes at run time: `k[i]` in the text. Values come later.
+
+    Attributes:
+        owners: of each place whose it is, and its expression of parameters.
+        strict: places whose value must be a finite number. It need not be where only a branch uses it that is not taken.
+    """
 
     owners: list[tuple[object, Node | None]] = field(default_factory=list)
+    strict: set[int] = field(default_factory=set)
     _slots: dict[tuple[object, Node | None], int] = field(default_factory=dict)
 
     def slot(self, owner: object, node: Node | None = None) -> int:
@@ -54,13 +53,12 @@ class Constants:
         return self._slots[key]
 
     def text(self, owner: object, node: Node | None = None) -> str:
-        """The same as C text."""
+        """The same as C text, for all lanes of a packet."""
         return f"((real)(k[{self.slot(owner, node)}]))"
 
 
-def literal(value: float) -> Value:
-    """A number known when the text is written."""
-    return Value(f"R({float(value)!r})", "constant", Number(value), float(value))
+def _is_complex_power(node: Node) -> TypeGuard[Call]:
+    return isinstance(node, Call) and node.function in _COMPLEX_POWERS
 
 
 @dataclass(slots=True)
@@ -72,7 +70,8 @@ class Emitter:
         bindings: the values of the names that expressions may use.
         constants: where run-time constants are collected.
         owner: distinguishes equal expressions with different parameter values (links of a chain).
-        decisions: all that may be known of parameter values while writing.
+        guarded: whether all of it is used for some values of parameters only.
+        branches: whether conditions of parameters become branches, else selections: only these can be differentiated.
         prefix: begins the names of this emitter's variables.
         lets: further names and their expressions, written where they are first used.
         lines: the statements so far.
@@ -83,14 +82,18 @@ class Emitter:
     bindings: dict[str, Value]
     constants: Constants
     owner: object
-    decisions: Decisions
+    branches: bool = False
+    guarded: bool = False
     prefix: str = "t"
     lets: dict[str, Node] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
     origins: dict[str, tuple[str, tuple[Value, ...]]] = field(default_factory=dict)
     _known: dict[tuple[str, ...], Value] = field(default_factory=dict)
-    # How many branches of run-time conditions surround what is written: values there need not be numbers.
-    _branches: int = 0
+    _pairs: dict[tuple[Node, ...], tuple[Value, Value]] = field(default_factory=dict)
+    _constancy: dict[str, bool] = field(default_factory=dict)
+    _names: int = 0
+    # How many arms of conditions with parameters surround what is written: values there need not be numbers.
+    _arms: int = 0
 
     def emit(self, node: Node) -> Value:
         """The value of an expression; appends the statements that compute it."""
@@ -98,16 +101,10 @@ class Emitter:
             return literal(node.value)
         if isinstance(node, Name):
             value = self._binding(node.name)
-            return value if value.text else self._constant(node, [value])
-        if node.function == "where":
-            chosen = self._decided(node.arguments[0])
-            if chosen is not None:
-                return self.emit(node.arguments[1 if chosen else 2])
-        names = {name: self._binding(name) for name in sorted(names_in(node))}
-        if all(value.kind == "constant" for value in names.values()):
-            return self._constant(
-                substitute(node, {n: v.node for n, v in names.items() if v.node}), names.values()
-            )
+            return value if value.text else self._constant(node)
+        closed = self._closed(node)
+        if closed is not None:
+            return self._constant(closed)
         function = node.function
         if function == "where":
             return self._where(node)
@@ -153,26 +150,27 @@ class Emitter:
 
     # --- operations ---
 
-    def _constant(self, node: Node, operands: Iterable[Value]) -> Value:
-        """A value known to the host: part of the text if it shapes code or is plain, else a run-time constant."""
-        if all(operand.number is not None for operand in operands):
+    def _constant(self, node: Node) -> Value:
+        """A value known to the host: part of the text if no parameter is in it, else a run-time constant."""
+        if not names_in(node):
             return literal(evaluate_constant(node, {}))
-        # A run-time constant of 0 or 1 is usually a feature that is off: its operations vanish from the code.
-        strict = self._branches == 0
-        number = self.decisions.folded(node, strict=strict)
-        if number is not None:
-            return literal(number)
-        return Value(self._passed(node, strict=strict), "constant", node)
+        return Value(f"((real)({self._passed(node)}))", "constant", node)
 
-    def _passed(self, node: Node, *, strict: bool) -> str:
-        """The C text of a value that the host passes at run time; the truth of a condition is 1 or 0."""
-        self.decisions.place(node, self.constants.slot(self.owner, node), strict=strict)
-        return self.constants.text(self.owner, node)
+    def _passed(self, node: Node) -> str:
+        """The C text of a number that the host passes at run time; the truth of a condition is 1 or 0."""
+        slot = self.constants.slot(self.owner, node)
+        if self._arms == 0 and not self.guarded:
+            self.constants.strict.add(slot)
+        return f"k[{slot}]"
+
+    def _name(self) -> str:
+        self._names += 1
+        return f"{self.prefix}{self._names - 1}"
 
     def _statement(self, c_type: str, kind: Literal["flat", "varying"], call: str, *arguments: str) -> Value:
         key = (call, *arguments)
         if key not in self._known:
-            name = f"{self.prefix}{len(self._known)}"
+            name = self._name()
             self.lines.append(f"const {c_type} {name} = {call}({', '.join(arguments)});")
             self._known[key] = Value(name, kind)
         return self._known[key]
@@ -201,7 +199,7 @@ class Emitter:
                 return self._operation("rsqrt", square)
         if function == "div" and b is not None and b.kind == "constant" and b.number != 0:
             # The host divides once; the kernel multiplies.
-            inverse = self._constant(Call("div", (Number(1.0), b.node or Number(1.0))), [literal(1.0), b])
+            inverse = self._constant(Call("div", (Number(1.0), b.node or Number(1.0))))
             return self._operation("mul", a, inverse)
         result = self._call(function, operands)
         self.origins.setdefault(result.text, (function, operands))
@@ -249,39 +247,58 @@ class Emitter:
     def _power(self, base: Value, exponent: Value) -> Value:
         """base ** exponent: whole exponents by repeated squaring, so that no logarithm is involved."""
         n = exponent.number
-        if n is not None and n == math.floor(n) and abs(n) <= 1024:
+        if n is not None and n == math.floor(n) and abs(n) <= _WHOLE:
             if n < 0:
-                return self._operation("div", literal(1.0), self._whole_power(base, int(-n)))
-            return self._whole_power(base, int(n)) if n > 0 else literal(1.0)
-        if n is not None and n + 0.5 == math.floor(n + 0.5) and 0 < n <= 1024:
+                return self._operation("div", literal(1.0), whole_power(self._operation, base, int(-n)))
+            return whole_power(self._operation, base, int(n)) if n > 0 else literal(1.0)
+        if n is not None and n + 0.5 == math.floor(n + 0.5) and 0 < n <= _WHOLE:
             # A half more than a whole power is that power times the square root.
             root = self._operation("sqrt", base)
-            return root if n == 0.5 else self._operation("mul", self._whole_power(base, int(n)), root)
+            return (
+                root if n == 0.5 else self._operation("mul", whole_power(self._operation, base, int(n)), root)
+            )
+        if exponent.node is not None and n is None:
+            return self._raised(base, exponent)
         if self.number_type == "dual" and base.kind == "varying" and exponent.kind != "varying":
             return self._statement("dual", "varying", "dual_pow_real", base.text, exponent.text)
         if self.number_type == "dual" and "varying" in (base.kind, exponent.kind):
             return self._statement("dual", "varying", "dual_pow", self._lift(base), self._lift(exponent))
         return self._operation("pow", base, exponent)
 
-    def _whole_power(self, base: Value, n: int) -> Value:
-        if n == 1:
-            return base
-        half = self._whole_power(base, n // 2)
-        square = self._operation("mul", half, half)
-        return self._operation("mul", square, base) if n % 2 else square
+    def _raised(self, base: Value, exponent: Value) -> Value:
+        """base ** exponent where the exponent is data; see `kernels/numbers/powers.h`."""
+        passed = self._exponent(exponent)
+        if self.number_type == "dual" and base.kind == "varying":
+            return self._statement("dual", "varying", "dual_raised", base.text, *passed)
+        kind: Literal["flat", "varying"] = "varying" if base.kind == "varying" else "flat"
+        result = self._statement("real", kind, "real_raised", base.text, *passed)
+        self.origins.setdefault(result.text, ("raised", (base, exponent)))
+        return result
+
+    def raised_slope(self, base: Value, exponent: Value) -> Value:
+        """The derivative of `_raised` by its base."""
+        return self._statement("real", "varying", "real_raised_slope", base.text, *self._exponent(exponent))
+
+    def _exponent(self, exponent: Value) -> tuple[str, str]:
+        """An exponent that is data, and twice it where that is a whole number, else 0."""
+        node = exponent.node
+        assert node is not None
+        twice = Call("mul", (Number(2.0), node))
+        short = Call("le", (Call("abs", (node,)), Number(float(_WHOLE))))
+        whole = Call("and", (Call("eq", (twice, Call("floor", (twice,)))), short))
+        return self._passed(node), f"(int){self._passed(Call('where', (whole, twice, Number(0.0))))}"
 
     def _complex_power(self, x: Value, y: Value, exponent: Value) -> tuple[Value, Value]:
         """(x + iy)^n: whole n by complex multiplications, otherwise by modulus and angle."""
         n = exponent.number
-        if n is not None and n == math.floor(n) and 0 < abs(n) <= 1024:
-            square = self.radicand(y)
+        if n is None:
+            return self._raised_complex(x, y, exponent)
+        if n == math.floor(n) and 0 < abs(n) <= _WHOLE:
+            square = self._square_of_root(y)
             if square is None:
-                re, im = self._whole_complex_power(x, y, int(abs(n)))
+                re, im = whole_complex_power(self._operation, x, y, int(abs(n)))
             else:
-                if not self._never_negative(square):
-                    # The root of a negative number is 0, and so is its square.
-                    square = self._operation("max", square, literal(0.0))
-                re, share = self._power_over_root(x, square, int(abs(n)))
+                re, share = power_over_root(self._operation, x, square, int(abs(n)))
                 im = self._operation("mul", share, y)
             if n > 0:
                 return re, im
@@ -291,71 +308,58 @@ class Emitter:
                 "neg", self._operation("div", im, square)
             )
         square = self._operation("add", self._operation("mul", x, x), self._operation("mul", y, y))
-        half = (
-            self._operation("mul", exponent, literal(0.5)) if exponent.node is None else self._half(exponent)
-        )
-        modulus = self._power(square, half)
-        if exponent.node is not None and self.decisions.is_live(exponent.node):
-            # A live exponent may become negative, and (0 + 0i)^n is 0 then too; it is 1 for n = 0.
-            zero = Call("eq", (exponent.node, Number(0.0)))
-            origin = self._constant(Call("where", (zero, Number(1.0), Number(0.0))), [exponent])
-            modulus = self._select(f"less(R(0.0), {self._plain(square)})", modulus, origin)
+        modulus = self._power(square, literal(n / 2))
         angle = self._operation("mul", self._operation("atan2", y, x), exponent)
         return (
             self._operation("mul", modulus, self._operation("cos", angle)),
             self._operation("mul", modulus, self._operation("sin", angle)),
         )
 
-    def _half(self, exponent: Value) -> Value:
-        node = exponent.node or Number(0.0)
-        return self._constant(Call("mul", (node, Number(0.5))), [exponent, literal(0.5)])
+    def _square_of_root(self, y: Value) -> Value | None:
+        """The square of what was computed as a root, else None."""
+        square = self.radicand(y)
+        if square is not None and not self._never_negative(square):
+            # The root of a negative number is 0, and so is its square.
+            square = self._operation("max", square, literal(0.0))
+        return square
 
-    def _whole_complex_power(self, x: Value, y: Value, n: int) -> tuple[Value, Value]:
-        if n == 1:
-            return x, y
-        re, im = self._whole_complex_power(x, y, n // 2)
-        # (re + im)(re - im) cancels less than re^2 - im^2.
-        real_part = self._operation("mul", self._operation("add", re, im), self._operation("sub", re, im))
-        product = self._operation("mul", re, im)
-        imaginary = self._operation("add", product, product)
-        if n % 2 == 0:
-            return real_part, imaginary
-        return (
-            self._operation(
-                "sub", self._operation("mul", real_part, x), self._operation("mul", imaginary, y)
-            ),
-            self._operation(
-                "add", self._operation("mul", real_part, y), self._operation("mul", imaginary, x)
-            ),
-        )
-
-    def _power_over_root(self, x: Value, square: Value, n: int) -> tuple[Value, Value]:
-        """(x + i sqrt(square))^n as (re, s) with imaginary part s * sqrt(square), so that nothing waits for the root."""
-        if n == 1:
-            return x, literal(1.0)
-        do = self._operation
-        re, s = self._power_over_root(x, square, n // 2)
-        squared = do("sub", do("mul", re, re), do("mul", square, do("mul", s, s)))
-        product = do("mul", re, s)
-        doubled = do("add", product, product)
-        if n % 2 == 0:
-            return squared, doubled
-        return (
-            do("sub", do("mul", squared, x), do("mul", square, doubled)),
-            do("add", do("mul", doubled, x), squared),
-        )
+    def _raised_complex(self, x: Value, y: Value, exponent: Value) -> tuple[Value, Value]:
+        """(x + iy)^n where n is data; see `kernels/numbers/powers.h`."""
+        passed = self._exponent(exponent)
+        if self.number_type == "dual" and "varying" in (x.kind, y.kind):
+            pair = self._statement(
+                "complex_dual", "varying", "dual_complex_raised", self._lift(x), self._lift(y), *passed
+            )
+            return Value(f"{pair.text}.re", "varying"), Value(f"{pair.text}.im", "varying")
+        kind: Literal["flat", "varying"] = "varying" if "varying" in (x.kind, y.kind) else "flat"
+        square = self._square_of_root(y)
+        if square is None:
+            pair = self._statement("complex_real", kind, "complex_raised", x.text, y.text, *passed)
+        else:
+            pair = self._statement(
+                "complex_real", kind, "complex_raised_root", x.text, square.text, y.text, *passed
+            )
+        re, im = Value(f"{pair.text}.re", kind), Value(f"{pair.text}.im", kind)
+        self.origins.setdefault(re.text, ("cpow_re", (x, y, exponent, re, im)))
+        self.origins.setdefault(im.text, ("cpow_im", (x, y, exponent, re, im)))
+        return re, im
 
     # --- conditions ---
 
     def _where(self, node: Call) -> Value:
         """`where`: the branch that is not taken spoils neither the value nor a partial, since lanes are selected."""
         condition, yes, no = node.arguments
-        if self._is_live(condition):
-            return self._live_where(condition, yes, no)
+        closed = self._closed(condition)
+        if closed is not None and not names_in(closed):
+            return self.emit(yes if evaluate_constant(closed, {}) else no)
+        if yes == no:
+            return self.emit(yes)
+        if closed is not None:
+            return self._branch(closed, yes, no) if self.branches else self._selected(condition, yes, no)
         chosen = self._condition(condition)
         if isinstance(chosen, bool):
             return self.emit(yes if chosen else no)
-        return self._select(chosen, *self._branches_of(condition, yes, no))
+        return self._select(chosen, *self._both(condition, yes, no))
 
     def _select(self, chosen: str, a: Value, b: Value) -> Value:
         """`a` in the lanes of the mask `chosen`, else `b`, of either number type."""
@@ -363,47 +367,84 @@ class Emitter:
             return self._statement("dual", "varying", "dual_where", chosen, self._lift(a), self._lift(b))
         return self.choose(chosen, a, b)
 
-    def _live_where(self, condition: Node, yes: Node, no: Node) -> Value:
-        """`where` by live parameters alone: both branches are written, and the host decides which one is taken."""
-        if yes == no:
-            return self.emit(yes)
+    def _branch(self, condition: Node, yes: Node, no: Node) -> Value:
+        """`where` by parameters alone as a branch that the host decides; both parts of a complex power come of one."""
+        for name in sorted(names_in(yes) & names_in(no)):
+            # What both arms use is written before them.
+            if not self._is_constant(name):
+                self._binding(name)
+        if _is_complex_power(yes) and _is_complex_power(no) and yes.function == no.function:
+            key = (condition, *yes.arguments, *no.arguments)
+            if key not in self._pairs:
+                powers = (
+                    lambda each=each: self._complex_power(*map(self.emit, each.arguments))
+                    for each in (yes, no)
+                )
+                re, im = self._arms_of(condition, *powers)
+                self._pairs[key] = re, im
+            return self._pairs[key][yes.function == "cpow_im"]
+        (result,) = self._arms_of(condition, lambda: (self.emit(yes),), lambda: (self.emit(no),))
+        return result
+
+    def _arms_of(self, condition: Node, *arms: Callable[[], tuple[Value, ...]]) -> tuple[Value, ...]:
+        """Results of one of two arms. What an arm has computed is known in it alone."""
+        passed = self._passed(condition)
+        lines, bindings, known, pairs = self.lines, self.bindings, self._known, self._pairs
+        written = []
+        self._arms += 1
+        for arm in arms:
+            self.lines, self.bindings, self._known, self._pairs = [], dict(bindings), dict(known), dict(pairs)
+            values = arm()
+            written.append((self.lines, values))
+        self._arms -= 1
+        self.lines, self.bindings, self._known, self._pairs = lines, bindings, known, pairs
+        results = [self._name() for _ in written[0][1]]
+        lines.append(f"real {', '.join(results)};")
+        for head, (inner, values) in zip((f"if ({passed} > S(0.5)) {{", "} else {"), written, strict=True):
+            lines += [head, *(f"    {line}" for line in inner)]
+            lines += [f"    {name} = {value.text};" for name, value in zip(results, values, strict=True)]
+        lines.append("}")
+        return tuple(Value(name, "varying") for name in results)
+
+    def _selected(self, condition: Node, yes: Node, no: Node) -> Value:
+        """`where` by parameters alone as a selection. What costs much is computed once, of the operands selected."""
         if isinstance(yes, Call) and isinstance(no, Call) and yes.function == no.function in _COSTLY:
             pairs = zip(yes.arguments, no.arguments, strict=True)
             operands = (a if a == b else Call("where", (condition, a, b)) for a, b in pairs)
             return self.emit(Call(yes.function, tuple(operands)))
-        return self._select(self._live_condition(condition), *self._branches_of(condition, yes, no))
+        return self._select(self._passed_condition(condition), *self._both(condition, yes, no))
 
-    def _branches_of(self, condition: Node, yes: Node, no: Node) -> tuple[Value, Value]:
-        """Both branches. Where a live parameter is in the condition their constants need not be numbers."""
-        live = bool(self.decisions.live) and any(
-            value.node is not None and self.decisions.is_live(value.node)
-            for value in map(self._binding, sorted(names_in(condition)))
-        )
-        self._branches += live
+    def _both(self, condition: Node, yes: Node, no: Node) -> tuple[Value, Value]:
+        """Both branches. Where a parameter is in the condition their constants need not be numbers."""
+        names = [name for name in sorted(names_in(condition)) if self._is_constant(name)]
+        guarded = any(self._binding(name).number is None for name in names)
+        self._arms += guarded
         try:
             return self.emit(yes), self.emit(no)
         finally:
-            self._branches -= live
+            self._arms -= guarded
 
-    def _is_live(self, node: Node) -> bool:
-        """Whether an expression is constant and uses a live parameter."""
-        if not self.decisions.live:
-            return False
-        closed = self._closed(node)
-        return closed is not None and self.decisions.is_live(closed)
-
-    def _live_condition(self, condition: Node) -> str:
+    def _passed_condition(self, condition: Node) -> str:
         """The mask of a condition that the host decides, so that every precision decides alike."""
         closed = self._closed(condition)
         assert closed is not None
-        return f"less(R(0.5), {self._passed(closed, strict=False)})"
+        return f"less(R(0.5), ((real)({self._passed(closed)})))"
 
     def _closed(self, node: Node) -> Node | None:
         """An expression that depends on parameters alone, with names of `let` filled in; None for any other."""
-        names = {name: self._binding(name) for name in sorted(names_in(node))}
-        if any(value.kind != "constant" for value in names.values()):
+        names = sorted(names_in(node))
+        if not all(map(self._is_constant, names)):
             return None
-        return substitute(node, {n: v.node for n, v in names.items() if v.node})
+        values = {name: self._binding(name).node for name in names}
+        return substitute(node, {name: value for name, value in values.items() if value})
+
+    def _is_constant(self, name: str) -> bool:
+        """Whether a name depends on parameters alone; what it stands for is not written for that."""
+        if name in self.bindings:
+            return self.bindings[name].kind == "constant"
+        if name not in self._constancy:
+            self._constancy[name] = all(map(self._is_constant, names_in(self.lets[name])))
+        return self._constancy[name]
 
     def choose(self, chosen: str, a: Value, b: Value) -> Value:
         """`a` in the lanes of the mask `chosen`, else `b`, both plain numbers."""
@@ -412,18 +453,12 @@ class Emitter:
         self.origins.setdefault(result.text, ("where", (Value(chosen, "flat"), a, b)))
         return result
 
-    def _decided(self, condition: Node) -> bool | None:
-        """The truth of a condition that depends on parameters alone: only the branch taken is written."""
-        closed = self._closed(condition)
-        if closed is None or self.decisions.is_live(closed):
-            return None
-        return self.decisions.truth(closed)
-
     def _condition(self, node: Node) -> str | bool:
         """A condition as the text of a mask, or its truth when it is known now."""
         assert isinstance(node, Call)
-        if self._is_live(node):
-            return self._live_condition(node)
+        closed = self._closed(node)
+        if closed is not None and names_in(closed):
+            return self._passed_condition(node)
         if node.function == "not":
             inner = self._condition(node.arguments[0])
             return (not inner) if isinstance(inner, bool) else f"(~{inner})"

@@ -7,11 +7,15 @@ import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Literal, TypeAlias
 
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.evaluate import as_function, finite
-from clfractal.formulas.nodes import Node, Number, names_in, substitute
+from clfractal.formulas.nodes import Call, Node, Number, names_in, substitute, walk
+
+# Of functions that are computed in several ways the argument that chooses.
+_CHOOSING = MappingProxyType({"pow": 1, "cpow_re": 2, "cpow_im": 2, "where": 0})
 
 Add: TypeAlias = Literal["point", "constant", "none"]
 
@@ -35,11 +39,7 @@ def inside(where: Where, *parts: str) -> Where:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A named number of a formula.
-
-    `baked` ones shape the generated code (a change recompiles it); the others are passed at run time. So are
-    baked ones that a scene names as live.
-    """
+    """A named number of a formula; `baked` has no effect, and is kept as it was read."""
 
     name: str
     type: Literal["int", "real"]
@@ -137,6 +137,27 @@ class Formula:
         return known[1]
 
     @cached_property
+    def shaping(self) -> Mapping[str, float]:
+        """Parameters that choose between ways to compute (by exponents, conditions, repeats), with their defaults."""
+        let = dict(self.let)
+
+        def leaves(node: Node) -> frozenset[str]:
+            return frozenset(leaf for name in names_in(node) for leaf in known.get(name, (name,)))
+
+        known: dict[str, frozenset[str]] = {}
+        for name, node in let.items():
+            known[name] = leaves(node)
+        defaults = {parameter.name: parameter.default for parameter in self.parameters}
+        found = set(names_in(self.repeat))
+        for node in (*let.values(), *self.map, *([self.derivative] if self.derivative else [])):
+            for part in walk(node):
+                if isinstance(part, Call) and part.function in _CHOOSING:
+                    names = leaves(part.arguments[_CHOOSING[part.function]])
+                    if names <= defaults.keys():
+                        found |= names
+        return {name: value for name, value in defaults.items() if name in found}
+
+    @cached_property
     def _functions(self) -> dict[int, tuple[Node, Callable[[Mapping[str, float]], Any]]]:
         return {}
 
@@ -153,7 +174,6 @@ class BoundFormula:
         values: parameter name to value (whole for `int`).
         julia: the constant that is added, one number for each variable, or None.
         bailout_override, distance_bailout_override: radii that replace the formula's own.
-        live: names of parameters whose values never become part of the code.
     """
 
     formula: Formula
@@ -161,7 +181,6 @@ class BoundFormula:
     julia: tuple[float, ...] | None = None
     bailout_override: float | None = None
     distance_bailout_override: float | None = None
-    live: frozenset[str] = frozenset()
 
     @cached_property
     def key(self) -> tuple[object, ...]:
@@ -173,7 +192,6 @@ class BoundFormula:
             self.julia is None,
             self.bailout_override,
             self.distance_bailout_override,
-            self.live,
         )
 
     @property
@@ -250,17 +268,9 @@ class BoundFormula:
         return substitute(self.formula.derivative, {"added": added})
 
     @property
-    def baked(self) -> Mapping[str, float]:
-        """The values that shape the code."""
-        return {
-            p.name: self.values[p.name]
-            for p in self.formula.parameters
-            if p.baked and p.name not in self.live
-        }
-
-    def depends_on_live(self, node: Node) -> bool:
-        """Whether an expression uses a live parameter."""
-        return bool(self.live) and not self.live.isdisjoint(names_in(node))
+    def has_usual_values(self) -> bool:
+        """Whether parameters that choose between ways to compute have the values that the formula gives them."""
+        return all(self.values[name] == value for name, value in self.formula.shaping.items())
 
     @cached_property
     def start(self) -> tuple[float, ...] | None:

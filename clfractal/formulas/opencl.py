@@ -1,25 +1,28 @@
 """Writes a chain of formulas as OpenCL C over packets: the functions that `kernels/orbit.h` iterates.
 
-The text depends on what shapes code (the expressions, baked parameters, counts); everything else is in `constants`, the
-values of the kernel argument `k`, so that changing a parameter needs no compilation. A text is kept with all that it
-depends on, so that it is written once for all parameter values that give it (`write_formula`).
+The text depends on the expressions, on counts, and on two facts that follow from values: whether the degree is above 1, and
+whether f(0) is a finite number. Everything else is in `constants`, the values of the kernel argument `k`. So a text is
+written once for all values of its parameters, and changing one needs no compilation. Where values choose between ways to
+compute, an application is written twice: for the usual values, which are literals then, and for any.
 """
 
 from __future__ import annotations
 
 import re
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from threading import Lock
-from typing import Literal
+from typing import Any, Literal
 
-from clfractal.formulas.decisions import Decisions, Question, replayed
-from clfractal.formulas.emit import Constants, Emitter, NumberType, Value, literal
+from clfractal.formulas.costs import cost_of
+from clfractal.formulas.emit import Constants, Emitter, NumberType
+from clfractal.formulas.evaluate import as_function, evaluate_constant, finite
 from clfractal.formulas.functions import Facts, state_functions
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
+from clfractal.formulas.products import Value, literal
 from clfractal.formulas.turns import Span
 
 # How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
@@ -68,25 +71,19 @@ def write_formula(
     `scalar_rule=False` leaves out the formulas' own derivative, so that marching uses the Jacobian throughout.
     A map that uses the point (`point_x`) is always written operation by operation.
 
-    Writing takes milliseconds, so texts are kept. For other parameter values the text is the same if all
-    decisions are that were made while writing it; then only the constants are computed.
+    Writing takes milliseconds, so texts are kept: for other parameter values only the constants are computed.
     """
-    key = (*(link.structure for link in chain.links), scalar_rule, dual_map, leaf)
+    structure = tuple(link.structure for link in chain.links)
+    key = (structure, scalar_rule, dual_map, leaf, chain.degree > 1, _starts_at_zero(chain))
     with _LOCK:
-        known = list(_WRITTEN.get(key, ()))
-    for written in reversed(known):
-        found = written.filled(chain)
-        if found is not None:
-            return found
-    written = _ChainWriter(chain, scalar_rule, dual_map, leaf).write()
-    result = written.filled(chain)
-    assert result is not None, "a text fits the chain that it was written for"
-    with _LOCK:
-        _WRITTEN[key] = [*_WRITTEN.get(key, ())[-(_MOST_TEXTS - 1) :], written]
-        _WRITTEN.move_to_end(key)
-        if len(_WRITTEN) > _MOST_STRUCTURES:
-            _WRITTEN.popitem(last=False)
-    return result
+        written = _WRITTEN.get(key)
+    if written is None:
+        written = _ChainWriter(chain, scalar_rule, dual_map, leaf).write()
+        with _LOCK:
+            _WRITTEN[key] = written
+            if len(_WRITTEN) > _MOST_TEXTS:
+                _WRITTEN.popitem(last=False)
+    return written.filled(chain)
 
 
 def forget_texts() -> None:
@@ -98,43 +95,34 @@ def forget_texts() -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Written:
-    """A text, and what must be the same of another chain for it to be that chain's text.
-
-    It is compared with chains of the same formulas, counts, additions and live parameters only.
+    """A text for all values of its parameters.
 
     Attributes:
-        offset: which components of f(0) are added at the start; None if iteration starts at z = 0.
-        repeats: how often each link's map is applied; None if it is passed at run time.
-        questions: what each link's parameters were asked.
-        owners: of each run-time constant whose it is, and its expression.
+        owners: of each run-time constant whose it is, its value by the link's parameters (None: it is no expression), and
+            whether it must be a finite number.
     """
 
     text: str
     facts: Facts
-    offset: tuple[bool, ...] | None
-    repeats: tuple[int | None, ...]
-    questions: tuple[tuple[Question, ...], ...]
-    owners: tuple[object, ...]
+    owners: tuple[tuple[object, Callable[[Mapping[str, float]], Any] | None, bool], ...]
 
-    def filled(self, chain: Chain) -> FormulaText | None:
-        """The text with the chain's constants; None if the chain has another text."""
-        if (chain.degree > 1) != self.facts.logarithmic or _offset(chain) != self.offset:
-            return None
-        constants = [0.0] * max(len(self.owners), 1)
-        for link, repeat, questions in zip(chain.links, self.repeats, self.questions, strict=True):
-            if repeat is not None and link.bound.repeat != repeat:
-                return None
-            if replayed(questions, link.bound.values, constants) is None:
-                return None
-        for slot, owner in enumerate(self.owners):
-            if isinstance(owner, tuple):
-                constants[slot] = _passed(chain, *owner)
-        return FormulaText(self.text, tuple(constants), self.facts)
+    def filled(self, chain: Chain) -> FormulaText:
+        """The text with the chain's constants."""
+        constants = []
+        for owner, function, strict in self.owners:
+            if function is None:
+                assert isinstance(owner, tuple)
+                constants.append(_passed(chain, *owner))
+            else:
+                assert isinstance(owner, int)
+                value = function(chain.links[owner].bound.values)
+                constants.append(finite(value) if strict else float(value))
+        return FormulaText(self.text, tuple(constants) or (0.0,), self.facts)
 
 
-# The texts of the formulas that were used last, each with the oldest first.
-_WRITTEN: OrderedDict[tuple[object, ...], list[_Written]] = OrderedDict()
-_MOST_STRUCTURES, _MOST_TEXTS = 32, 8
+# The texts of the formulas that were used last.
+_WRITTEN: OrderedDict[tuple[object, ...], _Written] = OrderedDict()
+_MOST_TEXTS = 64
 _LOCK = Lock()
 
 
@@ -144,17 +132,16 @@ def _one(text: str) -> str:
     return text
 
 
-def _offset(chain: Chain) -> tuple[bool, ...] | None:
-    """Which components of f(0) the start adds; None if iteration starts at z = 0, or no point is added."""
-    first = chain.first
-    if first.add != "point" or first.start is None:
-        return None
-    return tuple(bool(first.live) or value != 0 for value in first.start)
+def _starts_at_zero(chain: Chain) -> bool:
+    """Whether iteration starts at z = 0, because f(0) is not a finite number or depends on the point."""
+    return chain.add == "point" and chain.first.start is None
 
 
 def _passed(chain: Chain, index: int, what: str, component: int) -> float:
     """A run-time constant that is no expression."""
     bound = chain.links[index].bound
+    if what == "usual":
+        return float(all(link.bound.has_usual_values for link in chain.links))
     if what == "repeat":
         return float(bound.repeat)
     numbers = bound.julia if what == "julia" else bound.start
@@ -168,11 +155,13 @@ def operations_per_application(chain: Chain) -> float:
     A fused multiply-add counts as two, a root or a division as one; comparisons and selections do not count.
     """
     formula = write_formula(chain)
-    prefix = "derivative_apply_" if formula.has_derivative else "dual_apply_"
+    prefix = "derivative" if formula.has_derivative else "dual"
+    usual = all(link.bound.has_usual_values for link in chain.links)
     total = 0.0
     for index in chain.spans[-1].members:
         link = chain.links[index]
-        body = formula.text.partition(f"{prefix}{index}(")[2].partition("\n}")[0]
+        name = _name(prefix, index, usual and bool(link.bound.formula.shaping))
+        body = formula.text.partition(f" {name}(")[2].partition("\n}")[0]
         calls = re.findall(r"\b((?:real|dual)_\w+)\(", body)
         total += link.count * link.bound.repeat * sum(_OPERATIONS.get(call, 1) for call in calls)
     return total / chain.cycle_length
@@ -188,26 +177,31 @@ class _ChainWriter:
         self.size = chain.size
         self.width = chain.size if leaf is None else leaf.width
         self.constants = Constants()
-        self.decisions = [Decisions(link.bound) for link in self.links]
         has_rule = all(link.bound.derivative is not None for link in self.links)
         self.has_derivative = scalar_rule and has_rule
-        self.offset = _offset(chain)
-        self.starts_at_zero = chain.add == "point" and self.offset is None
+        self.ways = [
+            (index, way)
+            for index in range(len(self.links))
+            for way in (False, True)
+            if self.shaped(index) >= way
+        ]
+        self.starts_at_zero = _starts_at_zero(chain)
+        self.starts_at_first = chain.add == "point" and not self.starts_at_zero
 
     def write(self) -> _Written:
-        parts: list[str] = []
+        parts = [self._has_usual_values()]
         number_types: tuple[NumberType, ...] = ("real", "dual")
         for number_type in number_types:
             parts.append(self._start(number_type))
-            parts.extend(self._apply(index, number_type) for index in range(len(self.links)))
+            parts.extend(self._apply(index, number_type, usual=usual) for index, usual in self.ways)
             parts.append(self._dispatch(number_type, derivative=False))
             parts.append(self._solid_distance(self.chain.shape_index, number_type))
         if self.has_derivative:
-            parts.extend(self._apply_derivative(index) for index in range(len(self.links)))
+            parts.extend(self._apply_derivative(index, usual=usual) for index, usual in self.ways)
             parts.append(self._dispatch("real", derivative=True))
         facts = Facts(
             self.width,
-            int(self.offset is not None),
+            int(self.starts_at_first),
             self.chain.degree > 1,
             self.has_derivative,
             self.chain.shape_index is not None,
@@ -217,24 +211,38 @@ class _ChainWriter:
         return _Written(
             _one("\n".join([*head, *parts]) + "\n"),
             facts,
-            self.offset,
-            tuple(None if self._repeats_at_run_time(link) else link.bound.repeat for link in self.links),
-            tuple(tuple(each.questions) for each in self.decisions),
-            tuple(owner for owner, _ in self.constants.owners),
+            tuple(
+                (owner, as_function(node) if node is not None else None, slot in self.constants.strict)
+                for slot, (owner, node) in enumerate(self.constants.owners)
+            ),
         )
 
-    def _repeats_at_run_time(self, link: Link) -> bool:
-        return link.bound.depends_on_live(link.bound.formula.repeat)
+    def _has_usual_values(self) -> str:
+        """Whether all parameters have the values that are literals."""
+        answer = "1"
+        if any(map(self.shaped, range(len(self.links)))):
+            answer = f"k[{self.constants.slot((0, 'usual', 0))}] > S(0.5)"
+        return _function(
+            f"INLINE int {self.name}has_usual_values(__constant const scalar *k) {{", [], f"return {answer};"
+        )
 
     # --- one link ---
 
-    def _emitter(self, index: int, number_type: NumberType) -> Emitter:
+    def _emitter(
+        self, index: int, number_type: NumberType, *, branches: bool = False, usual: bool = False
+    ) -> Emitter:
         bound = self.links[index].bound
         bindings = {point_name(v): self._point_value(index, i) for i, v in enumerate(bound.formula.variables)}
         bindings |= {v: Value(f"z.s{i}", "varying") for i, v in enumerate(bound.formula.variables)}
-        decisions = self.decisions[index]
+        # Values that are not the usual ones need not be numbers where only the usual ones have a meaning.
+        literals = {name: literal(value) for name, value in bound.formula.shaping.items() if usual}
         return Emitter(
-            number_type, bindings | _parameters(bound, decisions), self.constants, index, decisions, lines=[]
+            number_type,
+            bindings | _parameters(bound) | literals,
+            self.constants,
+            index,
+            branches,
+            guarded=usual,
         )
 
     def _point_value(self, index: int, component: int) -> Value:
@@ -280,46 +288,51 @@ class _ChainWriter:
                 texts.append(f"{number_type}_add({self._full(number_type, value)}, c.s{i})")
         return texts
 
-    def _apply(self, index: int, number_type: NumberType) -> str:
+    def _apply(self, index: int, number_type: NumberType, *, usual: bool) -> str:
         bound = self.links[index].bound
         state = "state" if number_type == "real" else "dual_state"
-        emitter = self._emitter(index, number_type)
+        emitter = self._emitter(index, number_type, branches=number_type == "real", usual=usual)
         mapped = self._map(emitter, bound)
         if number_type == "dual" and not bound.formula.point_map and self.dual_map != "operations":
-            local, rows = self._by_local_jacobian(index)
-            cost = _cost([*local.lines, *(f" = {row};" for row in rows)])
-            if self.dual_map == "jacobian" or cost < _cost(emitter.lines):
+            local, rows = self._by_local_jacobian(index, usual=usual)
+            cost = cost_of([*local.lines, *(f" = {row};" for row in rows)])
+            if self.dual_map == "jacobian" or cost < cost_of(emitter.lines):
                 emitter, mapped = local, [Value(row, "varying") for row in rows]
-        head = f"INLINE {state} {self.name}{number_type}_apply_{index}({state} z, {state} c, __constant const scalar *k) {{"
-        times = str(bound.repeat)
-        if self._repeats_at_run_time(self.links[index]):
-            times = f"(int)(k[{self.constants.slot((index, 'repeat', 0))}])"
-        if times == "1":
-            # A map written by its Jacobian is made of real statements; what is added to it is not.
-            adder = self._adder(index, number_type) if emitter.number_type != number_type else emitter
-            texts = self._add_constant(index, number_type, adder, mapped)
-            lines = emitter.lines if adder is emitter else [*emitter.lines, *adder.lines]
-            return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
-        # The map several times, then the constant: `next` names what one pass of the map gives.
-        passes = [
-            f"for (int pass = 0; pass < {times}; ++pass) {{",
-            *("    " + line for line in emitter.lines),
-        ]
-        inner = ", ".join(self._full(number_type, value) for value in mapped)
-        passes += [f"    const {state} next = {{{inner}}};", "    z = next;", "}"]
-        plain = [Value(f"z.s{i}", "varying") for i in range(self.size)]
-        adder = self._adder(index, number_type)
-        texts = self._add_constant(index, number_type, adder, plain)
-        lines = [*passes, *adder.lines]
-        return _function(head, lines, f"const {state} sum = {{{', '.join(texts)}}};\n    return sum;")
+        name = self.name + _name(number_type, index, usual)
+        head = f"INLINE {state} {name}({state} z, {state} c, __constant const scalar *k) {{"
+        # All passes but the last one, whose map is written once more: what is added joins its last operations.
+        passes = []
+        times = self._times(index, usual=usual)
+        if times != "1":
+            inner = ", ".join(self._full(number_type, value) for value in mapped)
+            passes = [
+                f"for (int pass = 1; pass < {times}; ++pass) {{",
+                *("    " + line for line in emitter.lines),
+                f"    const {state} next = {{{inner}}};",
+                "    z = next;",
+                "}",
+            ]
+        # A map written by its Jacobian is made of real statements; what is added to it is not.
+        adder = self._adder(index, number_type) if emitter.number_type != number_type else emitter
+        texts = self._add_constant(index, number_type, adder, mapped)
+        lines = passes + (emitter.lines if adder is emitter else [*emitter.lines, *adder.lines])
+        return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
+
+    def _times(self, index: int, *, usual: bool) -> str:
+        """How often a link's map is applied before something is added, as C text."""
+        bound = self.links[index].bound
+        formula = bound.formula
+        if usual or not names_in(formula.repeat):
+            return str(round(evaluate_constant(formula.repeat, formula.shaping)))
+        return f"(int)k[{self.constants.slot((index, 'repeat', 0))}]"
 
     def _adder(self, index: int, number_type: NumberType) -> Emitter:
         """Writes statements after those of the map."""
-        return Emitter(number_type, {}, self.constants, index, self.decisions[index], prefix="u")
+        return Emitter(number_type, {}, self.constants, index, prefix="u")
 
-    def _by_local_jacobian(self, index: int) -> tuple[Emitter, list[str]]:
+    def _by_local_jacobian(self, index: int, *, usual: bool) -> tuple[Emitter, list[str]]:
         """The map over dual numbers by its own Jacobian: real statements, and a dual expression for each component."""
-        emitter = self._emitter(index, "real")
+        emitter = self._emitter(index, "real", usual=usual)
         emitter.bindings = {
             name: Value(f"{value.text}.v", value.kind) if value.text.startswith(("z.", "c.")) else value
             for name, value in emitter.bindings.items()
@@ -340,16 +353,16 @@ class _ChainWriter:
             )
         return emitter, rows
 
-    def _apply_derivative(self, index: int) -> str:
+    def _apply_derivative(self, index: int, *, usual: bool) -> str:
         """One application that carries the scalar derivative along, sharing what the two have in common."""
         bound = self.links[index].bound
         assert bound.derivative is not None
-        emitter = self._emitter(index, "real")
+        emitter = self._emitter(index, "real", branches=True, usual=usual)
         emitter.bindings["dr"] = Value("(*growth)", "varying")
         mapped = self._map(emitter, bound)
         growth = emitter.emit(bound.derivative)
         texts = self._add_constant(index, "real", emitter, mapped)
-        name = f"{self.name}derivative_apply_{index}"
+        name = self.name + _name("derivative", index, usual)
         head = f"INLINE state {name}(state z, state c, real *growth, __constant const scalar *k) {{"
         tail = f"const state next = {{{', '.join(texts)}}};\n    *growth = {growth.text};\n    return next;"
         return _function(head, emitter.lines, tail)
@@ -372,19 +385,36 @@ class _ChainWriter:
 
     def _dispatch(self, number_type: NumberType, *, derivative: bool) -> str:
         """`apply`: the link whose turn it is, the same for every lane because counts run together."""
-        prefix = self.name + ("derivative" if derivative else number_type)
-        name = "apply_derivative" if derivative else "apply" if number_type == "real" else "dual_apply"
+        prefix = "derivative" if derivative else number_type
+        name = self.name + (
+            "apply_derivative" if derivative else "apply" if number_type == "real" else "dual_apply"
+        )
         state = "state" if number_type == "real" else "dual_state"
         extra, passed = (", real *growth", ", growth") if derivative else ("", "")
+
+        def call(index: int) -> str:
+            general, usual = (
+                f"{self.name}{_name(prefix, index, way)}(z, c{passed}, k)" for way in (False, True)
+            )
+            return f"return usual ? {usual} : {general};" if self.shaped(index) else f"return {general};"
+
         lines = []
         if len(self.links) > 1:
             lines += _turn(self.chain.spans)
             before = 0
             for index, link in enumerate(self.links[:-1]):
                 before += link.count
-                lines.append(f"if (turn < {before}) return {prefix}_apply_{index}(z, c{passed}, k);")
-        head = f"INLINE {state} {self.name}{name}(int n, {state} z, {state} c{extra}, __constant const scalar *k) {{"
-        return _function(head, lines, f"return {prefix}_apply_{len(self.links) - 1}(z, c{passed}, k);")
+                lines.append(f"if (turn < {before}) {call(index)}")
+        arguments = f"int n, {state} z, {state} c{extra}, __constant const scalar *k"
+        head = f"INLINE {state} {name}_by(int usual, {arguments}) {{"
+        both = f"return {name}_by({self.name}has_usual_values(k), n, z, c{passed}, k);"
+        return _function(head, lines, call(len(self.links) - 1)) + _function(
+            f"INLINE {state} {name}({arguments}) {{", [both], None
+        )
+
+    def shaped(self, index: int) -> bool:
+        """Whether a link has parameters whose usual values are literals."""
+        return bool(self.links[index].bound.formula.shaping)
 
     def _start(self, number_type: NumberType) -> str:
         """The point as a state, and where the orbit begins.
@@ -396,14 +426,7 @@ class _ChainWriter:
         state = "state" if number_type == "real" else "dual_state"
         components = names if number_type == "real" else [f"dual_coordinate_{a[-1]}({a})" for a in names]
         bindings = {v: Value(f"c->s{i}", "varying") for i, v in enumerate(bound.formula.variables[:3])}
-        emitter = Emitter(
-            number_type,
-            bindings | _parameters(bound, self.decisions[index]),
-            self.constants,
-            index,
-            self.decisions[index],
-            prefix="p",
-        )
+        emitter = Emitter(number_type, bindings | _parameters(bound), self.constants, index, prefix="p")
         lines = [f"c->s{i} = {component};" for i, component in enumerate(components)]
         if self.size == 4:
             fourth = emitter.emit(bound.formula.slice or Number(0.0))
@@ -414,30 +437,13 @@ class _ChainWriter:
             lines += [f"z->s{i} = {zero};" for i in range(self.width)]
         else:
             lines.append("*z = *c;")
-            for i, added in enumerate(self.offset or ()):
-                if added:
-                    slot = self.constants.text((index, "start", i))
-                    component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
-                    lines.append(f"{component} += {slot};")
+            for i in range(self.size if self.starts_at_first else 0):
+                component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
+                lines.append(f"{component} += {self.constants.text((index, 'start', i))};")
         name = "start" if number_type == "real" else "dual_start"
-        head = (
-            f"INLINE void {self.name}{name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
-        )
+        name = self.name + name
+        head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
         return _function(head, lines, None)
-
-
-# What operations cost beside an addition, roughly, on the vector units of today's processors.
-_COSTS = {
-    "real_div": 8, "real_sqrt": 10, "real_rsqrt": 8, "real_exp": 25, "real_log": 25, "real_pow": 60,
-    "real_sin": 30, "real_cos": 30,
-    "real_tan": 40, "real_asin": 30, "real_acos": 30, "real_atan": 30, "real_atan2": 45, "real_mod": 12,
-    "real_power_slope": 60, "real_power_log": 30, "real_arc_slope": 20,
-    "dual_add": 4, "dual_sub": 4, "dual_neg": 4, "dual_mul": 7, "dual_square": 5, "dual_mul_real": 4, "dual_where": 4,
-    "dual_chain": 3, "dual_chain2": 6, "dual_chain3": 9, "dual_chain4": 12, "dual_div": 23, "dual_div_real": 12,
-    "real_div_dual": 20, "real_sub_dual": 4, "dual_sqrt": 22, "dual_rsqrt": 14, "dual_abs": 6, "dual_min": 5, "dual_max": 5,
-    "dual_clamp": 10, "dual_exp": 28, "dual_log": 37, "dual_sin": 63, "dual_cos": 63, "dual_tan": 45, "dual_asin": 53,
-    "dual_acos": 53, "dual_atan": 41, "dual_atan2": 62, "dual_mod": 18, "dual_pow": 150, "dual_pow_real": 123,
-}  # fmt: skip
 
 
 # What drivers have in a library: calls that move all registers into memory.
@@ -454,18 +460,13 @@ _OPERATIONS = {
 }  # fmt: skip
 
 
-def _cost(lines: Sequence[str]) -> int:
-    """Cost of statements of the form `... = function(...);`."""
-    return sum(_COSTS.get(line.partition("= ")[2].partition("(")[0], 1) for line in lines)
+def _name(prefix: str, index: int, usual: bool) -> str:
+    return f"{prefix}_{'usual' if usual else 'apply'}_{index}"
 
 
-def _parameters(bound: BoundFormula, decisions: Decisions) -> dict[str, Value]:
-    """Baked parameters as literals, the others as names that `Emitter` turns into slots of `k`."""
-    baked = bound.baked
-    return {
-        name: literal(decisions.exact(name)) if name in baked else Value("", "constant", Name(name))
-        for name in bound.values
-    }
+def _parameters(bound: BoundFormula) -> dict[str, Value]:
+    """Parameters as names that `Emitter` turns into places of `k`."""
+    return {name: Value("", "constant", Name(name)) for name in bound.values}
 
 
 def _turn(spans: Sequence[Span]) -> list[str]:

@@ -8,7 +8,8 @@ as in `kernels/numbers/dual.h`.
 
 from __future__ import annotations
 
-from clfractal.formulas.emit import Emitter, Value, literal
+from clfractal.formulas.emit import Emitter
+from clfractal.formulas.products import Value, literal
 
 # A partial that is zero everywhere is None: it costs nothing.
 Partial = Value | None
@@ -39,6 +40,14 @@ class Differentiator:
         if function == "where":
             mask, yes, no = operands
             return self._choose(mask.text, self.partial(yes, by), self.partial(no, by))
+        if function in ("cpow_re", "cpow_im"):
+            return self._of_complex_power(function, operands, by)
+        if function == "raised":
+            base, exponent = operands
+            partial = self.partial(base, by)
+            return (
+                None if partial is None else self._times(self.emitter.raised_slope(base, exponent), partial)
+            )
         partials = [self.partial(operand, by) for operand in operands]
         if all(partial is None for partial in partials):
             return None
@@ -116,6 +125,21 @@ class Differentiator:
         by_base = self._times(do("power_slope", a, b), da) if da is not None else None
         by_exponent = self._times(do("power_log", value, a), db) if db is not None else None
         return self._sum(by_base, by_exponent)
+
+    def _of_complex_power(self, function: str, operands: tuple[Value, ...], by: int) -> Partial:
+        """w^n has the slope n w^n / w, a complex number u + iv: dre = u dx - v dy, and dim = v dx + u dy; 0 for w = 0."""
+        do = self.emitter.combine
+        x, y, exponent, re, im = operands
+        dx, dy = self.partial(x, by), self.partial(y, by)
+        if dx is None and dy is None:
+            return None
+        square = do("add", do("mul", x, x), self.emitter.radicand(y) or do("mul", y, y))
+        share = self.emitter.choose(f"less(R(0.0), {square.text})", do("div", exponent, square), literal(0.0))
+        u = do("mul", do("add", do("mul", re, x), do("mul", im, y)), share)
+        v = do("mul", do("sub", do("mul", im, x), do("mul", re, y)), share)
+        if function == "cpow_re":
+            return self._sum(self._times(u, dx), self._times(do("neg", v), dy))
+        return self._sum(self._times(v, dx), self._times(u, dy))
 
     def _clamp(self, operands: tuple[Value, ...], partials: list[Partial]) -> Partial:
         """clamp(x, low, high): the partial of whichever of the three it is; `high` wins where low > high."""

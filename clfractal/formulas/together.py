@@ -16,12 +16,17 @@ from clfractal.formulas.opencl import FormulaText, Leaf, write_formula
 _ASKED = (
     ("void", "start", "vec point", "state *c, state *z"),
     ("void", "dual_start", "vec point", "dual_state *c, dual_state *z"),
+    ("int", "has_usual_values", "", ""),
+    ("state", "apply_by", "int usual, int n, state z, state c", ""),
     ("state", "apply", "int n, state z, state c", ""),
-    ("dual_state", "dual_apply", "int n, dual_state z, dual_state c", ""),
+    ("dual_state", "dual_apply_by", "int usual, int n, dual_state z, dual_state c", ""),
     ("real", "solid_distance", "state z", ""),
     ("dual", "dual_solid_distance", "dual_state z", ""),
 )
-_ASKED_DERIVATIVE = ("state", "apply_derivative", "int n, state z, state c, real *growth", "")
+_ASKED_DERIVATIVE = (
+    ("state", "apply_derivative_by", "int usual, int n, state z, state c, real *growth", ""),
+    ("state", "apply_derivative", "int n, state z, state c, real *growth", ""),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +67,7 @@ def write_together(chains: tuple[Chain, ...]) -> Together:
         constants.append(number)
         firsts.append(len(constants))
         constants += written.constants
-    asked = [*_ASKED, _ASKED_DERIVATIVE] if scalar_rule else _ASKED
+    asked = [*_ASKED, *_ASKED_DERIVATIVE] if scalar_rule else _ASKED
     text = "\n".join(
         [
             _facts([leaf.facts for leaf in leaves]),

@@ -21,7 +21,9 @@ class _Source(Section):
     file: Source | None = Field(None, description="a formula file, in the scene's folder or below")
     inline: dict[str, Any] | None = Field(None, description="a formula, written here")
     parameters: dict[str, Number] = Field({}, description="values of the formula's parameters")
-    live: Live = Field((), description="names of parameters whose values may change without compiling again")
+    live: Live = Field(
+        (), description="has no effect: the values of all parameters may change without compiling again"
+    )
     julia: Julia | None = Field(
         None, description="the constant to add instead of the point: one number for each variable"
     )

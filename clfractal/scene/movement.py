@@ -1,6 +1,6 @@
 """What a scene looks like at each frame of its animation."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -11,7 +11,7 @@ from clfractal.scene.curves import Values
 from clfractal.scene.model import Scene
 from clfractal.scene.movers import Mover, Movers
 from clfractal.scene.renderer import Renderer
-from clfractal.scene.tracks import Target, target_of, with_values
+from clfractal.scene.tracks import target_of, with_values
 
 
 class Movement:
@@ -26,7 +26,7 @@ class Movement:
         self.animation: Animation = scene.animation
         self.targets = {name: _placed(name, target_of, scene, name) for name in self.animation.tracks}
         self._original = scene
-        self._scene = _with_live(scene, self.targets.values())
+        self._scene = with_values(scene, {}, animation=None)
         self.movers = Movers(scene, self.animation, self.targets).made()
 
     def values(self, frame: float) -> dict[str, Any]:
@@ -93,9 +93,8 @@ class Movement:
         Args:
             blurred: whether the film's shutter blurs it: then values of tracks are the film's, edited or not.
         """
-        found = _with_live(posed, self.targets.values())
         own = self._exposed(frame) if blurred else None
-        found = with_values(found, self._noise(found, frame), animation=own)
+        found = with_values(posed, self._noise(posed, frame), animation=own)
         if own is not None:
             found.take_tables(posed)
         return found
@@ -183,22 +182,3 @@ def _placed(name: str, make: Callable[..., Any], *arguments: Any) -> Any:
     except SceneError as error:
         where = replace(error.where, path=error.where.path or f"animation.tracks.{name}")
         raise SceneError(error.message, where, details=error.details) from error
-
-
-def _with_live(scene: Scene, targets: Iterable[Target]) -> Scene:
-    """The scene without its animation; parameters that move are live, so that no frame needs a new program."""
-    names: dict[tuple[str, ...], tuple[str, ...]] = {}
-    for target in targets:
-        *section, group, name = ("", *target.path)
-        if group == "parameters":
-            path = (*section[1:], "live")
-            if path not in names:
-                at: Any = scene
-                for part in section[1:]:
-                    if isinstance(at, Mapping):
-                        at = at[part]
-                    else:
-                        at = at[int(part)] if isinstance(at, tuple) else getattr(at, part)
-                names[path] = at.live
-            names[path] = tuple(dict.fromkeys((*names[path], name)))
-    return with_values(scene, names, animation=None)

@@ -26,7 +26,6 @@ from clfractal.viewer.films import FilmQueue
 from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.history import History, Kind
-from clfractal.viewer.live import with_live
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.picking import Pick, picked
 from clfractal.viewer.session import Session
@@ -42,8 +41,6 @@ _PATIENCE = 0.25
 # Within so many seconds an equal line is the same event.
 _AGAIN = 0.1
 _PATIENCE_AT_END = 2.0
-# A drag that pauses for so many seconds, after those in which more of it is expected, is rendered as if it had ended.
-_PAUSE = 2.0
 MOST_MESSAGES = 200
 MOST_THUMBNAILS = 300
 
@@ -104,8 +101,6 @@ class Studio(InFilm):
         self.films = FilmQueue()
         self._thumbnails: dict[Hashable, Thumbnail] = {}
         self._requested: Any = None
-        self._live: tuple[str, ...] = ()
-        self._live_from: Scene | None = None  # as it was when the drag began
         self.session = Session(device, pacing, woken)
         self.session.start()
 
@@ -137,11 +132,6 @@ class Studio(InFilm):
             return False
         for path in values:
             self.problems.pop(path, None)
-        if gesture is not None:
-            self._live_from = self._live_from or self.scene
-            self._live = tuple(
-                path.split(".")[2] for path in values if path.startswith("formula.parameters.")
-            )
         self._replace(changed, gesture)
         return True
 
@@ -198,7 +188,6 @@ class Studio(InFilm):
     def end_gesture(self) -> None:
         """A drag has ended: the next edit is a new step, and the picture goes to full resolution."""
         self.history.seal()
-        self._live, self._live_from = (), None
         self._moving_until = 0.0
         self.refresh(follows=True)
 
@@ -261,28 +250,21 @@ class Studio(InFilm):
             again: render even what is there (the device has changed, or the user insists).
             follows: it ends a movement, and comes after what was begun for that; see `Session.request`.
         """
-        moving, live = time.perf_counter() < self._moving_until, self._live
+        moving = time.perf_counter() < self._moving_until
         exposed_in = self.exposed_in
-        key = (render_key(self.shown_scene), self.region, live, exposed_in)
+        key = (render_key(self.shown_scene), self.region, exposed_in)
         failed = self.session.frame is None and self.session.problem is not None and not moving
         if not again and key == self._requested and not failed:
             return
         self._requested = key
-        wanted = with_live(key[0], live, self._live_from) if live else key[0]
         self.session.request(
-            wanted, moving=moving, region=self.region, exposed_in=exposed_in, follows=follows
+            key[0], moving=moving, region=self.region, exposed_in=exposed_in, follows=follows
         )
 
     def tick(self) -> None:
-        """Asks for the first picture, and renders a drag that pauses with the scene's own program; called every turn.
-
-        Not at once: a slow drag pauses often, and that program may take as long to compile as the pause lasts.
-        """
+        """Asks for the first picture; called every turn."""
         if self._requested is None:
             self.refresh()
-        if self._live and time.perf_counter() >= self._moving_until + _PAUSE:
-            self._live, self._live_from = (), None
-            self.refresh(follows=True)
 
     def set_region(self, region: tuple[int, int, int, int] | None) -> None:
         """Refines only a part of the picture: x, y, width, height, pixels of each eye's picture; None: all again."""

@@ -25,6 +25,7 @@ from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.grid_values import in_words, is_finite_somewhere, lacking
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
+from clfractal.scene.objects import FormulaObject
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.work.job import Job
@@ -91,13 +92,25 @@ def remarks_of(
         FileError: a picture on the disk cannot be read.
     """
     found = [job.remark] if job.remark else []
-    found += [*state.remarks, *_of_kinds(stores)]
+    found += [*_of_keys(job.scene), *state.remarks, *_of_kinds(stores)]
     for number in sorted({view.number for view in job.views}):
         name = f"layout.views.{number}: " if job.scene.layout is not None else ""
         found += [name + line for line in _of_view(_gathered(job, state, stores, number))]
     if comfort is not None and comfort.warning():
         found.append(comfort.warning())
     return tuple(dict.fromkeys(found))
+
+
+def _of_keys(scene: Scene) -> list[str]:
+    """That a key has no effect."""
+    formulas = [
+        scene.formula,
+        *(each.formula for each in scene.objects.values() if isinstance(each, FormulaObject)),
+    ]
+    members = [member for formula in formulas for member in (formula, *(formula.chain or ()))]
+    if not any(member.live for member in members):
+        return []
+    return ["formula.live has no effect: no value of a parameter is part of a program"]
 
 
 def _of_kinds(stores: Sequence[Picture]) -> list[str]:

@@ -24,7 +24,7 @@ from clfractal.work.any_engine import SceneLike
 from clfractal.work.varied import AMOUNT, Kind, Step, Strength, changed
 from clfractal.work.vary_camera import camera_step, closeness, following_step
 from clfractal.work.vary_colors import colors_step
-from clfractal.work.vary_formula import expanded, formula_step, slots
+from clfractal.work.vary_formula import expanded, formula_step
 
 if TYPE_CHECKING:
     from clfractal.pictures.film import Film
@@ -212,25 +212,6 @@ def _is_buried(scene: Scene) -> bool:
 def _distance(one: Mapping[str, float], other: Mapping[str, float]) -> float:
     """How far apart two steps end, over everything that either of them changes."""
     return float(sum((one.get(name, 0.0) - other.get(name, 0.0)) ** 2 for name in {*one, *other}) ** 0.5)
-
-
-def preview_scene(scene: Scene, width: int, height: int) -> Scene:
-    """The scene as a quick small picture shows it: as `small_scene`, and with parameters live.
-
-    Variations of one scene then share one program: their parameters are not part of its text.
-    """
-    small = small_scene(scene, width, height)
-    try:
-        live = {
-            f"{slot.path}.live": [parameter.name for parameter in slot.bound.formula.parameters]
-            for slot in slots(expanded(small))
-            if slot.bound.formula.parameters
-        }
-        lively = changed(expanded(small), live)
-        check_scene(lively)
-        return lively
-    except ClfractalError:
-        return small  # a value that only a text of its own can show
 
 
 def small_scene(scene: Scene, width: int, height: int) -> Scene:

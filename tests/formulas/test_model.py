@@ -42,7 +42,6 @@ def test_numbers_follow_from_parameters() -> None:
     f = bound({"power": 8, "bend": 1})
     assert (f.repeat, f.degree, f.bailout, f.center, f.radius) == (3, 8.0, 4.0, (0.0, 1.0, 0.0), 3.5)
     assert f.values == {"power": 8.0, "bend": 1.0, "plain": 1.5}
-    assert f.baked == {"power": 8.0}
     assert f.step_scale == 0.75  # no rule for the derivative
     assert bound().bailout == 2.0
     assert bound(bailout=7).bailout == 7.0

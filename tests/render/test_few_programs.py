@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
+from clfractal.device import program
 from clfractal.device.select import Device
 from clfractal.renderers import cut_plane, volume
 from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
-from tests.render.shots import PERSPECTIVE, plan_of, scene_of
+from tests.render.shots import PERSPECTIVE, plan_of, scene_of, shoot_whole
 
 FORMULA = {"name": "mandelbulb", "iterations": 6}
 PLANE = {"center": [0, 0, 0], "normal": [1, -1, 0.2], "width": 2, "height": 2}
@@ -232,6 +233,35 @@ def test_normals_and_points_are_one_program(device: Device) -> None:
     for each in found:
         each.pop("rays")
     assert all(each == found[0] for each in found)
+
+
+POWERS = [1.5, *(2 + 0.5 * step for step in range(44)), 2.71, 8.001, 31.5, 32]
+
+
+def test_parameters_are_data(device: Device) -> None:
+    """Of programs that know the formula, too: whole powers, halves and others."""
+    extra = {"coloring": {"by": "trap", "trap": {"shape": "sphere"}}, "glow": {"by": "trap"}}
+    found = [texts(scene({**FORMULA, "parameters": {"power": power}}, **extra), device) for power in POWERS]
+    assert len(POWERS) > 48
+    assert all(each == found[0] for each in found)
+
+
+def test_fifty_powers_need_one_compilation(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    built = []
+    real = program._built
+
+    def counted(*given: Any) -> Any:
+        built.append(given)
+        return real(*given)
+
+    monkeypatch.setattr(program, "_built", counted)
+    pictures, counts = set(), []
+    for power in POWERS:
+        film = shoot_whole(scene({**FORMULA, "parameters": {"power": power}}, size=(16, 16)), device)
+        pictures.add(film["Z"].tobytes())
+        counts.append(len(built))
+    assert counts == counts[:1] * len(POWERS), "the first picture's programs are those of all"
+    assert len(pictures) == len(POWERS)
 
 
 def test_stages_without_a_formula_are_the_same_for_all(device: Device) -> None:

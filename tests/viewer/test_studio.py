@@ -12,7 +12,6 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.viewer.frame import Frame
-from clfractal.viewer.live import with_live
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.studio import Studio
 from clfractal.work.canvas import CHANNELS
@@ -155,7 +154,6 @@ def test_what_is_under_way_is_not_asked_for_again(device: Device) -> None:
 
 
 def test_a_dragged_parameter_needs_one_program(studio: Studio) -> None:
-    """While it is dragged it is live; when it rests the picture has the scene's own bits."""
     rest(studio)
     for step in range(1, 30):
         assert studio.edit({"formula.parameters.power": 8 + 0.01 * step}, "power")
@@ -171,38 +169,6 @@ def test_a_dragged_parameter_needs_one_program(studio: Studio) -> None:
     assert len(studio.session.device.loaded._programs) == loaded
     studio.end_gesture()
     converged(studio)
-
-
-def test_a_drag_that_pauses_shows_the_scenes_own_bits(studio: Studio) -> None:
-    rest(studio)
-    studio.edit({"formula.parameters.power": 7.5}, "power")
-    before = studio.frame
-
-    def ticked() -> bool:
-        studio.tick()
-        frame = studio.frame
-        return frame is not None and frame is not before and not frame.scene.formula.live
-
-    wait_for(ticked)
-    converged(studio)
-
-
-def test_live_parameters(device: Device) -> None:
-    scene = scene_of()
-    live = with_live(scene, ["power"])
-    assert live.formula.live == ("power",)
-    assert with_live(live, ["power"]) is live
-    assert with_live(scene, []) is scene
-    # Where the values only are constants of one text, its program is there already.
-    box = [
-        scene_of(BULB, f"formula={{name: mandelbox, parameters: {{scale: {value}}}}}") for value in (2.0, 1.7)
-    ]
-    assert with_live(box[1], ["scale"], box[0]) is box[1]
-    assert with_live(scene_of(BULB, "formula.parameters={power: 7.5}"), ["power"], scene).formula.live == (
-        "power",
-    )
-    ball = scene_of(BALL)
-    assert with_live(ball, ["nothing"]) is ball
 
 
 def test_undo_that_does_not_fit_is_told(studio: Studio) -> None:

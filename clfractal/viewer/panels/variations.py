@@ -22,7 +22,7 @@ from clfractal.work.variations import (
     Variation,
     candidates,
     nothing_to_vary,
-    preview_scene,
+    small_scene,
     worthwhile,
 )
 from clfractal.work.varied import Kind, Strength
@@ -74,7 +74,7 @@ class Draw:
             for each in islice(drawn, COUNT + SPARES):
                 if self.stopped:
                     return
-                self.found.append((each, preview_scene(each.scene, *SIZE)))
+                self.found.append((each, small_scene(each.scene, *SIZE)))
                 self.woken()
             if not self.found:
                 self.problem = nothing_to_vary([kind for kind in KINDS if kind in self.kinds]).message

@@ -1,4 +1,4 @@
-"""Live parameters: one text for all of their values. And a text that is kept is the one that would be written."""
+"""One text for all values of parameters; and a text that is kept is the one that would be written."""
 
 from __future__ import annotations
 
@@ -21,40 +21,40 @@ from clfractal.scene.load import load_scene
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
 WITH_PARAMETERS = [name for name in SINGLE if catalog.load(name).parameters]
-# Of the texts before there were live parameters. Who changes what the writer writes on purpose records them anew.
+# Who changes what the writer writes on purpose records them anew.
 TEXTS = {
-    "aexion": "dd7a9171583bf4d0",
-    "amazing_box_vary": "f049f4e7ccf96837",
-    "amazing_surf": "7422c4141c381138",
-    "apollonian": "6068952bc1f5be2a",
-    "benesi_pine_tree": "0e78383854418818",
-    "box_fold_bulb": "fc5471f1e537604f",
-    "box_fold_quaternion": "5a6f7a11ce983a6d",
-    "bristorbrot": "22c574600995d595",
-    "buffalo": "daab7bd1c24d4678",
-    "bulbox": "0d5c485f883d3be2",
-    "burning_ship": "0e4eae13b81bed67",
-    "cosine_mandelbulb": "676f7c5ffc5013ee",
-    "hast": "d3ec16279b76f4ac",
-    "kaleidoscopic_ifs": "74916609b774655d",
-    "kalibox": "32ce527f7526f70d",
-    "kaliset": "77f2b054d208e2e3",
-    "makin_brot": "b5bfb303a11f204b",
-    "mandelbox": "e58a114989855ae0",
-    "mandelbulb": "1fc366f3f8c69bc3",
-    "menger_box": "3e41ce006a1b7e17",
-    "menger_sponge": "6460410660858567",
-    "mengerbulb": "904b572a15d58588",
-    "octahedral_ifs": "1598ba1407fd5cea",
-    "polyhedral_ifs": "d1ead659043d3385",
-    "pseudo_kleinian": "8854a224e831c0a9",
-    "quaternion_julia": "49fd7e5e770ed00a",
-    "quaternion_mandelbrot": "346cbbd901a8babb",
-    "riemann_sphere": "bfcdff3b70ffaae2",
-    "sierpinski_tetrahedron": "1d973867ff9ba637",
-    "tetrabrot": "804dc4391c344bc4",
-    "twisted_box": "837fb992371b6827",
-    "vicsek_cross": "3ae3407cf5cdb951",
+    "aexion": "f2de615eaaae2e54",
+    "amazing_box_vary": "9724331107929f3e",
+    "amazing_surf": "893a7f83823390c1",
+    "apollonian": "e904df45f1a35803",
+    "benesi_pine_tree": "70413125b74ee95f",
+    "box_fold_bulb": "32687666cc9a5e35",
+    "box_fold_quaternion": "4cbb9c3a2a9cea08",
+    "bristorbrot": "3f7869ea0fd0b274",
+    "buffalo": "780874c3ddf3af31",
+    "bulbox": "282a148b71129ca3",
+    "burning_ship": "e05e98244d60c792",
+    "cosine_mandelbulb": "08e632f1ce610e77",
+    "hast": "4bd13512424600f7",
+    "kaleidoscopic_ifs": "6a764408a7d11556",
+    "kalibox": "b3e3757d83b550a6",
+    "kaliset": "68e07fc3ab9780e2",
+    "makin_brot": "86fc635029db4102",
+    "mandelbox": "fa3dfb54803ba982",
+    "mandelbulb": "8366dc0dcd15c9bc",
+    "menger_box": "7b52d546a2c5f185",
+    "menger_sponge": "49d740c9bd828961",
+    "mengerbulb": "7864c787432b1e82",
+    "octahedral_ifs": "9a573ca871002432",
+    "polyhedral_ifs": "9d26b5a556d99b7a",
+    "pseudo_kleinian": "6641c0ae4603eb3b",
+    "quaternion_julia": "4229c5967769341d",
+    "quaternion_mandelbrot": "1e5d57f01f20285a",
+    "riemann_sphere": "4613be2495e94b07",
+    "sierpinski_tetrahedron": "e2a59f1d704703cd",
+    "tetrabrot": "4b77bab2a71d7653",
+    "twisted_box": "45c0e027171b1fe5",
+    "vicsek_cross": "63270da9eb2dee5d",
 }
 # Everything that asks for a decision: conditions, exponents, 0 and 1, a repeat, f(0), divisors.
 DECIDING: dict[str, Any] = {
@@ -112,7 +112,7 @@ def chains_of(specs: list[dict[str, Any]]) -> list[Chain]:
     return [chain for chain in map(loaded, specs) if chain is not None]
 
 
-def test_scenes_without_live_parameters_keep_their_text() -> None:
+def test_texts_of_the_library() -> None:
     found = {}
     for name in catalog.names():
         text = write_formula(catalog.load_chain(name)).text
@@ -120,32 +120,55 @@ def test_scenes_without_live_parameters_keep_their_text() -> None:
     assert found == TEXTS
 
 
+SLIDERS = [(name, parameter) for name in WITH_PARAMETERS for parameter in catalog.load(name).parameters]
+
+
+def places(parameter: Parameter) -> list[float]:
+    """Where a slider may stand: both ends, its usual place, whole and half numbers, and others between."""
+    if parameter.choices is not None:
+        return list(parameter.choices)
+    assert parameter.minimum is not None
+    assert parameter.maximum is not None
+    low, high = parameter.minimum, parameter.maximum
+    found = [low + (high - low) * part / 13 for part in range(14)]
+    found += [half / 2 for half in range(math.ceil(2 * low), math.floor(2 * high) + 1)]
+    return sorted({round(v) for v in found} if parameter.type == "int" else {*found, parameter.default})
+
+
+@pytest.mark.parametrize(("name", "parameter"), SLIDERS, ids=[f"{n}-{p.name}" for n, p in SLIDERS])
+def test_a_slider_keeps_the_text(name: str, parameter: Parameter) -> None:
+    chains = chains_of([{"name": name, "parameters": {parameter.name: value}} for value in places(parameter)])
+    assert len(chains) > 1
+    texts = []
+    for chain in chains:
+        forget_texts()
+        texts.append(write_formula(chain).text)
+    assert len(set(texts)) == 1
+
+
 @pytest.mark.parametrize("name", WITH_PARAMETERS)
 @given(data=st.data())
 @settings(max_examples=25)
 def test_one_text_for_all_values(name: str, data: st.DataObject) -> None:
-    names = [p.name for p in catalog.load(name).parameters]
-    live = sorted(data.draw(st.sets(st.sampled_from(names), min_size=1), label="live"))
-    first = drawn(data, name)
-    second = {**first, **{k: v for k, v in drawn(data, name).items() if k in live}}
-    specs = [{"name": name, "parameters": parameters, "live": live} for parameters in (first, second)]
+    specs = [{"name": name, "parameters": drawn(data, name)} for _ in range(2)]
     texts = list(map(write_formula, chains_of(specs)))
     assert len({text.text for text in texts}) <= 1
     assert all(text.text is texts[0].text for text in texts)
     assert len({len(text.constants) for text in texts}) <= 1
 
 
-@given(first=deciding, second=deciding, live=st.sets(st.sampled_from(["p", "q", "n", "b"]), min_size=1))
+@given(first=deciding, second=deciding, live=st.sets(st.sampled_from(["p", "q", "n", "b"])))
 @settings(max_examples=150)
 def test_one_text_whatever_is_decided(first: Any, second: Any, live: set[str]) -> None:
-    mixed = {**first, **{name: second[name] for name in live}}
-    common = {"inline": DECIDING, "live": sorted(live)}
-    texts = []
-    for chain in chains_of([{**common, "parameters": parameters} for parameters in (first, mixed)]):
+    texts, starts = [], set()
+    for chain in chains_of(
+        [{"inline": DECIDING, "parameters": each, "live": sorted(live)} for each in (first, second)]
+    ):
         forget_texts()
         texts.append(write_formula(chain))
-    assert len({text.text for text in texts}) <= 1
-    assert len({len(text.constants) for text in texts}) <= 1
+        starts.add(chain.first.start is None)
+    assert len({text.text for text in texts}) <= len(starts)
+    assert len({len(text.constants) for text in texts}) <= len(starts)
 
 
 def same(a: FormulaText, b: FormulaText) -> bool:
@@ -155,17 +178,14 @@ def same(a: FormulaText, b: FormulaText) -> bool:
 
 @given(
     many=st.lists(deciding, min_size=2, max_size=6),
-    live=st.sets(st.sampled_from(["p", "q", "n", "b"])),
     options=st.fixed_dictionaries(
         {"dual_map": st.sampled_from(["operations", "jacobian", "cheapest"]), "scalar_rule": st.booleans()}
     ),
     julia=st.none() | st.lists(st.sampled_from([0.0, 1.0, 0.3]), min_size=3, max_size=3),
 )
 @settings(max_examples=80)
-def test_a_text_that_is_kept_is_what_would_be_written(
-    many: list[Any], live: set[str], options: Any, julia: Any
-) -> None:
-    common = {"inline": DECIDING, "live": sorted(live), "julia": julia}
+def test_a_text_that_is_kept_is_what_would_be_written(many: list[Any], options: Any, julia: Any) -> None:
+    common = {"inline": DECIDING, "julia": julia}
     chains = chains_of([{**common, "parameters": parameters} for parameters in many])
     anew = []
     for chain in chains:
@@ -180,9 +200,7 @@ def test_a_text_that_is_kept_is_what_would_be_written(
 @given(data=st.data())
 @settings(max_examples=15)
 def test_kept_texts_of_the_library(name: str, data: st.DataObject) -> None:
-    names = [p.name for p in catalog.load(name).parameters]
-    live = sorted(data.draw(st.sets(st.sampled_from(names)), label="live"))
-    found = chains_of([{"name": name, "parameters": drawn(data, name), "live": live} for _ in range(3)])
+    found = chains_of([{"name": name, "parameters": drawn(data, name)} for _ in range(3)])
     anew = []
     for chain in found:
         forget_texts()
@@ -191,31 +209,41 @@ def test_kept_texts_of_the_library(name: str, data: st.DataObject) -> None:
     assert all(map(same, anew, map(write_formula, found)))
 
 
-def test_a_baked_parameter_that_is_live_is_in_no_text() -> None:
+def test_a_number_of_repeats_is_in_no_text() -> None:
     two, eight = (
-        write_formula(catalog.load_chain({"name": "hast", "parameters": {"power": p}, "live": ["power"]}))
-        for p in (2, 8)
+        write_formula(catalog.load_chain({"name": "hast", "parameters": {"power": p}})) for p in (2, 8)
     )
     assert two.text is eight.text
-    assert "pass < (int)(k[" in two.text
-    assert set(eight.constants) - set(two.constants) == {3.0}
+    assert "pass < (int)k[" in two.text
+    # Whether the values are the usual ones, and log2 of the power.
+    assert [(a, b) for a, b in zip(two.constants, eight.constants, strict=True) if a != b] == [(1, 0), (1, 3)]
 
 
-def test_members_of_a_chain_have_live_parameters_of_their_own() -> None:
+def test_values_of_a_chains_members_are_in_no_text() -> None:
     def text(power: float, scale: float) -> str:
         links = [
-            {"name": "mandelbulb", "parameters": {"power": power}, "live": ["power"]},
+            {"name": "mandelbulb", "parameters": {"power": power}},
             {"name": "mandelbox", "parameters": {"scale": scale}},
         ]
         return write_formula(catalog.load_chain({"chain": links})).text
 
     assert text(2, -1.5) is text(8.5, -1.5)
-    # A scale of 1 is folded, since it is not live.
-    assert text(2, -1.5) != text(2, 1)
+    assert text(2, -1.5) is text(2, 1)
+
+
+def test_usual_values_are_those_of_the_formula() -> None:
+    def usual(**values: float) -> float:
+        return write_formula(catalog.load_chain({"name": "mandelbulb", "parameters": values})).constants[0]
+
+    assert usual() == usual(power=8.0) == 1
+    assert usual(power=7) == usual(power=8.5) == usual(phi_phase=0.1) == 0
+    # What chooses between no ways to compute is passed, and may be anything.
+    box = catalog.load_chain({"name": "mandelbox", "parameters": {"scale": -1.7}})
+    assert "return 1;" in write_formula(box).text.partition("has_usual_values")[2].partition("}")[0]
 
 
 def test_a_condition_is_decided_by_the_host_in_every_precision() -> None:
-    spec = {"name": "mandelbulb", "live": ["power"]}
+    spec = {"name": "mandelbulb"}
     even, odd = (
         write_formula(catalog.load_chain({**spec, "parameters": {"power": power}}))
         for power in (4, 4 + 1e-12)
@@ -258,39 +286,38 @@ def inline(**changes: Any) -> dict[str, Any]:
     }
 
 
-def test_a_live_degree_stays_above_1() -> None:
-    formula = inline(degree="p")
-    catalog.load_chain({"inline": formula, "parameters": {"p": 1}})
-    spec = {"inline": formula, "live": ["p"]}
-    assert write_formula(catalog.load_chain({**spec, "parameters": {"p": 1.5}})).logarithmic
-    with pytest.raises(FormulaError, match="degree must be above 1 where it follows from a live parameter"):
-        catalog.load_chain({**spec, "parameters": {"p": 1}})
+def test_a_degree_of_1_and_an_infinite_f0_are_texts_of_their_own() -> None:
+    def written(p: float, **changes: Any) -> FormulaText:
+        return write_formula(catalog.load_chain({"inline": inline(**changes), "parameters": {"p": p}}))
 
-
-def test_a_live_f0_is_a_number() -> None:
-    formula = inline(map=["x*x - y*y + p**-1", "2*x*y", "z*z"])
-    spec = {"inline": formula, "live": ["p"]}
-    assert write_formula(catalog.load_chain({**spec, "parameters": {"p": 0.5}})).constants[0] == 2.0
-    with pytest.raises(FormulaError, match=r"f\(0\) is not a finite number with p = 0"):
-        catalog.load_chain({**spec, "parameters": {"p": 0}})
+    one, more, most = (written(p, degree="p") for p in (1, 1.5, 3))
+    assert more.text is most.text
+    assert (one.logarithmic, more.logarithmic) == (False, True)
+    start = {"map": ["x*x - y*y + p**-1", "2*x*y", "z*z"]}
+    assert "#define FIRST_COUNT 1" in written(0.5, **start).text
+    assert written(0.5, **start).constants[0] == 2.0
+    assert written(0.5, **start).text is written(2, **start).text
 
 
 def test_a_branch_that_is_not_taken_may_be_no_number() -> None:
     formula = inline(map=["x*x - y*y", "where(p > 0, 2*x*y*p**-1, 2*x*y)", "z*z"], add="none")
-    spec = {"inline": formula, "live": ["p"], "parameters": {"p": 0}}
+    spec = {"inline": formula, "parameters": {"p": 0}}
     assert float("inf") in write_formula(catalog.load_chain(spec)).constants
-    plain = {"inline": {**formula, "map": ["x*x", "2*x*y*p**-1", "z"]}, "live": ["p"], "parameters": {"p": 0}}
+    plain = {"inline": {**formula, "map": ["x*x", "2*x*y*p**-1", "z"]}, "parameters": {"p": 0}}
     with pytest.raises(FormulaError, match="is not a finite number"):
         write_formula(catalog.load_chain(plain))
 
 
 def test_chains_are_equal_that_give_the_same_picture() -> None:
     spec = {"name": "mandelbulb", "parameters": {"theta_phase": 0.3}}
-    assert catalog.load_chain(spec) == catalog.load_chain(spec)
+    assert (
+        catalog.load_chain(spec)
+        == catalog.load_chain(spec)
+        == catalog.load_chain({**spec, "live": ["power"]})
+    )
     assert hash(catalog.load_chain(spec)) == hash(catalog.load_chain(spec))
     others: list[dict[str, Any]] = [
         {**spec, "parameters": {"theta_phase": 0.4}},
-        {**spec, "live": ["power"]},
         {**spec, "bailout": 5},
         {**spec, "julia": [0, 0, 0]},
         {"name": "hast"},
@@ -309,9 +336,8 @@ def test_a_chain_can_be_sent_elsewhere() -> None:
     assert write_formula(sent) == text
 
 
-@pytest.mark.parametrize("live", [[], ["power"], ["theta_phase", "phi_phase"]])
-def test_a_dragged_parameter_costs_hardly_any_time(live: list[str]) -> None:
-    scene = load_scene({"version": 1, "formula": {"name": "mandelbulb", "live": live}, "camera": {}})
+def test_a_dragged_parameter_costs_hardly_any_time() -> None:
+    scene = load_scene({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
 
     def moved(phase: float) -> float:
         formula = scene.formula.model_copy(update={"parameters": {"theta_phase": phase}})

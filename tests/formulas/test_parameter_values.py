@@ -1,8 +1,9 @@
-"""The OpenCL of live parameters against NumPy and mpmath: one program for all values, and right for each of them."""
+"""The OpenCL of parameters against NumPy and mpmath: one program for all values, and right for each of them."""
 
 from __future__ import annotations
 
 from functools import lru_cache, partial
+from itertools import product
 from typing import Any
 
 import mpmath
@@ -19,7 +20,6 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.language import Parameter
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
-from clfractal.renderers import points
 from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
 from tests.formulas.rounding import spread
 from tests.formulas.test_opencl import FAR, ORBITS, STEPS, device, points_of, start_at, usable
@@ -40,7 +40,7 @@ INLINE: dict[str, Any] = {
     "degree": 1,
     "bounds": {"radius": 2},
 }
-# The same without live parameters, as the oracle; and where the power is 0 or below at the origin.
+# Where the power is 0 or below at the origin.
 AT = np.array([[0, 0, 0], [0, 0, 0.5], [-0.5, 0, 0], [0, -0.75, 0.5], [-0.5, -0.25, -1.5], [1.5, 0.25, 0.5]])
 VALUES: dict[str, list[dict[str, float]]] = {
     "mandelbulb": [
@@ -78,17 +78,13 @@ def nearest(parameter: Parameter, wanted: float) -> float:
     return min(max(wanted, low), high)
 
 
-def spec_of(name: str, parameters: dict[str, float], *, live: bool) -> dict[str, Any]:
-    source = {"inline": INLINE} if name == "inline" else {"name": name}
-    names = (
-        list(INLINE["parameters"]) if name == "inline" else [p.name for p in catalog.load(name).parameters]
-    )
-    return {**source, "parameters": parameters, "live": names if live else []}
+def spec_of(name: str, parameters: dict[str, float]) -> dict[str, Any]:
+    return {**({"inline": INLINE} if name == "inline" else {"name": name}), "parameters": parameters}
 
 
 @lru_cache
 def texts() -> list[FormulaText]:
-    return [write_formula(catalog.load_chain(spec_of(name, {}, live=True))) for name in (*LIVE, "inline")]
+    return [write_formula(catalog.load_chain(spec_of(name, {}))) for name in (*LIVE, "inline")]
 
 
 @lru_cache
@@ -99,15 +95,23 @@ def program(precision: Precision) -> tuple[Any, int]:
     return compile_text(device(), text, precision, chosen), chosen
 
 
-def orbits(name: str, parameters: dict[str, float], at: Floats, precision: Precision) -> Floats:
-    """Shape (steps, size, 5, n): values over real, then value and partials over dual, of the one program."""
+def orbits(
+    name: str, parameters: dict[str, float], at: Floats, precision: Precision, *, as_any: bool = False
+) -> Floats:
+    """Shape (steps, size, 5, n): values over real, then value and partials over dual, of the one program.
+
+    `as_any`: usual values are computed as any others are.
+    """
     number = (*LIVE, "inline").index(name)
-    chain = catalog.load_chain(spec_of(name, parameters, live=True))
+    chain = catalog.load_chain(spec_of(name, parameters))
     formula = write_formula(chain)
     assert formula.text is texts()[number].text
     built, lanes = program(precision)
     with np.errstate(over="ignore"):
         constants = np.array(formula.constants, precision)
+    if as_any and any(link.bound.formula.shaping for link in chain.links):
+        assert constants[0] in (0, 1)
+        constants[0] = 0
     planes = (STEPS + 1) * (5 * chain.size + 1)
     out = launch(device(), built, f"orbits_f{number}", at, planes, precision, lanes, constants)
     each = out.reshape(STEPS + 1, 5 * chain.size + 1, len(at)).astype(np.float64)
@@ -138,8 +142,8 @@ def test_every_value_of_the_library(name: str, precision: Precision) -> None:
         return
     unit = float(np.finfo(precision).eps)
     compared = 0
-    for parameters in values_of(name):
-        chain = catalog.load_chain(spec_of(name, parameters, live=False))
+    for parameters, as_any in product(({}, *values_of(name)), (False, True)):
+        chain = catalog.load_chain(spec_of(name, parameters))
         at = points_of(chain)[:10]
         with np.errstate(all="ignore"):
             expected = oracle(chain, at, NumpyBackend())
@@ -148,7 +152,7 @@ def test_every_value_of_the_library(name: str, precision: Precision) -> None:
         width = np.broadcast_to(width.max(axis=1, keepdims=True), width.shape)
         scale = np.abs(expected).max(axis=1, keepdims=True)
         allowed = 8 * width + 64 * chain.first.degree * unit * scale
-        got = orbits(name, parameters, at, precision)
+        got = orbits(name, parameters, at, precision, as_any=as_any)
         radius = np.sqrt((expected[:, :, 0] ** 2).sum(axis=1))
         near = np.logical_and.accumulate(radius <= FAR, axis=0)[:, None, None]
         near = np.broadcast_to(near, expected.shape) & np.isfinite(allowed)
@@ -160,10 +164,10 @@ def test_every_value_of_the_library(name: str, precision: Precision) -> None:
 
 
 @pytest.mark.parametrize("power", [2, 5, 2.5, 8.0])
-def test_a_live_mandelbulb_against_forty_digits(power: float) -> None:
+def test_a_mandelbulb_against_forty_digits(power: float) -> None:
     if not usable("float64"):
         return
-    chain = catalog.load_chain(spec_of("mandelbulb", {"power": power}, live=False))
+    chain = catalog.load_chain(spec_of("mandelbulb", {"power": power}))
     at = points_of(chain)[:13]
     got = orbits("mandelbulb", {"power": power}, at, "float64")[:, :, 0]
     for index, point in enumerate(at.tolist()):
@@ -186,7 +190,7 @@ def test_any_exponent(p: float, q: float) -> None:
     if not usable("float64"):
         return
     parameters = {"p": round(p, 6), "q": q}
-    chain = catalog.load_chain(spec_of("inline", parameters, live=False))
+    chain = catalog.load_chain(spec_of("inline", parameters))
     with np.errstate(all="ignore"):
         expected = oracle(chain, AT, NumpyBackend(), 1)[1]
         width = spread(partial(oracle, chain, AT, steps=1), 1e-14)[1]
@@ -202,26 +206,3 @@ def test_any_exponent(p: float, q: float) -> None:
     some = expected[:, 1:, 4:]
     allowed = 10 * width[:, 1:, 4:] + 1e-11 * (1 + np.abs(some))
     assert (np.abs(got[:, 2:, 4:] - some) <= allowed).all()
-
-
-COUNTED = [
-    ("mandelbulb", {"power": 8}),
-    ("mandelbulb", {"power": 3.3, "theta_phase": 1}),
-    ("hast", {"power": 8}),
-    ("mandelbox", {"scale": -1.5}),
-    ("quaternion_julia", {"power": 3}),
-    ("menger_sponge", {"scale": 3}),
-]
-
-
-@pytest.mark.parametrize(("name", "parameters"), one_of(*COUNTED))
-def test_counts_and_distances_are_those_of_the_plain_program(name: str, parameters: dict[str, float]) -> None:
-    plain, live = (catalog.load_chain(spec_of(name, parameters, live=each)) for each in (False, True))
-    at = np.random.default_rng(5).uniform(-1, 1, (3000, 3)) * plain.radius * 0.8
-    options: dict[str, Any] = {"device": device(), "lanes": accepted_lanes(device(), "float32")[-1]}
-    counts = [points.escape(chain, at, 12, **options)[0] for chain in (plain, live)]
-    assert (counts[0] != counts[1]).mean() < 0.01
-    found = [points.distances(chain, at, 12, **options) for chain in (plain, live)]
-    for one, other in ((found[0].step, found[1].step), (found[0].full, found[1].full)):
-        apart = ~(np.abs(one - other) <= 1e-3 * np.abs(one) + 1e-5)
-        assert apart.mean() < 0.01
