@@ -10,9 +10,6 @@
 // A material at a spot, `pbr`: generated from clfractal/renderers/materials.py.
 #include "pbr.h"
 
-// Whether any lane has some of it.
-INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }
-
 // A material at a spot, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...

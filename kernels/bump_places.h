@@ -1,16 +1,4 @@
-// Which material a spot has, and places around it where the heights of that material's relief are compared.
-
-// The number of an object's material, or the set's.
-INLINE real object_material(real object, world w) {
-    real number = (real)((scalar)w.settings->set_material);
-    for (int i = 0; i < w.settings->object_count; ++i) {
-        const mask there = equal(object, (real)((scalar)(i + 1)));
-        number = pick(there, (real)((scalar)w.objects[i].material), number);
-    }
-    return number;
-}
-
-INLINE real spot_material(const spot *here, world w) { return object_material(here->object, w); }
+// Places around a spot, where the heights of its material's relief are compared.
 
 // The part of each material in a spot's, before blends are told apart.
 INLINE real material_share(const spot *here, int number, world w) {

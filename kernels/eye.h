@@ -10,6 +10,18 @@ INLINE mask of_the_set(real object, world w) {
     return found;
 }
 
+// The number of an object's material, or the set's.
+INLINE real object_material(real object, world w) {
+    real number = (real)((scalar)w.settings->set_material);
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask there = equal(object, (real)((scalar)(i + 1)));
+        number = pick(there, (real)((scalar)w.objects[i].material), number);
+    }
+    return number;
+}
+
+INLINE real spot_material(const spot *here, world w) { return object_material(here->object, w); }
+
 // The sums of the packet's pixels before this sample.
 INLINE pixel sums_before(stage s, const place_in_pass *here) {
     if (s.sample == s.span.first) return pixel_before(s.span, here);

@@ -34,22 +34,10 @@ INLINE pbr pbr_mixed(pbr_mix m, world w) {
     return m.sum;
 }
 
-#if !HAS_MAPS && MATERIALS == 1
-INLINE pbr pbr_at(stage s, const spot *here, world w) { return pbr_of(w.materials, here->tint); }
-#else
-#include "bump_places.h"
-#if HAS_MAPS
-#include "maps.h"
-#endif
-#if HAS_BUMP
-#include "bump.h"
-#endif
-
 // One of the materials that have layers, with its maps.
 CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     __constant const struct Pbr *material = w.materials + number;
     pbr p = pbr_of(material, here->tint);
-#if HAS_MAPS
     real *numbers = (real *)&p;
     for (int i = 0; i < material->map_count; ++i) {
         __global const struct Map *m = w.maps + material->first_map + i;
@@ -59,7 +47,6 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
         numbers[m->number + 1] = found.g;
         numbers[m->number + 2] = found.b;
     }
-#endif
     p.bending_ior = p.specular_ior;
     // Of a blend's parts what they reflect and shine is mixed, not the factors of it.
     p.base_color = color_scale(p.base_color, p.base_weight);
@@ -68,34 +55,29 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     return p;
 }
 
-INLINE pbr pbr_at(stage s, const spot *here, world w) {
-#if MATERIALS == 1
-    return pbr_mapped(s, here, 0, w);
-#else
+CALLED pbr pbr_at(stage s, const spot *here, world w) {
+    if (w.settings->material_count == 1 && w.materials->map_count == 0) return pbr_of(w.materials, here->tint);
+    if (w.settings->material_count == 1) return pbr_mapped(s, here, 0, w);
     // The share of each material. Blends come before their parts, and pass theirs on to them.
-    real shares[MATERIALS];
+    real shares[MOST_MATERIALS];
     const real root = spot_material(here, w);
-    for (int i = 0; i < MATERIALS; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
+    for (int i = 0; i < w.settings->material_count; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
     pbr_mix mix = pbr_nothing();
-    for (int i = 0; i < MATERIALS; ++i) {
+    for (int i = 0; i < w.settings->material_count; ++i) {
         if (!any_of(shares[i])) continue;
         __constant const struct Pbr *material = w.materials + i;
-#if HAS_MAPS
         if (material->blend[0] >= 0) {
             const real second = map_at(s, here, AT_SPOT, w.maps + material->mask, w).r;
             shares[material->blend[0]] += shares[i] * (R(1.0) - second);
             shares[material->blend[1]] += shares[i] * second;
             continue;
         }
-#endif
         pbr_add(&mix, pbr_mapped(s, here, i, w), shares[i], w);
     }
     pbr sum = pbr_mixed(mix, w);
     sum.base_weight = sum.emission_luminance = R(1.0);
     return sum;
-#endif
 }
-#endif
 
 // The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut.
 INLINE void pbr_of_face(const spot *here, pbr *p) {
@@ -115,7 +97,7 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
 }
 
 // What a path meets at a spot: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
-INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
+INLINE pbr pbr_found(stage s, const spot *here, world w) {
     pbr p = pbr_at(s, here, w);
     if (any_lane(less(R(0.0), here->share))) {
         spot one = *here, other = one;
@@ -131,15 +113,4 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
     }
     if (any_lane(on_face(here))) pbr_of_face(here, &p);
     return p;
-}
-
-// About what a material reflects of white light, from wherever it comes and is looked at: what channels call albedo. A clear boundary
-// counts as nothing, since what it does not mirror comes back from the body.
-INLINE color pbr_albedo(const pbr *p, __global const float *tables) {
-    const color white = color_of(R(1.0), R(1.0), R(1.0));
-    const color body = color_mix(color_scale(p->base_color, p->base_weight), p->subsurface_color, p->subsurface_weight);
-    const color base = color_mix(body, white, p->transmission_weight * (R(1.0) - p->base_metalness));
-    const color below = color_mul(base, color_mix(white, p->coat_color, p->coat_weight));
-    const real fibres = p->fuzz_weight * albedo_at(tables + ALBEDO_FUZZ, R(0.5), fmax(p->fuzz_roughness, SMOOTHEST_FUZZ)).mean;
-    return color_mix(below, p->fuzz_color, fibres);
 }

@@ -109,9 +109,6 @@ INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mas
     so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
 }
 
-// The normal of a spot that a path sees: past a rim that of the set faces away, and what sees a surface from behind would have no light.
-INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) * fmax(vec_dot(normal, direction), R(0.0)), direction); }
-
 // Adds what a spot shines with by itself.
 INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *here, color light, mask shows, world w) {
     color more = color_mul(light, so_far->through);
@@ -137,14 +134,10 @@ INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, enc
 // A spot's material, ready to scatter by the normal `shading`, which is the surface's own, or that of its relief. `behind`: in glass,
 // whether the spot is seen from inside its body.
 INLINE bsdf bsdf_of_spot(stage s, const spot *here, const pbr *p, mask behind, vec to_viewer, vec *shading, world w) {
-#if HAS_BUMP
-    bumped_normal(s, here, &behind, &to_viewer, shading, w);
+    if (HAS(w, BUMP)) *shading = bumped_normal(s, here, behind, to_viewer);
     bsdf b = bsdf_at(p, *shading, to_viewer, w.albedos);
-    bsdf_lean(&b, here->normal);
+    if (HAS(w, BUMP)) bsdf_lean(&b, here->normal);
     return b;
-#else
-    return bsdf_at(p, *shading, to_viewer, w.albedos);
-#endif
 }
 
 // Paths that come from below the boundary of their spot leave the medium there; the result says which. All others see the spot from

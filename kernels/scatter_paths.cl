@@ -22,7 +22,6 @@ STAGE(scatter_paths) {
     vec outward = found.normal, shading = outward;
     color reflects = color_of(R(1.0), R(1.0), R(1.0));
     if (any_lane(lands)) {
-        if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
         pbr p = pbr_of_spot(s, &found, w);
         const mask none = lands & ~lands;
         border edge = {R(0.0), none, none, R(0.0)};

@@ -137,6 +137,9 @@ INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *pl
     return met;
 }
 
+// The normal of a spot that a path sees: past a rim that of the set faces away, and what sees a surface from behind would have no light.
+INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) * fmax(vec_dot(normal, direction), R(0.0)), direction); }
+
 // What a march has cost, and where `of_surface` what finding its normal has.
 INLINE void tally_met(tally *cost, encounter met, int of_surface) {
     cost->steps += met.steps;

@@ -33,3 +33,6 @@ INLINE vec vec_normalize(vec a) {
     const mask usable = less(R(0.0), square) & less_equal(square, R(4.0));
     return vec_pick(usable, vec_scale(b, R(1.0) / sqrt(square)), vec_of(R(0.0), R(0.0), R(0.0)));
 }
+
+// Whether any lane has some of it.
+INLINE int any_of(real weight) { return any_lane(less(R(0.0), weight)); }

@@ -115,6 +115,12 @@ FACET = _carried(
     ("vec", "normal", ""),
     ("real", "weight", ""),
 )
+RELIEF = _carried(
+    "relief",
+    "How a spot's relief rises along the surface.",
+    ("real", "rises", "whether its material has one"),
+    ("vec", "slope", ""),
+)
 PATH = _carried(
     "path",
     "A path after a bounce.",
@@ -259,6 +265,7 @@ TYPES = (
     TOUCH,
     SPOT,
     FACET,
+    RELIEF,
     PATH,
     CARRIED,
     HALT,

@@ -16,6 +16,7 @@ from clfractal.scene.base import unit
 from clfractal.scene.blends import Blends, blends_of, has_skin, is_cloudy, is_glass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
+from clfractal.scene.materials import MAX_MATERIALS
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
 
@@ -39,7 +40,11 @@ MAP = Struct(
         Field("sharpness", "real", 0, "exponent of the normal's parts, which blend its three sides"),
     ],
 )
-MAP_DEFINES = {f"MAP_{name.upper()}": number for number, name in enumerate(QUANTITIES)}
+MAP_DEFINES = {
+    **{f"MAP_{name.upper()}": number for number, name in enumerate(QUANTITIES)},
+    # Those with names, and what Phong's is along paths.
+    "MOST_MATERIALS": MAX_MATERIALS + 1,
+}
 BUMP_PLACES = 3
 """Places around a spot where heights are compared."""
 TABLE = 256
@@ -277,19 +282,6 @@ def material_counts(scene: Scene) -> dict[str, object]:
         "bump_surface": int(found.relief_of_surface),
         "material_count": len(found.blends.materials),
         "set_material": found.blends.roots[0],
-    }
-
-
-def map_defines(scene: Scene) -> dict[str, object]:
-    """The defines of programs that may read maps."""
-    if not isinstance(scene.lighting, PathLighting):
-        return {"HAS_MAPS": 0, "HAS_BUMP": 0, "MATERIALS": 1, **MAP_DEFINES}
-    found = MappedMaterials(scene)
-    return {
-        "HAS_MAPS": int(bool(found.maps)),
-        "HAS_BUMP": int(found.has_bump),
-        "MATERIALS": len(found.blends.materials),
-        **MAP_DEFINES,
     }
 
 

@@ -87,6 +87,15 @@ def parameter_numbers() -> dict[str, tuple[int, int]]:
     return found
 
 
+# What `pbr_text` adds to them.
+MORE_NUMBERS = 3
+
+
+def matter_numbers() -> int:
+    """Numbers of a material in a lane."""
+    return sum(max(field.count, 1) for field in PARAMETERS) + MORE_NUMBERS
+
+
 def pbr_text() -> str:
     """The type of a lane's material, and how one begins as a record: the same everywhere (`kernels/bsdf.h`)."""
     kinds = {0: "real", 3: "color"}

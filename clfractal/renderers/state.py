@@ -23,6 +23,7 @@ from clfractal.renderers.carried import (
     PARTS_OF_LIGHT,
     PATH,
     PIXEL,
+    RELIEF,
     SIGHTING,
     SPOT_SEEN,
     SPOT_THING,
@@ -32,12 +33,13 @@ from clfractal.renderers.carried import (
     TOUCH,
     WITHIN,
 )
-from clfractal.renderers.maps import asked_maps, bump_numbers, has_cloudy_glass, has_glass
+from clfractal.renderers.maps import asked_maps, bump_numbers, has_bump, has_cloudy_glass, has_glass
+from clfractal.renderers.materials import matter_numbers
 from clfractal.renderers.passes import has_mattes, has_parts
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces
-from clfractal.renderers.waves import air_turns, has_cones, has_lens, has_media
+from clfractal.renderers.waves import air_turns, finds_materials, has_cones, has_lens, has_media
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 
@@ -101,6 +103,9 @@ PARTS = (
     # there, for the slopes of its material's relief (`kernels/bump_places.h`).
     Part("ASKED", 1, lambda scene, plan: len(asked_maps(scene))),
     Part("BESIDE", 1, lambda scene, plan: bump_numbers(scene)),
+    # The present spot's material, where one has to be found.
+    Part("MATTER", matter_numbers(), lambda scene, plan: int(finds_materials(scene))),
+    Part("RELIEF", RELIEF.numbers, lambda scene, plan: int(has_bump(scene))),
     Part("FACE", FACE.numbers, lambda scene, plan: int(has_faces(scene))),
     Part("LAYERS", LAYERS.numbers, lambda scene, plan: int(bool(scene.cut_planes))),
     Part("GLANCE", GLANCE.numbers, lambda scene, plan: int(has_parts(plan))),

@@ -28,7 +28,7 @@ from clfractal.renderers.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.renderers.maps import MAP, MappedMaterials, has_glass, map_defines, mapped_materials
+from clfractal.renderers.maps import MAP, MAP_DEFINES, MappedMaterials, has_glass, mapped_materials
 from clfractal.renderers.march import march_record, uses_positions
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.object_grids import ObjectGrids
@@ -108,7 +108,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         "POINTS": several_points(scene),
         "STATE_PADDING": STATE_PADDING,
         **object_defines(scene),
-        **map_defines(scene),
+        **MAP_DEFINES,
     }
 
 
@@ -226,6 +226,7 @@ _PROGRAMS = (
     _Program("spots", "find_spots.cl", ("find_spots",), state_defines),
     _Program("objects", "objects.cl", ("meet_objects", "look_at_objects"), state_defines),
     _Program("light", "light_spots.cl", ("light_spots",), state_defines),
+    _Program("materials", "find_materials.cl", ("find_materials",), state_defines),
     _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
     _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
     _Program("media", "media.cl", ("cross_media", "pass_clouds"), path_defines),

@@ -11,7 +11,7 @@ with `[meet_objects]` before each march and `[look_at_objects]` after those that
 for a spot; each mirror adds what follows `begin_shots` but for the points.
 With `lighting.mode: path` in the place of the last two
 
-    scatter_paths  march  gather_paths
+    [find_materials]  scatter_paths  march  gather_paths
 
 ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
 those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
@@ -24,7 +24,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.renderers.kernel import MET_NUMBERS, Over, Stage
-from clfractal.renderers.maps import asked_maps, bump_numbers, has_cloudy_glass, has_glass_set
+from clfractal.renderers.maps import (
+    MappedMaterials,
+    asked_maps,
+    bump_numbers,
+    has_cloudy_glass,
+    has_glass_set,
+)
 from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
@@ -84,6 +90,13 @@ def has_media(scene: Scene) -> bool:
     """Whether anything scatters paths on their way: clouds, or glass."""
     along_paths = isinstance(scene.lighting, PathLighting)
     return has_cloudy_glass(scene) or (along_paths and bool(clouds_of(scene)))
+
+
+def finds_materials(scene: Scene) -> bool:
+    """Whether materials of spots differ from place to place, or parts of several are mixed: else each thing has its own."""
+    if not isinstance(scene.lighting, PathLighting):
+        return False
+    return bool(MappedMaterials(scene).maps) or has_faces(scene) or joins_smoothly(scene)
 
 
 def met_numbers(scene: Scene) -> int:
@@ -201,6 +214,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         if paths:
             if has_media(scene):
                 yield stage("cross_media", 1, bounce=bounce)
+            if finds_materials(scene):
+                yield stage("find_materials", bounce=bounce)
             yield stage("scatter_paths", 1, bounce=bounce)
             if clouds_of(scene):
                 yield stage("pass_clouds", bounce=bounce)

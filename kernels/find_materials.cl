@@ -1,0 +1,36 @@
+// Entry point: the materials of spots, where a scene has several, or one that differs from place to place. It knows no formula.
+#include "stages.h"
+#include "spot.h"
+#include "phase.h"
+#include "flights.h"
+#include "media.h"
+#include "matter.h"
+#include "bump_places.h"
+#include "maps.h"
+#include "material_at.h"
+#include "bump.h"
+
+// Keeps the numbers of a path's present spot, and the slope of its relief.
+STAGE(find_materials) {
+    if (IS_BEYOND) return;
+    STAGE_OF(s);
+    if (paths_are_over(s)) return;
+    const world w = WORLD;
+    spot here = spot_kept(s, bounce);
+    if (!any_lane(mask_of(here.found))) return;
+    const aim a = aim_kept(s);
+    path so_far;
+    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    mask emerges = less(R(1.0), R(0.0));
+    if (HAS(w, SUBSURFACE)) {
+        const carried with = carried_kept(s);
+        emerges = path_emerges(bounce, &with, &here, w);
+    }
+    here.normal = vec_pick(emerges, here.normal, facing(here.normal, direction));
+    if (!is_colored_at_once(w.material)) here.tint = tint_of(&here, w);
+    const pbr p = pbr_found(s, &here, w);
+    matter_keep(s, &p);
+    if (!KEEPS(s, STATE_RELIEF)) return;
+    const relief slope = relief_at(s, &here, w);
+    STATE_KEEP(s, slope, STATE_RELIEF);
+}
