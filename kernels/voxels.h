@@ -1,6 +1,4 @@
 // Voxels as the fill evaluates them: bricks of 8 x 8 x 8, each voxel in one brick only (stored bricks have a ninth layer).
-//
-// From the build: FILL_INSIDE, FILL_COVERAGE, FILL_ITERATIONS and which of them FILL_KIND is; SAMPLE, the type of a value.
 // A brick's or node's place is packed into 64 bits: x, y and z in 21 bits each, x lowest.
 
 #include "fill_packets.h"
@@ -37,4 +35,19 @@ INLINE vec voxel_points(ulong place, int first, int4 sub_point, __global const s
         z[lane] = along_z[(at >> 4) & 3];
     }
     return vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
+}
+
+// Keeps the values of a packet from voxel `first` on: as floats, or as bytes that are `scale` times as large.
+INLINE void keep_values(__global uchar *samples, size_t brick, int first, real values, int floats, float scale) {
+    scalar each[LANES];
+    lanes_store(values, each);
+    const size_t at = brick * BRICK_VOXELS + first;
+    for (int lane = 0; lane < LANES; ++lane) {
+        const float value = (float)each[lane];
+        if (floats) {
+            ((__global float *)samples)[at + lane] = value;
+        } else {
+            samples[at + lane] = convert_uchar_sat_rte(value * scale);
+        }
+    }
 }

@@ -160,7 +160,7 @@ class _Filler:
         else:
             descent = Descent(all_places(every), np.zeros(0, np.uint64), 0)
         self.stats = replace(self.stats, nodes=descent.looked)
-        evaluated = self._fill(kernels["fill_bricks"], kernels.get("classify_nodes"), descent, source, sample)
+        evaluated = self._fill(built[0], kernels.get("classify_nodes"), descent, source, sample)
         grid = store(
             self.device,
             self.lattice,
@@ -274,7 +274,8 @@ class _Filler:
             limit = self.scene.formula.iterations if self.renderer.value == "iterations" else 1
             scale = 255.0 / max(limit, 1)
         with device.failures("filling the grid"):
-            kernel.set_args(samples, bricks, np.int32(0), known, np.float32(scale), *self.constants)
+            floats = np.int32(sample == "float")
+            kernel.set_args(samples, bricks, np.int32(0), known, floats, np.float32(scale), *self.constants)
         milliseconds = run_in_parts(
             device,
             kernel,

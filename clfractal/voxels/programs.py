@@ -29,6 +29,12 @@ Source = Literal["bits", "bricks", "slab"]
 # Instead of a brick's number: all its voxels are outside, or inside as a whole.
 ALL_OUTSIDE, ALL_INSIDE = -1, -2
 FILL_KINDS = ("inside", "coverage", "iterations")
+# Of each of them the entry point and the kernel.
+_FILLS = (
+    ("voxels_fill.cl", "fill_bricks"),
+    ("voxels_cover.cl", "cover_bricks"),
+    ("voxels_counts.cl", "count_bricks"),
+)
 NORMALS = ("gradient", "least_squares", "exact")
 SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
 C_TYPES: dict[Kind, str] = {"byte": "uchar", "float": "float"}
@@ -149,23 +155,16 @@ def nodes_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
 
 
 def fill_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
-    """`fill_bricks`: the values of bricks' voxels."""
-    sample: Kind = "byte" if renderer.value == "inside" else renderer.store
+    """`fill_bricks`, `cover_bricks` or `count_bricks`: the values of bricks' voxels."""
     items = BRICK**3 // max(lanes * (1 if lanes == 1 else PACKETS), 8)
     return Recipe(
-        "voxels_fill.cl",
-        "fill_bricks",
-        {
-            **_number_defines(lanes, precision),
-            **{f"FILL_{name.upper()}": number for number, name in enumerate(FILL_KINDS)},
-            "FILL_KIND": FILL_KINDS.index(renderer.value),
-            **_sample_defines(sample),
-        },
+        *_FILLS[FILL_KINDS.index(renderer.value)],
+        _number_defines(lanes, precision),
         precision,
         body.texts(_turns),
         items,
         (items, 1),
-        (_BUFFER, _BUFFER, _INT, _BUFFER, _FLOAT, *[_BUFFER] * 4),
+        (_BUFFER, _BUFFER, _INT, _BUFFER, _INT, _FLOAT, *[_BUFFER] * 4),
     )
 
 

@@ -160,7 +160,7 @@ class Arrangement:
 def smoothing_of(samples: int) -> float:
     """How strongly a picture under way is smoothed whose pixels have so many samples: 1 with one, nothing from four on.
 
-    It is the share that is taken of a step of diffusion (`diffuse` in `show.cl`). A whole step leaves 0.64 of the deviation
+    It is the share that is taken of a step of diffusion (`diffuse` in `show.h`). A whole step leaves 0.64 of the deviation
     of noise whose pixels are independent, and all of the picture's mean.
     """
     return max(0.0, (SHARP - samples) / (SHARP - 1))
@@ -186,14 +186,14 @@ def program_text(*, to_image: bool) -> FlatText:
     """The whole text of the program that writes to an image or to a buffer."""
     defines: dict[str, object] = {f"MODE_{name}": number for number, name in enumerate(MODES)}
     defines |= {
-        "TO_IMAGE": int(to_image),
         "TABLE_SHIFT": srgb.TABLE_SHIFT,
         "TABLE_LOWEST": srgb.TABLE_LOWEST,
         "TABLE_ONE": srgb.TABLE_ONE,
     }
     defines |= _tone_defines()
     structs = SHOW.c_text("float32") + SHOWN_VIEW.c_text("float32")
-    return flatten("show.cl", generated={"show_structs.h": structs}, defines=defines)
+    entry = "show_image.cl" if to_image else "show.cl"
+    return flatten(entry, generated={"show_structs.h": structs}, defines=defines)
 
 
 class Shower:

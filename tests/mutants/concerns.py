@@ -12,7 +12,7 @@ from pathlib import Path
 # `tests/`, `test_` and `.py`. To them come the tests that bear the file's name, and for Python those that import it.
 CONCERNS = """
 kernels/numbers/*: numbers/ formulas/distance render/surface_analytic
-kernels/show.cl: work/show work/smoothing viewer/display
+kernels/show*: work/show work/smoothing viewer/display
 kernels/canvas.cl: work/canvas viewer/session
 kernels/cut_plane.cl: render/cut_plane render/cut_plane_periods
 kernels/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods

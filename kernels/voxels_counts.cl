@@ -1,0 +1,24 @@
+// The escape counts of the voxels of bricks. One work-item takes ITEM_VOXELS of a brick.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "numbers/dual.h"
+#include "vectors.h"
+#include "structs.h"
+#include "formula.h"
+#include "solids.h"
+#include "voxels.h"
+#include "solid_count.h"
+
+// As `cover_bricks`, but that all octants are looked at.
+__kernel void count_bricks(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known,
+                           int floats, float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
+                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (orbit_cancelled(orbit)) return;
+    const size_t brick = (size_t)first + get_global_id(1);
+    const int item = (int)get_global_id(0) * ITEM_VOXELS;
+    for (int part = 0; part < ITEM_VOXELS; part += LANES) {
+        mask inside;
+        const vec points = voxel_points(bricks[brick], item + part, (int4)(0), axes, lattice);
+        keep_values(samples, brick, item + part, solid_count(points, &inside, orbit, k), floats, scale);
+    }
+}

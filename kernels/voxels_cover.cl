@@ -1,0 +1,48 @@
+// How much of each voxel of bricks is inside. One work-item takes ITEM_VOXELS of a brick.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "numbers/dual.h"
+#include "vectors.h"
+#include "structs.h"
+#include "formula.h"
+#include "solids.h"
+#include "voxels.h"
+
+// The shares of PACKETS packets from voxel `first` on that are inside, 0 to 1: of their sub-points.
+INLINE void packet_shares(ulong place, int first, real *shares, __global const scalar *axes, __constant const struct Lattice *lattice,
+                          __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const int n = lattice->sub_points;
+    for (int p = 0; p < TURNS(PACKETS); ++p) shares[p] = R(0.0);
+    int4 sub_point = (int4)(0);
+    for (int sub = 0; sub < n * n * n; ++sub) {
+        vec points[PACKETS];
+        mask inside[PACKETS];
+        #pragma unroll
+        for (int p = 0; p < TURNS(PACKETS); ++p) points[p] = voxel_points(place, first + p * LANES, sub_point, axes, lattice);
+        solid_inside(points, inside, orbit, k);
+        #pragma unroll
+        for (int p = 0; p < TURNS(PACKETS); ++p) shares[p] += pick(inside[p], R(1.0), R(0.0));
+        sub_point.x += 1;
+        if (sub_point.x == n) sub_point = (int4)(0, sub_point.y + 1, sub_point.z, 0);
+        if (sub_point.y == n) sub_point = (int4)(0, 0, sub_point.z + 1, 0);
+    }
+    for (int p = 0; p < TURNS(PACKETS); ++p) shares[p] /= (real)((scalar)(n * n * n));
+}
+
+// samples: of each brick its voxels (see `keep_values`). `known`: see `fill_bricks`.
+__kernel void cover_bricks(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known,
+                           int floats, float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
+                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (orbit_cancelled(orbit)) return;
+    const size_t brick = (size_t)first + get_global_id(1);
+    const int item = (int)get_global_id(0) * ITEM_VOXELS;
+    const ulong place = bricks[brick];
+    const int octant = item / OCTANT_VOXELS;
+    const bool empty = ((known[2 * brick] >> octant) & 1) != 0, full = ((known[2 * brick + 1] >> octant) & 1) != 0;
+    for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {
+        real found[PACKETS];
+        for (int p = 0; p < TURNS(PACKETS); ++p) found[p] = full ? R(1.0) : R(0.0);
+        if (!empty && !full) packet_shares(place, item + part, found, axes, lattice, orbit, k);
+        for (int p = 0; p < TURNS(PACKETS); ++p) keep_values(samples, brick, item + part + p * LANES, found[p], floats, scale);
+    }
+}
