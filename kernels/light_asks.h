@@ -5,7 +5,7 @@
 // object lights itself.
 INLINE real weight_of_all(vec point, real own, world w) {
     real sum = (real)(w.settings->environment_weight);
-    for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, point);
+    for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, &point);
     sum = with_lights_beside(sum, point, own, w);
     return fmax(sum, (real)(REAL_SMALLEST));
 }
@@ -21,7 +21,7 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
     for (int i = 0; i < w.settings->light_count; ++i) {
         const mask met = light_met(w.lights + i, direction);
         if (!any_lane(met)) continue;
-        const real of_light = light_weight(w.lights + i, from) / total * light_density(w.lights + i, from, direction);
+        const real of_light = light_weight(w.lights + i, &from) / total * light_density(w.lights + i, from, direction);
         const real share = pick(less(density, R(0.0)), R(1.0), power_share(density, of_light));
         sum = color_pick(met, color_add(sum, color_scale(light_shown(w.lights + i), share)), sum);
     }
@@ -37,7 +37,7 @@ typedef struct {
 
 INLINE lamp lamp_met(vec origin, vec direction, int of_eye, real *far, world w) {
     lamp found = {less(R(1.0), R(0.0)), color_of(R(0.0), R(0.0), R(0.0)), R(0.0), R(0.0)};
-    found.met = nearest_light(origin, direction, of_eye, far, &found.shows, &found.density, &found.weight, w);
+    found.met = nearest_light(&origin, &direction, of_eye, far, &found.shows, &found.density, &found.weight, w);
     return found;
 }
 
@@ -51,7 +51,7 @@ INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *
     for (int i = 0; i <= w.settings->light_count; ++i) {
         const int is_light = i < w.settings->light_count;
         __constant const struct Light *light = w.lights + (is_light ? i : 0);
-        const real weight = is_light ? light_weight(light, from) : (real)(w.settings->environment_weight);
+        const real weight = is_light ? light_weight(light, &from) : (real)(w.settings->environment_weight);
         const mask here = is_chosen(&c, weight);
         if (!any_lane(here)) continue;
         light_ray r;

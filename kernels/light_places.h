@@ -62,25 +62,25 @@ INLINE mask light_met_at(__constant const struct Light *light, vec origin, vec d
 }
 
 // About the irradiance that a light can bring to a point.
-INLINE real light_weight(__constant const struct Light *light, vec point) {
+CALLED real light_weight(__constant const struct Light *light, const vec *point) {
     const color c = color_splat(light->color);
-    return LIGHT_PI * light_at(light, point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
+    return LIGHT_PI * light_at(light, *point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
 }
 
 // The nearest light that a ray meets before `far`, its number, or -1; the eye's own rays see only visible ones.
-INLINE mask nearest_light(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
+CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     mask met = less(R(1.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
         __constant const struct Light *light = w.lights + i;
         if (!light_is_seen(light) || (of_eye && !light->visible)) continue;
         real distance;
-        const mask here = light_met_at(light, origin, direction, &distance) & less(distance, *far);
+        const mask here = light_met_at(light, *origin, *direction, &distance) & less(distance, *far);
         if (!any_lane(here)) continue;
         met |= here;
         *far = pick(here, distance, *far);
         *shows = color_pick(here, color_scale(color_splat(light->color), (real)(light->intensity)), *shows);
-        *density = pick(here, light_density(light, origin, direction), *density);
+        *density = pick(here, light_density(light, *origin, *direction), *density);
         *weight = pick(here, light_weight(light, origin), *weight);
     }
-    return met | met_on_set(origin, direction, of_eye, far, shows, density, weight, w);
+    return met | met_on_set(*origin, *direction, of_eye, far, shows, density, weight, w);
 }

@@ -83,7 +83,7 @@ INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, wo
     real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
     color shows = color_of(R(0.0), R(0.0), R(0.0));
     real density = R(0.0), weight = R(0.0);
-    const mask met = mask_of(so_far->on_path) & nearest_light(arrived.origin, arrived.direction, s.bounce == 0, &far, &shows, &density, &weight, w);
+    const mask met = mask_of(so_far->on_path) & nearest_light(&arrived.origin, &arrived.direction, s.bounce == 0, &far, &shows, &density, &weight, w);
     if (!any_lane(met)) return;
     so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(shows, so_far->through)), so_far->seen);
     so_far->on_path = number_of(mask_of(so_far->on_path) & ~met);

@@ -3,7 +3,7 @@
 
 #define NEXT_BOUNCE 16u   // from a bounce's purposes to those of the next
 
-INLINE void path_square(stage s, const packet_pixels *at, uint purpose, world w, real *u, real *v) {
+CALLED void path_square(stage s, const packet_pixels *at, uint purpose, world w, real *u, real *v) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, purpose + NEXT_BOUNCE * (uint)s.bounce);
     unit_square((bits)((uint)s.sample), seed, u, v);
 }

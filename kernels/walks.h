@@ -49,7 +49,7 @@ INLINE void walk_flies(march *m, walk *a, mask here, world w) {
     stop = fmin(stop, met);
     color unused;
     real density, weight;
-    nearest_light(m->r.origin, m->r.direction, 0, &stop, &unused, &density, &weight, w);
+    nearest_light(&m->r.origin, &m->r.direction, 0, &stop, &unused, &density, &weight, w);
     a->stop = pick(here, stop, a->stop);
     m->r.far = pick(here, (real)(REAL_LARGEST), m->r.far);
 }
