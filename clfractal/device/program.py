@@ -79,6 +79,7 @@ def build(
     on_compile: Callable[[str], None] | None = None,
     stopped: Callable[[], bool] | None = None,
     waits: bool = True,
+    what: str = "",
 ) -> Program:
     """The program of one flat text, from the cache or the driver's compiler.
 
@@ -94,6 +95,7 @@ def build(
         on_compile: called with a message, from another thread, if compiling takes more than a moment.
         stopped: asked at least every 20 ms while a child process compiles; it ends the child by answering True.
         waits: whether it is built if it is not loaded yet.
+        what: a word for what the program does, for whoever waits.
 
     Raises:
         KernelBuildError: the program does not compile, with our file, line and an excerpt.
@@ -114,7 +116,9 @@ def build(
     # Of devices of one kind one compiles, and the others find it in the cache.
     with device.loaded.building, _alone(key, stopped):
         try:
-            program, cached = _built(device, key, text, flags, warm, isolated, keep, on_compile, stopped)
+            program, cached = _built(
+                device, key, text, flags, warm, isolated, keep, on_compile, stopped, what
+            )
         except BuildFailureError as failure:
             from clfractal.device.buildlog import build_error
 
@@ -186,6 +190,7 @@ def _built(
     keep: bool,
     on_compile: Callable[[str], None] | None,
     stopped: Callable[[], bool] | None,
+    what: str,
 ) -> tuple[Any, bool]:
     """The program, and whether the cache on the disk had it."""
     binary = cache.load_blob(key)
@@ -195,11 +200,12 @@ def _built(
             _note(key, binary)
             return program, True
         cache.drop_blob(key)
-    remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"compiling for {device.info.name}, once"))
+    doing = " ".join(filter(None, ("compiling", what, "for", device.info.name)))
+    remark = threading.Timer(_REMARK_SECONDS, _tell, (on_compile, f"{doing}, once"))
     remark.daemon = True
     remark.start()
     try:
-        with activity.doing(f"compiling for {device.info.name}"):
+        with activity.doing(doing):
             program, binary = _compile(device, text, flags, warm, isolated=isolated, stopped=stopped)
     finally:
         remark.cancel()

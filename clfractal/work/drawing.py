@@ -278,6 +278,7 @@ class Drawing:
                 on_compile=resources.on_compile,
                 stopped=lambda: ended.is_set() or (resources.token is not None and resources.token()),
                 waits=resources.waits,
+                what=text.name,
             )
 
         # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all. Those begin first

@@ -123,6 +123,7 @@ class Precompilation:
                 sources=text.sources,
                 warm=wanted.warm,
                 stopped=ended,
+                what=wanted.text.name,
             )
             return 1
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
+from clfractal.device import activity
 from clfractal.device.select import Device
 from clfractal.scene.light_paths import DirectLighting
 from clfractal.scene.lighting import DirectionalLight
@@ -133,3 +135,23 @@ def test_it_is_told(device: Device) -> None:
     assert overlay.state_lines(ui, frame) == []
     ui.show.clear()  # nothing lies over a picture that is shown alone
     assert overlay.state_lines(ui, drafted) == []
+
+
+@pytest.mark.parametrize(
+    ("progress", "doing", "told"),
+    [
+        (
+            "compiling rays for a device, once",
+            "compiling light for a device",
+            "compiling light for a device, 0 s",
+        ),
+        ("measuring a device, once", "writing out.png", "measuring a device, once"),
+        ("measuring a device, once", None, "measuring a device, once"),
+    ],
+)
+def test_what_a_picture_waits_for_is_told_with_its_time(progress: str, doing: str | None, told: str) -> None:
+    ui = make_ui(scene_of(BULB, *PATHS))[0]
+    ui.studio.session.progress = progress
+    with nullcontext() if doing is None else activity.doing(doing):
+        ((line, _),) = overlay.state_lines(ui, None)
+    assert line.split("  ", 1)[1] == told

@@ -7,6 +7,7 @@ import time
 
 from imgui_bundle import imgui
 
+from clfractal.device import activity
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -231,8 +232,16 @@ def state_lines(ui: Ui, frame: Frame | None) -> list[tuple[str, theme.Rgba]]:
         told.append((str(session.problem), theme.WARNING))
     if session.progress:
         turn = _SPINNER[int(time.perf_counter() * 8) % len(_SPINNER)]
-        told.append((f"{turn}  {session.progress}", theme.ACCENT))
+        told.append((f"{turn}  {_with_seconds(session.progress)}", theme.ACCENT))
     return told
+
+
+def _with_seconds(line: str) -> str:
+    """What takes long, and since when; of several programs that are compiled the one that was begun last."""
+    doing = activity.current()
+    if doing is None or doing.what.split()[0] != line.split()[0]:
+        return line
+    return f"{doing.what}, {time.monotonic() - doing.began:.0f} s"
 
 
 def _state(ui: Ui, left: float, bottom: float) -> None:
