@@ -1,4 +1,4 @@
-"""Makes the drawings of docs/stereo.md: docs/pictures/stereo_*.png, seen from above.
+"""Makes the drawings of docs/stereo.md, seen from above, and of docs/architecture.md: docs/pictures/*.png.
 
     python docs/make_drawings.py                    every drawing
     python docs/make_drawings.py stereo_parallax    one of them
@@ -280,11 +280,138 @@ def projectors() -> Drawing:
     return sheet
 
 
+# The rows of `stages`: each stage's kernel, with a question mark if only some scenes launch it, and what a march is after.
+_PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("once for a block of pixels", ("send_cones?", "march_rays? cones")),
+    ("each sample", ("begin_shots",)),
+    (
+        "each bounce: meet the surface",
+        (
+            "meet_objects?",
+            "find_faces?",
+            "march_rays surface",
+            "march_inside?",
+            "look_at_objects?",
+            "find_spots",
+        ),
+    ),
+    (
+        "or, by the points of a pixel",
+        (
+            "march_rays? near",
+            "send_points?",
+            "meet_objects?",
+            "march_rays? surface",
+            "look_at_objects?",
+            "join_points?",
+        ),
+    ),
+    ("what is seen there", ("color_spots?", "find_planes?", "add_glow?")),
+    ("direct light, mirrors", ("meet_objects?", "march_rays? lights", "light_spots?")),
+    (
+        "or light along paths",
+        (
+            "cross_media?",
+            "find_materials?",
+            "scatter_paths?",
+            "pass_clouds?",
+            "meet_objects?",
+            "march_rays? lights",
+            "gather_paths?",
+        ),
+    ),
+    (
+        "after the last bounce of a path",
+        ("meet_objects?", "march_rays? whether", "cross_media?", "end_paths?"),
+    ),
+)
+# Kernels that stand in the place of one that is drawn: for single lanes, and for glass that scatters light.
+_BESIDE = {
+    "march_rays": ("look_at_surfaces",),
+    "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
+}
+_ASK_FORMULA = ("march_rays", "march_inside", "color_spots", "add_glow", "find_faces", "find_planes")
+
+
+def drawn_kernels() -> set[str]:
+    """Every kernel that `stages` shows."""
+    drawn = {cell.split()[0].removesuffix("?") for _, row in _PLAIN for cell in row}
+    return drawn | {name for each in drawn for name in _BESIDE.get(each, ())}
+
+
+def stages() -> Drawing:
+    """The stages of a surface, row by row, and what they hand to each other."""
+    wide, tall, left, top, width, height = 1160, 880, 24.0, 66.0, 138.0, 40.0
+    sheet = Drawing(wide, tall)
+    sheet.text(
+        (left, 28),
+        "A launch of the surface renderer: rows from the top, stages from the left",
+        anchor="lm",
+        size=18,
+    )
+    for number, (title, cells) in enumerate(_PLAIN):
+        y = top + number * 76
+        sheet.text((left, y), title, PALE, anchor="lm", size=14)
+        for place, cell in enumerate(cells):
+            words = cell.split()
+            name, goal = words[0].removesuffix("?"), " ".join(words[1:])
+            x, color = left + place * (width + 22), THING if name in _ASK_FORMULA else LEFT
+            always = not words[0].endswith("?")
+            sheet.box((x, y + 13), (width, height), color, 0.30 if always else 0.08)
+            sheet.text((x + width / 2, y + 13 + height / 2), f"{name}\n{goal}" if goal else name, size=14)
+            if place:
+                sheet.arrow((x - 22, y + 13 + height / 2), (x - 2, y + 13 + height / 2), PALE)
+    # A path, or a mirror's ray, goes back to where surfaces are met.
+    back, again = 1142.0, top + 2 * 76
+    for row in (5, 6):
+        end = left + len(_PLAIN[row][1]) * (width + 22) - 22
+        sheet.line((end, top + row * 76 + 33), (back, top + row * 76 + 33), RIGHT)
+    sheet.line((back, top + 6 * 76 + 33), (back, again), RIGHT)
+    sheet.arrow((back, again), (left + 210, again), RIGHT)
+    sheet.text((back - 8, again - 14), "next bounce", RIGHT, anchor="rm", size=14)
+    low = top + len(_PLAIN) * 76 + 14
+    legend = ((0, THING, 0.3, "knows the formula"), (190, LEFT, 0.3, "knows none: one text for all scenes"))
+    for x, color, opacity, told in (*legend, (486, INK, 0.04, "pale: launched only by scenes that need it")):
+        sheet.box((left + x, low - 9), (26, 18), color, opacity)
+        sheet.text((left + x + 36, low), told, anchor="lm", size=14)
+    _queues(sheet, (left, low + 60), width, height)
+    return sheet
+
+
+def _queues(sheet: Drawing, corner: Point, width: float, height: float) -> None:
+    """What stages hand to each other: queues of rays and of what these met, and the state of each shot."""
+    x, y = corner
+    sheet.text((x, y - 18), "what they hand on", PALE, anchor="lm", size=14)
+    row = (
+        ("a stage sends", LEFT),
+        ("queue: rays\none a pixel, turn", RIGHT),
+        ("meet_objects\nends them there", LEFT),
+        ("a march", THING),
+        ("queue: what\nthey have met", RIGHT),
+        ("the next reads", LEFT),
+    )
+    for place, (told, color) in enumerate(row):
+        at = x + place * (width + 22)
+        sheet.box((at, y), (width, height), color, 0.15)
+        sheet.text((at + width / 2, y + height / 2), told, size=14)
+        if place:
+            sheet.arrow((at - 22, y + height / 2), (at - 2, y + height / 2), PALE)
+    last, under = x + 5 * (width + 22) + width / 2, y + height + 26
+    sheet.box((x + width / 2, under), (last - x - width / 2, 30), RIGHT, 0.15)
+    told = (
+        "state of each shot, from stage to stage: sighting, spot, path, tally, and what else the scene needs"
+    )
+    sheet.text(((x + width / 2 + last) / 2, under + 15), told, size=14)
+    for middle in (x + width / 2 + 12, last - 12):
+        sheet.arrow((middle, y + height), (middle, under), PALE, both=True)
+
+
 DRAWINGS: dict[str, Callable[[], Drawing]] = {
     "stereo_view": view,
     "stereo_parallax": parallax,
     "stereo_convergence": convergence,
     "stereo_projectors": projectors,
+    "stages": stages,
 }
 
 

@@ -18,7 +18,7 @@ __kernel void inside(__global const scalar *points, __global char *result, int s
         z[lane] = points[2 * stride + first + lane];
     }
     const vec point = vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
-    const orbit_end end = orbit_solid(point, equal(R(0.0), R(0.0)), orbit->iterations, orbit, k);
+    const orbit_end end = formula_end(point, equal(R(0.0), R(0.0)), orbit->iterations, orbit, k);
     lanes_store(pick(end.inside, R(1.0), R(0.0)), found);
     for (int lane = 0; lane < LANES; ++lane) result[first + lane] = found[lane] > S(0.5);
 }

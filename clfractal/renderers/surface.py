@@ -219,7 +219,7 @@ class _Program:
 
 
 # A scene needs those whose stages it launches.
-_PROGRAMS = (
+PROGRAMS = (
     _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines, formula=True),
     _Program("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
     _Program("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
@@ -261,7 +261,7 @@ def program_texts(scene: Scene, plan: Plan, *, all_stages: bool = False) -> list
     launched = {stage.kernel for stage in surface_stages(scene, plan, (0, 1))}
     defines = cache(lambda of: of(scene, plan))
     texts = []
-    for each in _PROGRAMS:
+    for each in PROGRAMS:
         if not all_stages and launched.isdisjoint(each.kernels):
             continue
         # All that there are: what is kept of a program has every kernel that any scene may launch.

@@ -10,8 +10,9 @@ import pytest
 from clfractal.device import program
 from clfractal.device.select import Device
 from clfractal.renderers import cut_plane, volume
-from clfractal.renderers.surface import program_texts
+from clfractal.renderers.surface import PROGRAMS, program_texts
 from clfractal.scene.model import Scene
+from tests.makers import maker
 from tests.render.shots import PERSPECTIVE, plan_of, scene_of, shoot_whole
 
 FORMULA = {"name": "mandelbulb", "iterations": 6}
@@ -311,6 +312,11 @@ def test_only_the_formulas_in_a_scene_are_text(join: str, device: Device) -> Non
     known = texts(scene(FORMULA, objects={"other": HAST}, **ASKING), device)
     assert texts(scene(FORMULA, objects=objects, **ASKING), device) == known
     assert known["rays"] != texts(scene(FORMULA, objects=JOINED["cut"], **ASKING), device)["rays"]
+
+
+def test_the_drawing_shows_every_stage() -> None:
+    drawn: set[str] = maker("make_drawings").drawn_kernels()
+    assert drawn == {kernel for each in PROGRAMS for kernel in each.kernels}
 
 
 # Features that still make texts of their own: none may join them.

@@ -246,7 +246,8 @@ class TestCost:
         monkeypatch.setattr(program, "_built", counted("built", program._built))
         monkeypatch.setattr(program, "build", watched)
         self.pair(stereo_scene(kind), device)
-        entry = "STAGE(march_rays)" if kind in ("surface", "planes") else f"kernel void {kind}("
+        entries = {"volume": "VOLUME(volume_", "cut_plane": "kernel void cut_plane("}
+        entry = entries.get(kind, "STAGE(march_rays)")
         pictures = [text for text in texts if entry in text]
         # (The second eye's is loaded when it is wanted, and need not be built.)
         assert len(pictures) == 1
