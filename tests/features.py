@@ -154,8 +154,6 @@ _SHINES = [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [1, 0.5, 0]}]
 _TINTS = [{"at": 0, "color": [1, 0, 0]}, {"at": 1, "color": [0, 0, 1]}]
 VOLUME: Mapping[str, Values] = {
     "formula": {name: {"formula": {"name": name}} for name in ("mandelbulb", "hast")},
-    "values": {"byte": {}, "float": {}},
-    "pools": {"one": {}, "three": {}},
     "transfer": {
         "level": {},
         "opacity": {"renderer": {"transfer": {"opacity": _STOPS}}},

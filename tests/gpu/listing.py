@@ -83,7 +83,6 @@ def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
     """The programs of a scene that has what is chosen of each feature."""
     scene = put_together(_scene(renderer), FEATURES[renderer], chosen)
     precision: Precision = "float64" if chosen["precision"] == "float64" else "float32"
-    values, pools = chosen.get("values", "byte"), 3 if chosen.get("pools") == "three" else 1
     name = " ".join(value for value in chosen.values() if value)
-    for part, text in programs.of_scene(load_scene(scene, folder=FOLDER), 1, precision, values, pools):
+    for part, text in programs.of_scene(load_scene(scene, folder=FOLDER), 1, precision):
         yield Listed(f"{part} {name}", precision, text)

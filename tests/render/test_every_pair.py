@@ -45,7 +45,7 @@ OF_SURFACES: Mapping[str, Values] = {
     "layers": {"": {}, "layers": {}},
 }
 OF_VOLUMES: Mapping[str, Values] = {
-    **{name: each for name, each in VOLUME.items() if name not in ("values", "pools")},
+    **VOLUME,
     "formula": FORMULAS,
     **{
         key: {value: {"renderer": {key: value}} for value in values}
