@@ -1,63 +1,9 @@
 // The stored part of a grid: bricks of 9 x 9 x 9 samples with their normals. One work-item takes one brick, or a part of it (ALONE).
 //
-// From the build besides what voxels_bricks.h needs: VALUE, the type of a stored value, and VALUE_BYTES; NORMALS, whether
-// normals are wanted; RADIUS of the low-pass filter before them, voxels.
+// From the build besides what voxels_bricks.h needs: RADIUS of the low-pass filter before normals, voxels.
 #include "structs.h"
 #include "voxels_bricks.h"
 
-// 0: no voxel of the brick, its ninth layer included, is in the solid; 1: all are, as a whole; 2: neither.
-__kernel void classify_bricks(__global uchar *classes, __global const ulong *bricks, int first, int count,
-                              __global const SAMPLE *samples, __global const int *numbers,
-                              __constant const struct Extent *extent) {
-    const size_t brick = (size_t)first + get_global_id(1);
-    if (brick >= count) return;
-    const near_bricks around = near_bricks_of(bricks[brick], numbers, extent);
-#if SOURCE == SOURCE_BITS
-    // For most bricks their own voxels are enough.
-    __global const uchar *bytes = samples + brick * 64;
-    uchar16 least = vload16(0, bytes), most = least;
-    for (int i = 1; i < 4; ++i) {
-        const uchar16 more = vload16(i, bytes);
-        least &= more;
-        most |= more;
-    }
-    const ulong2 some_set = as_ulong2(most), all_set = as_ulong2(least);
-    if ((some_set.x | some_set.y) != 0 && (all_set.x & all_set.y) != ~0ul) {
-        classes[brick] = 2;
-        return;
-    }
-#endif
-    neighbourhood n;
-    load_neighbourhood(&n, samples, &around, extent);
-    bool some = false, all = true;
-    for (int z = 0; z < BRICK_SIDE; ++z) {
-        for (int y = 0; y < BRICK_SIDE; ++y) {
-            const row r = row_at(&n, y, z);
-#if ALONE
-            for (n.own = 0; n.own < BRICK_SIDE; ++n.own) {
-                const float value = row_window(&r, 0);
-                some |= value != 0.0f;
-                all &= value >= (SOURCE == SOURCE_BITS ? 1.0f : extent->whole);
-            }
-#elif SOURCE == SOURCE_BITS
-            const uint own = (r >> VOXELS_BEFORE) & 0x1ff;
-            some |= own != 0;
-            all &= own == 0x1ff;
-#else
-            float nine[16];
-            vstore16(row_window(&r, 0), 0, nine);
-            for (int x = 0; x < BRICK_SIDE; ++x) {
-                some |= nine[x] != 0.0f;
-                all &= nine[x] >= extent->whole;
-            }
-#endif
-        }
-        if (some && !all) break;
-    }
-    classes[brick] = all ? 1 : some ? 2 : 0;
-}
-
-#if NORMALS
 // Weights of the binomial low-pass filter of RADIUS, and of the central difference after it, for voxels 1, 2, ... away (the
 // other side has the same, and the same negated): as differences of equal values they give exactly 0.
 #if RADIUS == 0
@@ -137,31 +83,36 @@ INLINE wide_uint packed_normal(wide gx, wide gy, wide gz, wide_uint alpha) {
     const wide unit = reciprocal_root(fmax(square, (wide)(0.5f)));
     return color_of(gx * unit) | color_of(gy * unit) << 8 | color_of(gz * unit) << 16 | alpha << 24;
 }
-#endif
 
-// A row's nine values, or the own one.
-INLINE void store_values(__global VALUE *out, wide row) {
-#if ALONE && VALUE_BYTES == 1
-    *out = convert_uchar(row);
-#elif ALONE
-    *out = row;
-#elif VALUE_BYTES == 1
-    vstore8(convert_uchar8(row.lo), 0, out);
-    out[8] = convert_uchar(row.s8);
+// A row's nine values, or the own one, from number `at` of floats or bytes on.
+INLINE void store_values(__global uchar *values, size_t at, int floats, wide row) {
+    __global float *to_floats = (__global float *)values + at;
+    __global uchar *to_bytes = values + at;
+#if ALONE
+    if (floats) {
+        *to_floats = row;
+    } else {
+        *to_bytes = convert_uchar(row);
+    }
 #else
-    vstore8(row.lo, 0, out);
-    out[8] = row.s8;
+    if (floats) {
+        vstore8(row.lo, 0, to_floats);
+        to_floats[8] = row.s8;
+    } else {
+        vstore8(convert_uchar8(row.lo), 0, to_bytes);
+        to_bytes[8] = convert_uchar(row.s8);
+    }
 #endif
 }
 
 // Where a brick's samples are stored, and which of its lines and columns this item stores.
 typedef struct {
-    __global VALUE *value;
+    __global uchar *values;
     __global uint *normal;
+    size_t start;   // of the brick's values
     int first_line, own;
 } brick_place;
 
-#if NORMALS
 INLINE void store_normal(__global uint *out, wide_uint packed) {
 #if ALONE
     *out = packed;
@@ -195,7 +146,8 @@ INLINE void store_samples(neighbourhood *n, brick_place at, __constant const str
             rows_x[SLOT(line)] = differed(window + REACH, 1);
             if (z >= 0 && z < BRICK_SIDE && y >= 0 && y < LINES) {
                 alpha[kept + (ALONE ? 0 : y)] = middle >= extent->opaque ? (wide_uint)(255u) : (wide_uint)(0u);
-                store_values(at.value + BRICK_SIDE * (BRICK_SIDE * z + at.first_line + y) + at.own, middle * extent->scale);
+                store_values(at.values, at.start + BRICK_SIDE * (BRICK_SIDE * z + at.first_line + y) + at.own, extent->floats,
+                             middle * extent->scale);
             }
         }
         for (int y = 0; y < LINES; ++y) {
@@ -219,19 +171,9 @@ INLINE void store_samples(neighbourhood *n, brick_place at, __constant const str
         }
     }
 }
-#else
-INLINE void store_samples(neighbourhood *n, brick_place at, __constant const struct Extent *extent) {
-    for (int z = 0; z < BRICK_SIDE; ++z) {
-        for (int y = at.first_line; y < at.first_line + LINES; ++y) {
-            const row r = row_at(n, y, z);
-            store_values(at.value + BRICK_SIDE * (BRICK_SIDE * z + y) + at.own, row_window(&r, 0) * extent->scale);
-        }
-    }
-}
-#endif
 
 // Values and normals of the bricks from `first` on, into slots from `slot` on.
-__kernel void store_bricks(__global VALUE *values, __global uint *normals, __global const ulong *bricks, int first, int count,
+__kernel void store_bricks(__global uchar *values, __global uint *normals, __global const ulong *bricks, int first, int count,
                            int slot, __global const SAMPLE *samples, __global const int *numbers,
                            __constant const struct Extent *extent) {
     const int brick = first + (int)get_global_id(1);
@@ -248,17 +190,14 @@ __kernel void store_bricks(__global VALUE *values, __global uint *normals, __glo
     first_line = item / BRICK_SIDE;
 #endif
     const size_t start = (size_t)(slot + brick) * BRICK_STRIDE;
-    __global VALUE *value = values + start;
-#if NORMALS
-    const brick_place at = {value, normals + start, first_line, own};
-#else
-    const brick_place at = {value, 0, first_line, own};
-#endif
+    const brick_place at = {values, normals + start, start, first_line, own};
     store_samples(&n, at, extent);
     for (int i = BRICK_SAMPLES; i < BRICK_STRIDE && own + first_line == 0; ++i) {
-        value[i] = 0;
-#if NORMALS
+        if (extent->floats) {
+            ((__global float *)values)[start + i] = 0.0f;
+        } else {
+            values[start + i] = 0;
+        }
         at.normal[i] = 0x00808080u;
-#endif
     }
 }

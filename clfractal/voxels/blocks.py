@@ -32,13 +32,19 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
         DeviceError: status 2 if there is no room, 3 if the device failed.
         KernelBuildError: the program does not compile.
     """
-    device = grid.device
-    built = build_all(device, [blocks_recipe(grid.kind)], on_compile)[0]
+    device, floats = grid.device, np.int32(grid.kind == "float")
+    built = build_all(device, [blocks_recipe()], on_compile)[0]
     blocks = device.buffer(BLOCK_BYTES * grid.parts.slots, "the table of visible blocks")
     for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
         with device.failures("checking the grid's bricks"):
             built.kernel.set_args(
-                blocks, values, np.int32(0), np.int32(after - first), np.int32(first), np.float32(unseen)
+                blocks,
+                values,
+                np.int32(0),
+                np.int32(after - first),
+                np.int32(first),
+                floats,
+                np.float32(unseen),
             )
         run_in_parts(
             device,
@@ -59,12 +65,14 @@ def brick_ranges(grid: Grid, on_compile: Callable[[str], None] | None = None) ->
         DeviceError: status 2 if there is no room, 3 if the device failed.
         KernelBuildError: the program does not compile.
     """
-    device = grid.device
-    built = build_all(device, [ranges_recipe(grid.kind)], on_compile)[0]
+    device, floats = grid.device, np.int32(grid.kind == "float")
+    built = build_all(device, [ranges_recipe()], on_compile)[0]
     ranges = device.buffer(RANGE_BYTES * grid.parts.slots, "the ranges of bricks")
     for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
         with device.failures("reading the grid's bricks"):
-            built.kernel.set_args(ranges, values, np.int32(0), np.int32(after - first), np.int32(first))
+            built.kernel.set_args(
+                ranges, values, np.int32(0), np.int32(after - first), np.int32(first), floats
+            )
         run_in_parts(
             device,
             built.kernel,

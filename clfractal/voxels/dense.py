@@ -130,13 +130,14 @@ class _Slabs:
         normal_radius: int,
     ) -> None:
         self.device, self.place, self.values = device, place, values
+        self.kind: Kind = "byte" if values.dtype == np.uint8 else "float"
         self.built, self.opaque, self.reach = built, opaque, normal_radius + 1
         self.layers = max(SLAB_BYTES // (BRICK * values[0].nbytes) - 2, 1)
 
     @staticmethod
     def recipe(device: Device, kind: Kind, normal_radius: int) -> programs.Recipe:
         alone = programs.takes_parts(device)
-        return programs.store_recipe("slab", kind, kind, normal_radius, alone=alone)
+        return programs.store_recipe("slab", kind, normal_radius, alone=alone)
 
     def store(
         self,
@@ -157,7 +158,7 @@ class _Slabs:
             slab = self.device.buffer(part.nbytes, "a slab of the grid", read_only=True)
             places = pack_places(x[place:after], y[place:after], z[place:after])
             bricks = self.device.buffer(places.nbytes, "places", read_only=True)
-            extent = extent_buffer(self.device, self.place, 1.0, np.inf, self.opaque, bottom)
+            extent = extent_buffer(self.device, self.place, self.kind, 1.0, np.inf, self.opaque, bottom)
             with self.device.failures("storing the grid"):
                 cl.enqueue_copy(self.device.queue, slab, part.reshape(-1))
                 cl.enqueue_copy(self.device.queue, bricks, places)

@@ -142,7 +142,7 @@ class _Filler:
         alone = programs.takes_parts(self.device)
         recipes = [
             programs.fill_recipe(body, renderer, self.lanes, self.precision),
-            programs.store_recipe(source, sample, renderer.store, renderer.normal_radius, alone=alone),
+            programs.store_recipe(source, sample, renderer.normal_radius, alone=alone),
         ]
         if octree:
             recipes.append(programs.nodes_recipe(body, self.lanes, self.precision))

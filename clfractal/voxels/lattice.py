@@ -42,6 +42,7 @@ EXTENT = Struct(
         Field("first_layer", "int", 0, "the grid's layer of voxels that a slab begins with"),
         Field("whole", "float", 0, "least value of a voxel that is inside as a whole"),
         Field("opaque", "float", 0, "least value of a voxel that counts as inside"),
+        Field("floats", "int", 0, "1: values are stored as floats; 0: as bytes"),
         Field("scale", "float", 0, "factor from a voxel's value to what is stored"),
         Field(
             "normal_x",

@@ -21,7 +21,7 @@ from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.solids import Body
-from clfractal.voxels.grid import SAMPLE_BYTES, Kind
+from clfractal.voxels.grid import Kind
 from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
 
 Source = Literal["bits", "bricks", "slab"]
@@ -171,15 +171,9 @@ def fill_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Pre
 def classify_recipe(source: Source, sample: Kind, *, alone: bool = False) -> Recipe:
     """`classify_bricks`: which bricks are outside or inside as a whole; `alone`: see `store_recipe`."""
     return Recipe(
-        "voxels_bricks.cl",
+        "voxels_classes.cl",
         "classify_bricks",
-        {
-            **_source_defines(source, sample, alone),
-            "NORMALS": 0,
-            "VALUE": "uchar",
-            "VALUE_BYTES": 1,
-            "RADIUS": 0,
-        },
+        {**_source_defines(source, sample, alone), "RADIUS": 0},
         "float32",
         {},
         1,
@@ -188,7 +182,7 @@ def classify_recipe(source: Source, sample: Kind, *, alone: bool = False) -> Rec
     )
 
 
-def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int, *, alone: bool = False) -> Recipe:
+def store_recipe(source: Source, sample: Kind, radius: int, *, alone: bool = False) -> Recipe:
     """`store_bricks`: samples and gradient normals of stored bricks.
 
     `alone`: a work-item takes one x and one y of a brick, for GPUs (`kernels/voxels_alone.h`); else a brick.
@@ -196,27 +190,22 @@ def store_recipe(source: Source, sample: Kind, kept: Kind, radius: int, *, alone
     items, group = (ALONE_ITEMS, ALONE_GROUP) if alone else (1, BRICK_GROUP)
     defines = {
         **_source_defines(source, sample, alone),
-        "NORMALS": 1,
-        "VALUE": C_TYPES[kept],
-        "VALUE_BYTES": SAMPLE_BYTES[kept],
         "RADIUS": radius,
     }
     arguments = (*[_BUFFER] * 3, _INT, _INT, _INT, *[_BUFFER] * 3)
     return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", {}, items, group, arguments)
 
 
-def blocks_recipe(kept: Kind) -> Recipe:
+def blocks_recipe() -> Recipe:
     """`seen_blocks`: which parts of stored bricks may be seen."""
-    defines: dict[str, object] = {"VALUE": C_TYPES[kept]}
-    arguments = (_BUFFER, _BUFFER, _INT, _INT, _INT, _FLOAT)
-    return Recipe("voxels_blocks.cl", "seen_blocks", defines, "float32", {}, 1, BRICK_GROUP, arguments)
+    arguments = (_BUFFER, _BUFFER, *[_INT] * 4, _FLOAT)
+    return Recipe("voxels_blocks.cl", "seen_blocks", {}, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
-def ranges_recipe(kept: Kind) -> Recipe:
+def ranges_recipe() -> Recipe:
     """`brick_ranges`: the least and the largest sample of stored bricks."""
-    defines: dict[str, object] = {"VALUE": C_TYPES[kept]}
-    arguments = (_BUFFER, _BUFFER, _INT, _INT, _INT)
-    return Recipe("voxels_blocks.cl", "brick_ranges", defines, "float32", {}, 1, BRICK_GROUP, arguments)
+    arguments = (_BUFFER, _BUFFER, *[_INT] * 4)
+    return Recipe("voxels_blocks.cl", "brick_ranges", {}, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
 def normals_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
@@ -248,7 +237,7 @@ def _turns(chains: Sequence[Chain]) -> dict[str, object]:
 
 
 def _sample_defines(sample: Kind) -> dict[str, object]:
-    return {"SAMPLE": C_TYPES[sample], "SAMPLE_BYTES": SAMPLE_BYTES[sample]}
+    return {"SAMPLE": C_TYPES[sample]}
 
 
 def _source_defines(source: Source, sample: Kind, alone: bool) -> dict[str, object]:

@@ -82,7 +82,7 @@ def store(
         DeviceError: status 2 if what is kept does not fit.
         Stopped: the token was set.
     """
-    extent = extent_buffer(device, lattice.place, evaluated.scale, evaluated.whole, evaluated.opaque)
+    extent = extent_buffer(device, lattice.place, kept, evaluated.scale, evaluated.whole, evaluated.opaque)
     count = len(evaluated.places)
     milliseconds = refining = 0.0
     within = (evaluated.at < np.array(lattice.bricks)).all(axis=1)
@@ -220,7 +220,13 @@ def _tell_from(tell: Callable[[str, int, int], None], stage: str, before: int, t
 
 
 def extent_buffer(
-    device: Device, place: GridPlace, scale: float, whole: float, opaque: float, first_layer: int = 0
+    device: Device,
+    place: GridPlace,
+    kept: Kind,
+    scale: float,
+    whole: float,
+    opaque: float,
+    first_layer: int = 0,
 ) -> cl.Buffer:
     """The struct of the kernels that store bricks, on the device."""
     # Of a length that is about 1 in voxels, whatever the scene's unit: only the gradient's direction matters.
@@ -233,6 +239,7 @@ def extent_buffer(
             "first_layer": first_layer,
             "whole": whole,
             "opaque": opaque,
+            "floats": int(kept == "float"),
             "scale": scale,
             **dict(zip(("normal_x", "normal_y", "normal_z"), across, strict=True)),
         },

@@ -95,7 +95,7 @@ def load_job(request: dict[str, Any]) -> None:
 def test_programs_that_store_bricks_can_be_loaded_again(build_in_child: Build, radius: int) -> None:
     """With vectors of 16 in calls of the library, PoCL 3.0 on a processor that it takes for one without AVX-512 writes a
     program that it cannot read again."""
-    recipe = programs.store_recipe("bits", "byte", "byte", radius)
+    recipe = programs.store_recipe("bits", "byte", radius)
     structs = {"structs.h": EXTENT.c_text()}
     text = flatten(recipe.entry, generated=structs, defines=recipe.defines).text
     build_in_child(text, recipe)

@@ -104,13 +104,13 @@ def of_grids(count: int, precision: Precision) -> Iterator[Named]:
             recipes += [
                 programs.classify_recipe("bits", "byte", alone=alone),
                 programs.classify_recipe("bricks", "float", alone=alone),
-                programs.store_recipe("bits", "byte", "byte", 0, alone=alone),
-                programs.store_recipe("bits", "byte", "byte", 1, alone=alone),
-                programs.store_recipe("bricks", "float", "float", 2, alone=alone),
-                programs.store_recipe("bricks", "byte", "byte", 4, alone=alone),
-                programs.store_recipe("slab", "float", "float", 1, alone=alone),
+                programs.store_recipe("bits", "byte", 0, alone=alone),
+                programs.store_recipe("bits", "byte", 1, alone=alone),
+                programs.store_recipe("bricks", "float", 2, alone=alone),
+                programs.store_recipe("bricks", "byte", 4, alone=alone),
+                programs.store_recipe("slab", "float", 1, alone=alone),
             ]
-        recipes += [programs.blocks_recipe("byte"), programs.blocks_recipe("float")]
+        recipes += [programs.blocks_recipe(), programs.ranges_recipe()]
     for recipe in recipes:
         yield f"{recipe.kernel} {_choices(recipe.defines)}".strip(), programs.program_text(recipe)
     for recipe in _joined_recipes(count, precision):
