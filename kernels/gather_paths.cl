@@ -24,11 +24,6 @@ STAGE(gather_paths) {
     const encounter answer = queue_met(s.q, 0, s.slot);
     tally_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
-    if (bounce == 0 && KEEPS(s, STATE_AIR)) {
-        const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-        const spot found = spot_kept(s, 0);
-        air_gather(s, &here.at, aim_kept(s), &found, 1, &cost, w);
-    }
     STATE_KEEP(s, cost, STATE_TALLY);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);

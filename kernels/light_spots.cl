@@ -8,7 +8,6 @@
 #include "light_places.h"
 #include "secondary.h"
 #include "fog.h"
-#include "air.h"
 #include "look.h"
 #include "lit.h"
 #include "shots.h"
@@ -25,10 +24,6 @@ STAGE(light_spots) {
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const vec direction = arrived.direction;
-    if (bounce == 0 && KEEPS(s, STATE_AIR)) {
-        const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-        air_gather(s, &here.at, a, &found, turns_for_light(w), &cost, w);
-    }
     path_meets_light(s, &so_far, &found, arrived, w);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {

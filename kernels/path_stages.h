@@ -8,7 +8,6 @@
 #include "light_places.h"
 #include "secondary.h"
 #include "fog.h"
-#include "air.h"
 #include "look.h"
 #include "lit.h"
 #include "shots.h"

@@ -6,7 +6,6 @@
 #include "light_places.h"
 #include "secondary.h"
 #include "fog.h"
-#include "air.h"
 
 // Keeps it, or the face of a cut before it, and sends the rays that bring its light. `r`: the ray that has met it.
 INLINE void spot_found(stage s, const packet_pixels *at, aim a, ray r, real on_path, spot found, sighting at_first, tally cost, int next_turns,
@@ -18,5 +17,4 @@ INLINE void spot_found(stage s, const packet_pixels *at, aim a, ray r, real on_p
     if (w.material->coloring == COLORING_RESIDUAL) found.quantity = found.residual;
     spot_keep(s, &found, s.bounce);
     send_for_light(s, at, &found, next_turns, w);
-    if (s.bounce == 0 && KEEPS(s, STATE_AIR)) air_send(s, at, a, &found, HAS(w, PATHS) ? 1 : next_turns, w);
 }

@@ -226,6 +226,7 @@ PROGRAMS = (
     _Program("spots", "find_spots.cl", ("find_spots",), state_defines),
     _Program("objects", "objects.cl", ("meet_objects", "look_at_objects"), state_defines),
     _Program("light", "light_spots.cl", ("light_spots",), state_defines),
+    _Program("air", "air_rays.cl", ("send_air", "gather_air"), state_defines),
     _Program("materials", "find_materials.cl", ("find_materials",), state_defines),
     _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
     _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),

@@ -203,14 +203,15 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         yield from of_objects(looked, turns + within)
         kernel = "join_points" if points > 1 and bounce == 0 else "find_spots"
         yield stage(kernel, turns, bounce=bounce, next_turns=after)
+        air, paths = air_turns(scene) if bounce == 0 else 0, isinstance(scene.lighting, PathLighting)
+        if air > 0:  # behind the rays for light
+            yield stage("send_air", next_turns=1 if paths else after)
         if asks_formula(scene):
             yield stage("color_spots", bounce=bounce)
-        paths = isinstance(scene.lighting, PathLighting)
         if scene.cut_planes and bounce == 0 and not paths:
             yield stage("find_planes")
         if scene.glow is not None:
             yield stage("add_glow", bounce=bounce)
-        air = air_turns(scene) if bounce == 0 else 0
         if paths:
             if has_media(scene):
                 yield stage("cross_media", 1, bounce=bounce)
@@ -223,11 +224,15 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
                 yield stage("find_planes")
             yield from of_objects(met, 1 + air)
             yield from _marched(marching, 1 + air, GOAL_SHADOW)
+            if air > 0:
+                yield stage("gather_air", 1 + air, next_turns=1)
             yield stage("gather_paths", 1 + air, bounce=bounce)
             continue
         if after + air > 0:
             yield from of_objects(met, after + air)
             yield from _marched(marching, after + air, GOAL_SHADOW)
+        if air > 0:
+            yield stage("gather_air", after + air, next_turns=after)
         yield stage("light_spots", after + air, bounce=bounce)
     if isinstance(scene.lighting, PathLighting):
         yield from of_objects(met, 1)

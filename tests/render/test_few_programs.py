@@ -33,7 +33,7 @@ FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "map": ({"environment": {"name": "studio", "rays": 2, "background": True}}, set()),
     "occlusion": ({"renderer": {"ambient_occlusion": {"rays": 2}}}, set()),
     "fog": ({"fog": {"density": 0.1, "height": 2}}, set()),
-    "shafts": ({"fog": {"density": 0.1, "scattering": {}}}, set()),
+    "shafts": ({"fog": {"density": 0.1, "scattering": {}}}, {"air"}),
     "mirror": ({"material": {"reflection": 0.5}}, set()),
     "noise": ({"renderer": {"samples": 64, "noise": 0.02}}, set()),
     "lens": ({"camera": {**PERSPECTIVE, "f_number": 2}}, set()),
