@@ -306,8 +306,8 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "join_points?",
         ),
     ),
-    ("what is seen there", ("color_spots?", "find_planes?", "add_glow?")),
-    ("direct light, mirrors", ("meet_objects?", "march_rays? lights", "light_spots?")),
+    ("what is seen there", ("send_air?", "color_spots?", "find_planes?", "add_glow?")),
+    ("direct light, mirrors", ("meet_objects?", "march_rays? lights", "gather_air?", "light_spots?")),
     (
         "or light along paths",
         (
@@ -317,6 +317,7 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "pass_clouds?",
             "meet_objects?",
             "march_rays? lights",
+            "gather_air?",
             "gather_paths?",
         ),
     ),
@@ -341,7 +342,7 @@ def drawn_kernels() -> set[str]:
 
 def stages() -> Drawing:
     """The stages of a surface, row by row, and what they hand to each other."""
-    wide, tall, left, top, width, height = 1160, 880, 24.0, 66.0, 138.0, 40.0
+    wide, tall, left, top, width, height = 1320, 880, 24.0, 66.0, 138.0, 40.0
     sheet = Drawing(wide, tall)
     sheet.text(
         (left, 28),
@@ -362,7 +363,7 @@ def stages() -> Drawing:
             if place:
                 sheet.arrow((x - 22, y + 13 + height / 2), (x - 2, y + 13 + height / 2), PALE)
     # A path, or a mirror's ray, goes back to where surfaces are met.
-    back, again = 1142.0, top + 2 * 76
+    back, again = 1302.0, top + 2 * 76
     for row in (5, 6):
         end = left + len(_PLAIN[row][1]) * (width + 22) - 22
         sheet.line((end, top + row * 76 + 33), (back, top + row * 76 + 33), RIGHT)
