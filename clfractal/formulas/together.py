@@ -20,6 +20,7 @@ _ASKED = (
     ("state", "apply_by", "int usual, int n, state z, state c", ""),
     ("state", "apply", "int n, state z, state c", ""),
     ("dual_state", "dual_apply_by", "int usual, int n, dual_state z, dual_state c", ""),
+    ("dual_state", "dual_apply", "int n, dual_state z, dual_state c", ""),
     ("real", "solid_distance", "state z", ""),
     ("dual", "dual_solid_distance", "dual_state z", ""),
 )

@@ -25,7 +25,7 @@ INLINE real whole_power(real x, int n) {
 INLINE real real_raised(real x, scalar n, int twice) {
     if (twice == 0 || (twice < 0 && (twice & 1))) return real_pow(x, (real)(n));
     if (twice == 1) return real_sqrt(x);
-    const real power = whole_power(x, abs(twice) >> 1);
+    const real power = whole_power(x, (twice < 0 ? -twice : twice) >> 1);
     if (twice & 1) return power * real_sqrt(x);
     return twice < 0 ? R(1.0) / power : power;
 }
@@ -67,7 +67,7 @@ INLINE complex_real inverse_where(complex_real w, int over) {
 INLINE complex_real complex_raised(real x, real y, scalar n, int twice) {
     if (twice == 0 || (twice & 1)) return turned(x, y, n);
     complex_real w = {x, y};
-    const int whole = abs(twice) >> 1;
+    const int whole = (twice < 0 ? -twice : twice) >> 1;
     for (int bit = second_bit(whole); bit != 0; bit >>= 1) {
         // (re + im)(re - im) cancels less than re^2 - im^2.
         const real re = (w.re + w.im) * (w.re - w.im), product = w.re * w.im, im = product + product;
@@ -86,7 +86,7 @@ INLINE complex_real complex_raised(real x, real y, scalar n, int twice) {
 INLINE complex_real complex_raised_root(real x, real square, real root, scalar n, int twice) {
     if (twice == 0 || (twice & 1)) return turned(x, root, n);
     real re = x, share = R(1.0);
-    const int whole = abs(twice) >> 1;
+    const int whole = (twice < 0 ? -twice : twice) >> 1;
     for (int bit = second_bit(whole); bit != 0; bit >>= 1) {
         const real squared = re * re - square * (share * share), product = re * share, doubled = product + product;
         if (whole & bit) {
