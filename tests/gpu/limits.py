@@ -30,14 +30,14 @@ LACKING = {
     r"asm|__asm__": "one maker's instructions",
     r"(?:__)?(?:constant|global|local)\b[^(),;{}*]*\w\[\w*\]\s*(?=[,)])": "Apple's compiler takes pointers, not arrays",
 }
-# A program that writes an image is chosen where the device has images, and the text says so.
+# A program that is given an image is chosen where the device has images.
 _IMAGES = (r"image\w+_t|(?:read|write)_image\w*", "a device may have no images")
-_TO_IMAGE = "#define TO_IMAGE 1"
+_GIVEN_IMAGE = re.compile(r"__kernel void \w+\([^{]*\bimage2d_t\b")
 
 
 def words(text: str, preprocessed: str) -> Iterator[str]:
     """Words that devices may lack, each with the reason, in a program's text as it is and after the preprocessor."""
-    lacking = LACKING if _TO_IMAGE in text else {**LACKING, _IMAGES[0]: _IMAGES[1]}
+    lacking = LACKING if _GIVEN_IMAGE.search(text) else {**LACKING, _IMAGES[0]: _IMAGES[1]}
     for pattern, reason in lacking.items():
         for word in sorted(set(re.findall(rf"\b(?:{pattern})(?!\w)", preprocessed))):
             yield f"{word}: {reason}"

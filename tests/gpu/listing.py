@@ -10,7 +10,7 @@ from clfractal.device.source import FlatText
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import points, trial
+from clfractal.renderers import points, surface, trial
 from clfractal.scene.load import load_scene
 from clfractal.solids import Body
 from tests.features import APART, FEATURES, OF_MEDIA, put_together
@@ -19,6 +19,10 @@ from tests.platforms import programs
 from tests.portability.pictures import FOLDER
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
+# Programs that know no formula: one text for all scenes, so their names have no features.
+_ALIKE = {each.name for each in surface.PROGRAMS if not each.formula} | {
+    *("volume_surface", "volume_medium", "volume_paths")
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,4 +89,4 @@ def _of_choice(renderer: str, chosen: Mapping[str, str]) -> Iterator[Listed]:
     precision: Precision = "float64" if chosen["precision"] == "float64" else "float32"
     name = " ".join(value for value in chosen.values() if value)
     for part, text in programs.of_scene(load_scene(scene, folder=FOLDER), 1, precision):
-        yield Listed(f"{part} {name}", precision, text)
+        yield Listed(f"{part} {precision if part in _ALIKE else name}", precision, text)
