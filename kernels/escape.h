@@ -39,9 +39,9 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
                 square = state_square(z);
                 count += pick(alive, R(1.0), R(0.0));
                 alive &= less_equal(square, radius_square);
-                if (smooth && !HAS_SHAPE) highest = fmax(highest, square);
+                if (!HAS_SHAPE && smooth) highest = fmax(highest, square);
             }
-            if (periodicity && !HAS_SHAPE) {
+            if (!HAS_SHAPE && periodicity) {
                 mask back = alive & same_bits(z.s0, kept.s0) & same_bits(z.s1, kept.s1) & same_bits(z.s2, kept.s2);
 #if STATE_SIZE > 3
                 back &= same_bits(z.s3, kept.s3);

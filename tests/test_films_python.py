@@ -98,9 +98,10 @@ def test_a_film_has_the_statistics_that_the_shell_writes(
     assert ended.status == 0, ended.err
     written = json.loads(stats.read_text())
     left, right = clfractal.render_pair(tmp_path / "s.yaml")
-    assert left.stats == right.stats
-    assert list(left.stats) == list(written)
     measured = {"build_ms", "kernel_ms", "write_ms", "wall_ms", "rays_per_second", "peak_memory_mb"}
+    # The process may need more memory by the time that the second one is told.
+    assert {**left.stats, "peak_memory_mb": 0} == {**right.stats, "peak_memory_mb": 0}
+    assert list(left.stats) == list(written)
     assert {key: value for key, value in left.stats.items() if key not in measured} == {
         key: value for key, value in written.items() if key not in measured
     }

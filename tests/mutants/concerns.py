@@ -73,7 +73,7 @@ clfractal/api.py: api stereo_python work/engine
 clfractal/device/c[ah]*: device/isolate device/cache work/cancel
 clfractal/device/*: device/ work/cancel
 clfractal/files/*: files/
-clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/live formulas/catalog
+clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/catalog
 clfractal/optics/*: render/view render/stereo_views render/surface_analytic
 clfractal/pictures/*: render/film render/film_store render/compose render/anaglyph render/paste render/compose_files
 clfractal/renderers/*: render/job_data render/program_text render/points render/surface_light render/volume_surface

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from clfractal.device import peak, probe, struct_layout
 from clfractal.device.source import FlatText, SourceMap
@@ -33,6 +34,7 @@ EVERY_KIND = ("still", "steps", "volumes", "cloud", "plane")
 def every_text(count: int, precision: Precision, pictures: Sequence[str] = PICTURES) -> Iterator[Named]:
     """Names and texts, with packets of `count` lanes."""
     yield from of_pictures(count, precision, pictures)
+    yield from of_more(count, precision)
     yield from of_others(count, precision)
 
 
@@ -40,7 +42,6 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
     """All that is no renderer: grids, lists of points, measurements of the device, the window."""
     yield from of_grids(count, precision)
     yield "probe", probe.program_text(count, precision)
-    yield "volume exact", _exact_normals(count, precision)
     for name in ("mandelbulb", "hast"):  # by a scalar rule, and by the Jacobian
         yield (
             f"march_probe {name}",
@@ -55,17 +56,31 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
             yield f"show {to_image=}", show.program_text(to_image=to_image)
 
 
-def _exact_normals(count: int, precision: Precision) -> FlatText:
-    """A surface in a grid with the formula's normals where rays meet it."""
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "hast"},
-            "camera": {"position": [0, -4, 1], "target": [0, 0, 0]},
-            "renderer": {"type": "volume", "normals": "exact"},
-        }
-    )
-    return volume.program_text(scene, make_plan(scene, precision=precision, lanes=count, channels=CHANNELS))
+# What none of the pictures has: exact normals of a grid, a grid along paths, and glass that is clear.
+_MORE: dict[str, dict[str, Any]] = {
+    "exact": {"renderer": {"type": "volume", "normals": "exact"}},
+    "lit": {
+        "renderer": {
+            "type": "volume",
+            "transfer": {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 1}]},
+        },
+        "lighting": {"mode": "path"},
+    },
+    "clear": {
+        "lighting": {"mode": "path"},
+        "materials": {"clear": {"transmission": {"weight": 1}}},
+        "material": {"name": "clear"},
+    },
+}
+
+
+def of_more(count: int, precision: Precision) -> Iterator[Named]:
+    """The programs of renderers that no picture has."""
+    camera = {"position": [0, -4, 1], "target": [0, 0, 0]}
+    for name, sections in _MORE.items():
+        scene = load_scene({"version": 1, "formula": {"name": "hast"}, "camera": camera, **sections})
+        for part, text in of_scene(scene, count, precision):
+            yield f"{part} {name}", text
 
 
 def of_pictures(count: int, precision: Precision, pictures: Sequence[str]) -> Iterator[Named]:
