@@ -57,7 +57,7 @@ class Body:
         Solids that are joined are a list that programs read. Of a scene with such solids only the formulas are text.
         """
         chains = self._chains
-        own = {"JOINED": int(self.scene is not None), **({} if turns is None else turns(chains))}
+        own = {} if turns is None else turns(chains)
         lines = "".join(f"#define {name} {value}\n" for name, value in own.items())
         text = write_formula(self.chain).text if self.scene is None else write_together(chains).text
         return {"formula.h": lines + text}

@@ -37,6 +37,21 @@ INLINE vec voxel_points(ulong place, int first, int4 sub_point, __global const s
     return vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
 }
 
+// The entry points of the fill, over the parts of bricks: all have the same arguments.
+// samples: of each brick its voxels, bits of them or values (see `keep_values`). `known`: two bytes of each brick, which of its octants
+// hold nothing, and which nothing else.
+#define FILL(name)                                                                                                               \
+    __kernel void name(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known, int floats, \
+                       float scale, __global const scalar *axes, __constant const struct Lattice *lattice,                        \
+                       __constant const struct Orbit *orbit, __constant const scalar *k)
+#define FILLED_BRICK ((size_t)first + get_global_id(1))
+#define FILLED_VOXEL ((int)get_global_id(0) * ITEM_VOXELS)
+
+// Whether a voxel's octant is known to hold nothing (which = 0), or nothing else (1).
+INLINE bool octant_is_known(__global const uchar *known, size_t brick, int voxel, int which) {
+    return ((known[2 * brick + which] >> (voxel / OCTANT_VOXELS)) & 1) != 0;
+}
+
 // Keeps the values of a packet from voxel `first` on: as floats, or as bytes that are `scale` times as large.
 INLINE void keep_values(__global uchar *samples, size_t brick, int first, real values, int floats, float scale) {
     scalar each[LANES];

@@ -10,12 +10,10 @@
 #include "solid_count.h"
 
 // As `cover_bricks`, but that all octants are looked at.
-__kernel void count_bricks(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known,
-                           int floats, float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
-                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+FILL(count_bricks) {
     if (orbit_cancelled(orbit)) return;
-    const size_t brick = (size_t)first + get_global_id(1);
-    const int item = (int)get_global_id(0) * ITEM_VOXELS;
+    const size_t brick = FILLED_BRICK;
+    const int item = FILLED_VOXEL;
     for (int part = 0; part < ITEM_VOXELS; part += LANES) {
         mask inside;
         const vec points = voxel_points(bricks[brick], item + part, (int4)(0), axes, lattice);

@@ -29,16 +29,12 @@ INLINE void packet_shares(ulong place, int first, real *shares, __global const s
     for (int p = 0; p < TURNS(PACKETS); ++p) shares[p] /= (real)((scalar)(n * n * n));
 }
 
-// samples: of each brick its voxels (see `keep_values`). `known`: see `fill_bricks`.
-__kernel void cover_bricks(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known,
-                           int floats, float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
-                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+FILL(cover_bricks) {
     if (orbit_cancelled(orbit)) return;
-    const size_t brick = (size_t)first + get_global_id(1);
-    const int item = (int)get_global_id(0) * ITEM_VOXELS;
+    const size_t brick = FILLED_BRICK;
+    const int item = FILLED_VOXEL;
     const ulong place = bricks[brick];
-    const int octant = item / OCTANT_VOXELS;
-    const bool empty = ((known[2 * brick] >> octant) & 1) != 0, full = ((known[2 * brick + 1] >> octant) & 1) != 0;
+    const bool empty = octant_is_known(known, brick, item, 0), full = octant_is_known(known, brick, item, 1);
     for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {
         real found[PACKETS];
         for (int p = 0; p < TURNS(PACKETS); ++p) found[p] = full ? R(1.0) : R(0.0);

@@ -8,17 +8,12 @@
 #include "solids.h"
 #include "voxels.h"
 
-// samples: of each brick a bit for each of its voxels. `known`: two bytes of each brick, which of its octants hold nothing, and which
-// nothing else.
-__kernel void fill_bricks(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known,
-                          int floats, float scale, __global const scalar *axes, __constant const struct Lattice *lattice,
-                          __constant const struct Orbit *orbit, __constant const scalar *k) {
+FILL(fill_bricks) {
     if (orbit_cancelled(orbit)) return;
-    const size_t brick = (size_t)first + get_global_id(1);
-    const int item = (int)get_global_id(0) * ITEM_VOXELS;
+    const size_t brick = FILLED_BRICK;
+    const int item = FILLED_VOXEL;
     const ulong place = bricks[brick];
-    const int octant = item / OCTANT_VOXELS;
-    const bool empty = ((known[2 * brick] >> octant) & 1) != 0, full = ((known[2 * brick + 1] >> octant) & 1) != 0;
+    const bool empty = octant_is_known(known, brick, item, 0), full = octant_is_known(known, brick, item, 1);
     uint bits = full ? 0xffffffffu : 0u;
     for (int part = 0; part < ITEM_VOXELS && !empty && !full; part += LANES * PACKETS) {
         vec points[PACKETS];

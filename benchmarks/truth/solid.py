@@ -60,7 +60,7 @@ class Solid:
             "formula.h": formula.text,
             "structs.h": struct_text(),
         }
-        defines = {"LANES": self.lanes, "REAL_IS_DOUBLE": 1, "JOINED": 0}
+        defines = {"LANES": self.lanes, "REAL_IS_DOUBLE": 1}
         text = flatten("inside.cl", generated=generated, defines=defines, user=["formula.h"])
         built = program.build(device, text.text, flags=program.math_flags("float64"), sources=text.sources)
         self._kernel = built.kernel("inside")

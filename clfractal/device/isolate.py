@@ -30,12 +30,6 @@ _FROM_OUTSIDE = frozenset(
     for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT", "SIGXCPU")
     if hasattr(signal, name)
 )
-# Signals that no driver ends a process by: other programs send them, and the system where memory or time is short.
-_FROM_OUTSIDE = frozenset(
-    int(getattr(signal, name))
-    for name in ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT", "SIGXCPU")
-    if hasattr(signal, name)
-)
 
 
 class DriverAbortedError(DeviceError):

@@ -28,6 +28,7 @@ class Facts:
     def text(self) -> str:
         """As defines."""
         return (
+            "#define JOINED 0\n"
             f"#define STATE_SIZE {self.size}\n"
             f"#define FIRST_COUNT {self.first_count}\n"
             f"#define LOGARITHMIC {int(self.logarithmic)}\n"

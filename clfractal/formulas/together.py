@@ -88,6 +88,7 @@ def _facts(each: list[Facts]) -> str:
     """The facts as defines: what is not the same of all formulas stands in the record of each."""
     first = each[0]
     values: dict[str, object] = {
+        "JOINED": 1,
         "STATE_SIZE": first.size,
         "FIRST_COUNT": first.first_count,
         "LOGARITHMIC": int(first.logarithmic),

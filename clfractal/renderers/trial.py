@@ -107,7 +107,6 @@ def program_text(formula: FormulaText, lanes: int, precision: Precision) -> Flat
         "POINTS": 1,
         "POLISH": 0,
         "FAR_BOUNDS": 0,
-        "JOINED": 0,
     }
     generated = {"structs.h": struct_text(), "formula.h": formula.text}
     return flatten("march_probe.cl", generated=generated, defines=defines)

@@ -59,7 +59,7 @@ def compile_text(
     flat = flatten(
         "batch.cl",
         generated={"batch.cl": text, "structs.h": struct_text()},
-        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "JOINED": 0},
+        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
     )
     return compiler.compile_source(device, flat.text, [*program.math_flags(precision), *flags])
 

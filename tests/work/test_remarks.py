@@ -57,6 +57,12 @@ def test_a_usual_picture_needs_no_remark(engine: Engine) -> None:
     assert Film().remarks == ()
 
 
+def test_a_key_without_an_effect(engine: Engine) -> None:
+    formula = {"name": "mandelbulb", "iterations": 3}
+    assert of(engine, formula) == ()
+    one(of(engine, {**formula, "live": ["power"]}), "formula.live has no effect")
+
+
 # The scenes whose programs other tests build anyway, of each renderer, with layouts and stereo; all were looked at.
 @pytest.mark.parametrize("name", ["mandelbulb", "cut_mandelbrot", "four_views", "stereo_hall"])
 def test_shipped_scenes_need_none(name: str) -> None:
