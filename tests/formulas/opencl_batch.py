@@ -40,8 +40,11 @@ def kernel_file(name: str) -> str:
 
 
 def numbered(text: str, number: int) -> str:
-    """The text with `_f<number>` after every name that it defines (but not after members, `light->color`)."""
-    names = {name for found in _DEFINED.findall(text) for name in found if name}
+    """The text with `_f<number>` after every name that it defines (but not after members, `light->color`).
+
+    JOINED stays as it is: all formulas of a batch stand alone, and headers that they share read it.
+    """
+    names = {name for found in _DEFINED.findall(text) for name in found if name} - {"JOINED"}
     pattern = rf"(?<!->)\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
     return re.sub(pattern, rf"\1_f{number}", text)
 
