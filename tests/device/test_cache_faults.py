@@ -31,18 +31,37 @@ from tests.shell import SCENE, Ended, command, environment, process
 SECTIONS = ("lanes", "marches", "speeds")
 
 
+SMALL = SCENE.replace("camera:", "renderer: {type: cut_plane}\ncamera:")
+"""A picture that takes one program."""
+
+
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the scene, its picture, and the cache after it."""
     folder = tmp_path_factory.mktemp("good")
-    (folder / "scene.yaml").write_text(SCENE)
+    rendered(folder, SMALL)
+    assert all((folder / "cache" / f"{section}.json").exists() for section in SECTIONS)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def several(good: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same of a scene that takes several programs."""
+    folder = tmp_path_factory.mktemp("several")
+    shutil.copytree(good / "cache", folder / "cache", ignore=shutil.ignore_patterns("programs"))
+    rendered(folder, SCENE)
+    assert len(list((folder / "cache" / "programs").iterdir())) >= 4
+    return folder
+
+
+def rendered(folder: Path, scene: str) -> None:
+    """Renders a scene of a folder, with the cache in it."""
+    (folder / "scene.yaml").write_text(scene)
     ended = process(
         ["render", "scene.yaml", "-o", "a.exr"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")}
     )
     assert ended.status == 0, ended
-    assert all((folder / "cache" / f"{section}.json").exists() for section in SECTIONS)
-    assert len(list((folder / "cache" / "programs").iterdir())) >= 2
-    return folder
+    assert list((folder / "cache" / "programs").iterdir())
 
 
 def again(good: Path, folder: Path) -> Ended:
@@ -68,7 +87,7 @@ def is_whole(cache_folder: Path, good: Path) -> bool:
             patch.setenv(cache.ENVIRONMENT_VARIABLE, str(each))
             blobs = [cache.load_blob(entry.stem) for entry in (each / "programs").glob("*.bin")]
             facts = {section: sorted(cache.recall(section)) for section in SECTIONS}
-            found.append((len(blobs) >= 2, all(blobs), facts))
+            found.append((bool(blobs), all(blobs), facts))
     return found[0] == found[1]
 
 
@@ -87,12 +106,23 @@ def _empty(path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [_flip, _cut, _empty], ids=["a bit flipped", "cut short", "empty"])
-def test_damaged_programs(good: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
+def test_a_damaged_program(good: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
     shutil.copytree(good / "cache", tmp_path / "cache")
     for entry in (tmp_path / "cache" / "programs").iterdir():
         damage(entry)
     assert again(good, tmp_path).err == ""
     assert is_whole(tmp_path / "cache", good)
+
+
+def test_damaged_programs(several: Path, tmp_path: Path) -> None:
+    shutil.copytree(several / "cache", tmp_path / "cache")
+    programs = tmp_path / "cache" / "programs"
+    names = sorted(path.name for path in programs.iterdir())
+    for name, damage in zip(names, [_flip, _cut, _empty] * len(names), strict=False):
+        damage(programs / name)
+    assert again(several, tmp_path).err == ""
+    assert is_whole(tmp_path / "cache", several)
+    assert len(list(programs.iterdir())) >= 3
 
 
 def test_damaged_facts(good: Path, tmp_path: Path) -> None:
@@ -131,7 +161,8 @@ def test_damaged_small_pictures(
     np.testing.assert_array_equal(thumbnails.load("a"), pixels)
 
 
-# In a name space of mounts: renders with a cache on a disk of some KB, then with room; tells how each ended.
+# In a name space of mounts: renders with a cache on a disk of some KB, where some facts may be known, then with room; tells
+# how each ended.
 FULL = """
 import json, subprocess, sys
 size, command = sys.argv[1], sys.argv[2:]
@@ -145,6 +176,7 @@ def run():
     return [ended.returncode, ended.stderr, sorted(kept.stdout.split())]
 
 mount("-t", "tmpfs", "-o", f"size={size}", "tmpfs")
+subprocess.run("cp known/* cache", shell=True, capture_output=True)
 told = [run()]
 mount("-o", "remount,size=64m")
 told += [run(), run()]
@@ -163,12 +195,16 @@ def _mounts() -> list[str] | None:
     return None
 
 
-@pytest.mark.parametrize("size", ["4k", "300k"])
-def test_a_full_disk(good: Path, tmp_path: Path, size: str) -> None:
+@pytest.mark.parametrize(("size", "known"), [("4k", ()), ("100k", SECTIONS)])
+def test_a_full_disk(good: Path, tmp_path: Path, size: str, known: tuple[str, ...]) -> None:
+    """On which there is no room for facts, or none for a program."""
     how = _mounts()
     if how is None:
         pytest.skip("this system lets nobody mount a small disk; writes that fail are tried beside it")
     (tmp_path / "cache").mkdir()
+    (tmp_path / "known").mkdir()
+    for section in known:
+        shutil.copy(good / "cache" / f"{section}.json", tmp_path / "known")
     render = [*command("render", good / "scene.yaml", "-o", "b.exr")]
     ended = subprocess.run(
         [*how, sys.executable, "-c", FULL, size, *render],

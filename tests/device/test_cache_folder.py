@@ -146,7 +146,7 @@ def test_no_temporary_folder_either(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 @posix
 def test_the_shell_tells_it(tmp_path: Path) -> None:
-    (tmp_path / "scene.yaml").write_text(SCENE)
+    (tmp_path / "scene.yaml").write_text(SCENE + "renderer: {type: cut_plane}\n")  # one program
     (tmp_path / "file").touch()
     own = {"HOME": str(tmp_path / "file"), "CLFRACTAL_LANES": "1"}
     whole = without(own, tmp_path / "tmp")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 from clfractal.device import peak, probe, struct_layout
@@ -32,10 +33,14 @@ EVERY_KIND = ("still", "steps", "volumes", "cloud", "plane")
 
 
 def every_text(count: int, precision: Precision, pictures: Sequence[str] = PICTURES) -> Iterator[Named]:
-    """Names and texts, with packets of `count` lanes."""
-    yield from of_pictures(count, precision, pictures)
-    yield from of_more(count, precision)
-    yield from of_others(count, precision)
+    """Names and texts, with packets of `count` lanes: each text once, since pictures share those that know no formula."""
+    told: set[str] = set()
+    for name, program in chain(
+        of_pictures(count, precision, pictures), of_more(count, precision), of_others(count, precision)
+    ):
+        if program.text not in told:
+            told.add(program.text)
+            yield name, program
 
 
 def of_others(count: int, precision: Precision) -> Iterator[Named]:

@@ -33,9 +33,12 @@ FORMULAS: Values = {
     name: {"formula": {"name": name, "iterations": 4}}
     for name in ("mandelbulb", "hast", "sierpinski_tetrahedron")
 }
+# Pixels that are done after four samples, after twelve, and between; more only take longer.
+NOISE: Values = {"": {}, "noise": {"renderer": {"noise": 0.02, "min_samples": 4, "samples": 12}}}
 OF_SURFACES: Mapping[str, Values] = {
     **SURFACE,
     "formula": FORMULAS,
+    "noise": NOISE,
     "light": {
         **SURFACE["light"],
         "small": {"lights": [{"type": "point", "position": [0, -9, 9], "angular_size": 3}]},
@@ -47,6 +50,7 @@ OF_SURFACES: Mapping[str, Values] = {
 OF_VOLUMES: Mapping[str, Values] = {
     **VOLUME,
     "formula": FORMULAS,
+    "noise": NOISE,
     **{
         key: {value: {"renderer": {key: value}} for value in values}
         for key, values in {
@@ -60,13 +64,13 @@ OF_VOLUMES: Mapping[str, Values] = {
 FEATURES: Mapping[str, Mapping[str, Values]] = {
     "surface": OF_SURFACES,
     "volume": OF_VOLUMES,
-    "cut_plane": {**CUT_PLANE, "formula": FORMULAS},
+    "cut_plane": {**CUT_PLANE, "formula": FORMULAS, "noise": NOISE},
 }
 _NUMBERS = st.floats(-1, 1, width=32)
 # What random scenes say beside their features.
 SECTIONS: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     "camera": st.builds(lambda x, y, z: {"position": [x, y - 3.2, z]}, _NUMBERS, _NUMBERS, _NUMBERS),
-    "renderer": st.builds(lambda count: {"samples": count}, st.integers(1, 3)),
+    "renderer": st.builds(lambda count: {"samples": count, "min_samples": None}, st.integers(1, 3)),
     "fog": st.builds(lambda part: {"density": abs(part) / 4}, _NUMBERS),
     "glow": st.builds(lambda part: {"intensity": abs(part)}, _NUMBERS),
 }
