@@ -3,9 +3,10 @@
 With `--all` an implementation that this user or machine may not have is a fault, too, and is not passed over.
 With `--brief` fewer pictures are rendered: those that differ in kind, as golden pictures show the formulas.
 
-Each implementation runs alone, in processes of its own: first the tests marked `conformance`, then the
-pictures of `pictures.py`; Oclgrind renders tiny ones and checks every access to memory. All pictures are then
-compared with those of the first implementation. Pictures that differ are left in `build/portability`.
+Each implementation has processes of its own: one for the tests marked `conformance`, others for the pictures of
+`pictures.py`; Oclgrind renders tiny ones and checks every access to memory. As many processes as there are cores work
+side by side, whatever they belong to, since most of the time goes into compilers that use one core each. All pictures
+are then compared with those of the first implementation. Pictures that differ are left in `build/portability`.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from subprocess import PIPE, STDOUT
 
 import numpy as np
 
@@ -32,7 +35,8 @@ from tests.portability.implementations import (
 )
 from tests.portability.pictures import PARTS
 
-_TIMEOUT_S = 600
+_TIMEOUT_S = 900
+_TELLING = threading.Lock()
 
 
 def main() -> int:
@@ -46,12 +50,7 @@ def main() -> int:
         return 2
     chosen = [each for each in IMPLEMENTATIONS if not wanted or each.name in wanted]
     WORKPLACE.mkdir(parents=True, exist_ok=True)
-    faults: dict[str, list[str]] = {}
-    for implementation in chosen:
-        start, before = time.monotonic(), _processor_seconds()
-        faults[implementation.name] = _examine(implementation, kind)
-        took, worked = time.monotonic() - start, _processor_seconds() - before
-        print(f"{implementation.name}: {took:.0f} s, {worked:.0f} s of a processor", flush=True)
+    faults = _examine(chosen, kind)
     for name, fault in _compare(chosen, (kind, "tiny")):
         faults[name].append(fault)
     print("\nimplementation  result")
@@ -60,62 +59,73 @@ def main() -> int:
     return 1 if any(faults.values()) else 0
 
 
-def _processor_seconds() -> float:
-    """Of all processes that have ended: what a run takes on an idle machine is seen on a busy one, too."""
-    times = os.times()
-    return times.children_user + times.children_system
+def _examine(chosen: Sequence[Implementation], kind: str) -> dict[str, list[str]]:
+    """What is wrong with each implementation by itself."""
+    faults: dict[str, list[str]] = {each.name: [] for each in chosen}
+    parts: list[tuple[Implementation, Part]] = []
+    for implementation in chosen:
+        try:
+            environment = implementation.environment(os.environ)
+        except NotAllowedError as error:
+            print(f"{implementation.name}: passed over: {error}", flush=True)
+            faults[implementation.name] += ["not allowed here"] if "--all" in sys.argv else []
+            continue
+        except MissingError as error:
+            print(f"{implementation.name}: {error}", flush=True)
+            faults[implementation.name].append("not there and not to be installed")
+            continue
+        environment.update(_oclgrind_checks(implementation))
+        parts += [(implementation, part) for part in _parts(implementation, environment, kind)]
+    # Those that take longest first: a core that is left with one at the end is waited for.
+    parts.sort(key=lambda each: each[0].minutes, reverse=True)
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        running = [(implementation, pool.submit(part)) for implementation, part in parts]
+        for implementation, found in running:
+            faults[implementation.name] += found.result()
+    return faults
 
 
-def _examine(implementation: Implementation, kind: str) -> list[str]:
-    """What is wrong with one implementation by itself."""
-    print(f"\n=== {implementation.name}", flush=True)
-    try:
-        environment = implementation.environment(os.environ)
-    except NotAllowedError as error:
-        print(f"passed over: {error}")
-        return ["not allowed here"] if "--all" in sys.argv else []
-    except MissingError as error:
-        print(error)
-        return ["not there and not to be installed"]
-    environment.update(_oclgrind_checks(implementation))
-    # Each in processes of its own.
-    wanted: list[Part] = [_conformance_faults]
-    wanted += [partial(_picture_faults, half=half, kind=kind) for half in (0, 1)]
-    # Most of the time goes into compiling, one core each. (The simulator's processes share a log.)
-    with ThreadPoolExecutor(1 if implementation.simulator else 2) as both:
-        parts = [
-            part.result() for part in [both.submit(part, implementation, environment) for part in wanted]
+def _parts(implementation: Implementation, environment: Mapping[str, str], kind: str) -> list[Part]:
+    """What can be done side by side."""
+    conformance = partial(_conformance_faults, implementation, environment)
+    if not implementation.simulator:
+        # Tiny ones are for the simulator, and what it is compared with.
+        kinds = (kind, "tiny") if implementation is IMPLEMENTATIONS[0] else (kind,)
+        pictures = [
+            partial(_picture_faults, implementation, environment, kind=each, part=part)
+            for each in kinds
+            for part in range(PARTS[each])
         ]
-    found = [fault for part in parts for fault in part]
-    if implementation.simulator:
-        found += _memory_faults(environment)
-    return found
+        return [*pictures, conformance]
+
+    # The simulator's processes share a log.
+    def one_after_the_other() -> list[str]:
+        found = conformance()
+        for part in range(PARTS["tiny"]):
+            found += _picture_faults(implementation, environment, kind="tiny", part=part)
+        return found + _memory_faults(environment)
+
+    return [one_after_the_other]
 
 
 def _conformance_faults(implementation: Implementation, environment: Mapping[str, str]) -> list[str]:
     tests = ["pytest", "-q", "-p", "no:cacheprovider", "-m", "conformance", *_tests(implementation)]
-    passed = _run(implementation.command(tests, environment), environment)
+    passed = _run(implementation, "conformance", implementation.command(tests, environment), environment)
     return [] if passed else ["conformance tests fail"]
 
 
 def _picture_faults(
-    implementation: Implementation, environment: Mapping[str, str], half: int, kind: str
+    implementation: Implementation, environment: Mapping[str, str], kind: str, part: int
 ) -> list[str]:
-    """Renders every other picture; compiling them one after the other would leave a core idle."""
-    found = []
-    # Tiny ones are for the simulator, and what it is compared with.
-    measure = (kind, "tiny") if implementation is IMPLEMENTATIONS[0] else (kind,)
-    for each in ("tiny",) if implementation.simulator else measure:
-        for part in range(PARTS[each])[half::2]:
-            pictures = _pictures(implementation, each, part)
-            pictures.unlink(missing_ok=True)
-            module = ["tests.portability.pictures", str(pictures), each, str(part), *implementation.left_out]
-            if not _run(implementation.command(module, environment), environment):
-                found.append(f"the {each} pictures fail")
-    return found
+    pictures = _pictures(implementation, kind, part)
+    pictures.unlink(missing_ok=True)
+    module = ["tests.portability.pictures", str(pictures), kind, str(part), *implementation.left_out]
+    command = implementation.command(module, environment)
+    rendered = _run(implementation, f"{kind} pictures, part {part}", command, environment)
+    return [] if rendered else [f"the {kind} pictures fail"]
 
 
-Part = Callable[[Implementation, Mapping[str, str]], list[str]]
+Part = Callable[[], list[str]]
 
 
 def _tests(implementation: Implementation) -> list[str]:
@@ -153,18 +163,30 @@ def _memory_faults(environment: Mapping[str, str]) -> list[str]:
     if text.strip():
         print(text[:4000])
         found.append("invalid use of memory")
-    _run([sys.executable, "-m", "tests.portability.canary"], environment)
+    canary = [sys.executable, "-m", "tests.portability.canary"]
+    subprocess.run(canary, env=environment, timeout=_TIMEOUT_S, check=False)
     if "Invalid write" not in (log.read_text() if log.exists() else ""):
         found.append("the memory checker finds nothing where something is")
     return found
 
 
-def _run(command: list[str], environment: Mapping[str, str]) -> bool:
+def _run(
+    implementation: Implementation, doing: str, command: list[str], environment: Mapping[str, str]
+) -> bool:
+    """Runs a command to its end, and then tells what it has printed, in one piece."""
+    start = time.monotonic()
     try:
-        return subprocess.run(command, env=environment, timeout=_TIMEOUT_S, check=False).returncode == 0
-    except subprocess.TimeoutExpired:
-        print(f"{' '.join(command)[:200]}: more than {_TIMEOUT_S} s")
-        return False
+        ended = subprocess.run(
+            command, env=environment, timeout=_TIMEOUT_S, check=False, stdout=PIPE, stderr=STDOUT
+        )
+        told, well = ended.stdout, ended.returncode == 0
+    except subprocess.TimeoutExpired as error:
+        told = (error.stdout or b"") + f"{' '.join(command)[:200]}: more than {_TIMEOUT_S} s\n".encode()
+        well = False
+    head = f"\n=== {implementation.name}, {doing}: {time.monotonic() - start:.0f} s\n"
+    with _TELLING:
+        print(head + told.decode(errors="replace"), end="", flush=True)
+    return well
 
 
 def _compare(chosen: list[Implementation], kinds: tuple[str, str]) -> list[tuple[str, str]]:

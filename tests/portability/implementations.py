@@ -52,6 +52,8 @@ class Implementation:
     variables: tuple[tuple[str, str], ...] = ()
     left_out: tuple[str, ...] = ()
     """Pictures whose programs its compiler does not end in any useful time."""
+    minutes: int = 1
+    """How long the longest part of its work takes, roughly."""
 
     def command(self, module: Sequence[str], environment: Mapping[str, str]) -> list[str]:
         """The command for `python -m MODULE...` on it."""
@@ -141,7 +143,7 @@ def _of_trixie(icd: str) -> Callable[[], str]:
 IMPLEMENTATIONS = (
     Implementation("pocl-wheel", "pthread", _wheel),
     Implementation("pocl-debian", "debian", _debian_pocl),
-    Implementation("intel", "Intel(R) OpenCL", _intel),
+    Implementation("intel", "Intel(R) OpenCL", _intel, minutes=9),
     Implementation("pocl-trixie", "Portable", _of_trixie("pocl.icd"), root=_trixie),
     # Of the devices that Mesa has, the processor.
     Implementation(

@@ -1,6 +1,6 @@
 """Small pictures that every implementation renders: `python -m tests.portability.pictures OUT KIND PART [LEFT_OUT ...]`.
 
-KIND is `full`, `brief` or `tiny`, PART is 0 or 1: every other picture (0 to 3 for `tiny`: every fourth). They reach what
+KIND is `full`, `brief` or `tiny`, PART says which process of a kind's (`PARTS`) this is. They reach what
 a compiler may get wrong: trigonometry and whole powers, folds, chains of branches, states of four numbers, the scalar
 derivative and the full Jacobian, shadows of both kinds of light, several samples; what stills add: the points of a pixel,
 the search by steps, every kind of ray, a lens and fog; a grid that is filled and shown as a cloud around a cut plane, and a
@@ -156,7 +156,8 @@ _TINY = ("mandelbulb", "hast", "mandelbox", "plane")
 FOLDER = Path(__file__).parent
 """Where the grid is that objects show."""
 SIZE, TINY_SIZE = (96, 72), (12, 8)
-# Processes that share a kind's pictures. The simulator's checker of memory takes a second picture's for the first one's.
+# Processes that share a kind's pictures: one for surfaces, which share the programs that know no formula, and one for the
+# others. The simulator's checker of memory takes a second picture's for the first one's.
 PARTS = {"full": 2, "brief": 2, "tiny": 4}
 
 
@@ -168,6 +169,14 @@ def cases(kind: str) -> Iterator[tuple[str, Precision]]:
     for name in _DOUBLE:
         if name in chosen and kind != "tiny":
             yield name, "float64"
+
+
+def cases_of(kind: str, part: int) -> list[tuple[str, Precision]]:
+    """Those of a process."""
+    every = list(cases(kind))
+    if kind == "tiny":
+        return every[part :: PARTS[kind]]
+    return [each for each in every if ("type:" in _RENDERERS.get(each[0], "")) == bool(part)]
 
 
 def picture(
@@ -220,7 +229,7 @@ def main() -> None:
     device = choose()
     print(device.info.name, "|", device.info.version, flush=True)
     rendered = {}
-    for name, precision in list(cases(kind))[part :: PARTS[kind]]:
+    for name, precision in cases_of(kind, part):
         if name in left_out:
             print("left out", name, precision, flush=True)
             continue

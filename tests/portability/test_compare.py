@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.portability.compare import LIMITS, Picture, difference
-from tests.portability.pictures import CHANNELS
+from tests.portability.pictures import CHANNELS, PARTS, cases, cases_of
 
 
 @pytest.fixture
@@ -63,3 +63,9 @@ def test_a_tiny_picture_may_differ_in_one_pixel(picture: Picture) -> None:
     tiny = picture[:, :8, -12:]
     assert difference(tiny, _changed(tiny, "R", 1 / 96, 0.5), "float32").fault == ""
     assert difference(tiny, _changed(tiny, "R", 2 / 96, 0.5), "float32").fault
+
+
+@pytest.mark.parametrize("kind", PARTS)
+def test_the_parts_have_every_picture_once(kind: str) -> None:
+    parts = [case for part in range(PARTS[kind]) for case in cases_of(kind, part)]
+    assert sorted(parts) == sorted(cases(kind))
