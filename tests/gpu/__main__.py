@@ -35,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     chosen = listing.unlike(listing.everything() if asked.all or asked.record else listing.paired())
     programs = [each for each in chosen if any(fnmatch.fnmatch(each.name, name) for name in asked.only)]
+    texts = _sums(found, programs, asked.jobs)
     if asked.known:
         recorded = {name.split(" | ")[0] for name in known.figures}
         fresh = [each.name for each in programs if each.name not in recorded]
@@ -44,13 +45,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     if not programs:
         return _wrong(f"no program is called {' or '.join(asked.only)}")
+    if asked.known:
+        changed = [each for each in programs if texts[each.name] != known.texts.get(each.name)]
+        print(f"{len(programs) - len(changed)} programs are what they were when their figures were recorded")
+        programs = changed
     print(f"{len(programs)} programs with {_said(found.versions)}", flush=True)
     measured, failures = compiled(found, programs, asked.jobs)
     if asked.record and not failures:
         # Programs that were not asked for stay on record; those that there are no more do not.
         still = {each.name for each in chosen} - {each.name for each in programs}
         kept = {name: by_gpu for name, by_gpu in known.figures.items() if name.split(" | ")[0] in still}
-        made = record.Record(found.versions, {**kept, **measured})
+        kept_texts = {name: text for name, text in known.texts.items() if name in still}
+        made = record.Record(found.versions, {**kept, **measured}, {**kept_texts, **texts})
         record.save(made)
         page = table.into_page(table.PAGE.read_text(encoding="utf-8"), table.markdown(made.figures))
         table.PAGE.write_text(page, encoding="utf-8", newline="\n")
@@ -69,7 +75,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _asked(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="make gpu-check", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--all", action="store_true", help="every program, not only each pair of features")
-    parser.add_argument("--known", action="store_true", help="only programs that are on record")
+    parser.add_argument(
+        "--known", action="store_true", help="only programs that are on record, and whose texts have changed"
+    )
     parser.add_argument("--record", action="store_true", help="compile all, and put the figures on record")
     parser.add_argument(
         "--only", nargs="+", default=["*"], metavar="NAME", help="programs of such names: 'march *'"
@@ -85,6 +93,19 @@ def _said(versions: Mapping[str, str]) -> str:
 def _wrong(message: str) -> int:
     print(f"gpu-check: {message}", file=sys.stderr)
     return 2
+
+
+def _sums(found: Compilers, programs: Sequence[Listed], jobs: int) -> dict[str, str]:
+    """What the texts of programs are known by; empty for one that cannot be read, which is told when it is compiled."""
+
+    def one(listed: Listed) -> str:
+        try:
+            return record.sum_of(compilers.shown(found, listed.text.text, listed.precision))
+        except RejectedError:
+            return ""
+
+    with ThreadPoolExecutor(jobs) as pool:
+        return dict(zip((each.name for each in programs), pool.map(one, programs), strict=True))
 
 
 def compiled(

@@ -95,16 +95,22 @@ def _version(program: str, pattern: str) -> str:
     return found[1] if found else "unknown"
 
 
+def shown(compilers: Compilers, text: str, precision: Precision) -> str:
+    """What a compiler sees of a program: without comments, and macros put in. Two that look the same have the same figures.
+
+    Raises:
+        RejectedError: the text cannot be read.
+    """
+    return _made(compilers, text, precision, "-E", "-P", "-target", "spir64-unknown-unknown", declared=False)
+
+
 def measured(compilers: Compilers, text: str, precision: Precision) -> dict[str, dict[str, Figures]]:
     """What each kernel of a program needs, by kernel and by GPU; nothing of a program with images, which cannot be linked.
 
     Raises:
         RejectedError: it does not compile for one of the GPUs, or is not for every device (see `limits`).
     """
-    preprocessed = _made(
-        compilers, text, precision, "-E", "-P", "-target", "spir64-unknown-unknown", declared=False
-    )
-    problems = list(limits.words(text, preprocessed))
+    problems = list(limits.words(text, shown(compilers, text, precision)))
     result: dict[str, dict[str, Figures]] = {}
     # One text in NVIDIA's assembly serves both of its GPUs, as it does when a driver compiles what it has kept.
     ptx = _made(compilers, text, precision, *_NVIDIA, *_linked(compilers, "NVIDIA"))

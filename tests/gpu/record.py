@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 
 from tests.gpu.figures import Figures
 
 PATH = Path(__file__).with_name("record.json")
+_ASKING = tuple(Path(__file__).with_name(f"{name}.py") for name in ("compilers", "figures", "limits"))
 
 Measured = Mapping[str, Mapping[str, Figures]]
 """Figures by `program | kernel`, then by GPU."""
@@ -17,10 +19,22 @@ Measured = Mapping[str, Mapping[str, Figures]]
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Figures, and the versions of the compilers that they come from."""
+    """Figures, and the versions of the compilers that they come from.
+
+    Attributes:
+        texts: by program, a sum of what the compilers saw of it.
+    """
 
     versions: Mapping[str, str]
     figures: Measured
+    texts: Mapping[str, str] = field(default_factory=dict)
+
+
+def sum_of(shown: str) -> str:
+    """Of a program as a compiler sees it but for empty lines, and of how it is compiled and what is asked of it."""
+    lines = "\n".join(line for line in shown.splitlines() if line.strip())
+    asking = [path.read_bytes() for path in _ASKING]
+    return hashlib.sha256(b"\0".join([lines.encode(), *asking])).hexdigest()[:16]
 
 
 def load(path: Path = PATH) -> Record:
@@ -32,7 +46,7 @@ def load(path: Path = PATH) -> Record:
         name: {gpu: Figures(*numbers) for gpu, numbers in by_gpu.items()}
         for name, by_gpu in read["figures"].items()
     }
-    return Record(read["compilers"], figures)
+    return Record(read["compilers"], figures, read.get("texts", {}))
 
 
 def save(record: Record, path: Path = PATH) -> None:
@@ -41,8 +55,14 @@ def save(record: Record, path: Path = PATH) -> None:
         f"  {json.dumps(name)}: {json.dumps({gpu: list(astuple(figures)) for gpu, figures in by_gpu.items()})}"
         for name, by_gpu in sorted(record.figures.items())
     ]
+    texts = [f"  {json.dumps(name)}: {json.dumps(text)}" for name, text in sorted(record.texts.items())]
     head = json.dumps({"compilers": dict(record.versions)})[:-1]
-    path.write_text(head + ', "figures": {\n' + ",\n".join(lines) + "\n}}\n", encoding="utf-8", newline="\n")
+    parts = [
+        head,
+        '"texts": {\n' + ",\n".join(texts) + "\n}",
+        '"figures": {\n' + ",\n".join(lines) + "\n}}\n",
+    ]
+    path.write_text(", ".join(parts), encoding="utf-8", newline="\n")
 
 
 def worse(measured: Measured, record: Record) -> Iterator[str]:

@@ -135,7 +135,20 @@ def test_recording_some_programs_keeps_the_others_that_there_are(
     assert set(new.figures) == set(old.figures)
     assert new.figures["small float32 | small"]["sm_75"].registers < 255
     assert new.figures["small float64 | small"]["sm_75"].registers == 255
+    assert new.texts == {"small float32": record.sum_of(compilers.shown(found(), SMALL, "float32"))}
     assert "| `small` | float64 | 1 | 255, 8 warps |" in page.read_text(encoding="utf-8")
+
+
+def test_known_programs_are_compiled_when_their_text_has_changed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    same = record.sum_of(compilers.shown(found(), "// A remark.\n" + SMALL, "float32"))
+    texts = {"small float32": same, "small float64": record.sum_of("another")}
+    assert run(monkeypatch, replace(known(1), texts=texts), "--known") == 1
+    said = capsys.readouterr()
+    assert "1 programs are what they were" in said.out
+    assert said.err.count("small float64 | small: ") == len(GPUS)
+    assert "float32" not in said.err
 
 
 def test_without_compilers_it_says_what_to_install(

@@ -16,6 +16,7 @@ KNOWN = Record(
         "march hast float32 | march": {"sm_75": Figures(96), "gfx1030": Figures(85)},
         "surface still float32 | surface": {"sm_75": Figures(192, 952), "gfx1030": Figures(183, 960)},
     },
+    {"march hast float32": "0123456789abcdef"},
 )
 
 
