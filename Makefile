@@ -63,11 +63,15 @@ light: $(VENV)/.tested-with $(STAGE)/.linked
 combinations: $(VENV)/.tested-with $(STAGE)/.linked
 	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest --ignore=tests/window --ignore=tests/cluster -m combination $(PARALLEL) $(ARGUMENTS)
 
-# Windows show what they show in time only if nothing else keeps the cores busy: so one test at a time. A screen, a window
-# manager and a hand on the mouse are programs of their own, so what fails is tried once more before it counts.
+# A window waits for its user, and for a while in which nothing changes: two at a time, each file on screens of its own. Where
+# seconds count it has the cores to itself (`quiet`). A screen, a window manager and a hand on the mouse are programs
+# of their own, so what fails is tried once more before it counts.
+WINDOWS = $(BIN)/python -P -m pytest tests/window
 window: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && export CLFRACTAL_EXPECT_INSTALLED=1 && { $(BIN)/python -P -m pytest tests/window $(ARGUMENTS) \
-		|| { echo "once more, what has failed:"; $(BIN)/python -P -m pytest tests/window --last-failed $(ARGUMENTS); }; }
+	cd $(STAGE) && export CLFRACTAL_EXPECT_INSTALLED=1 && status=0 && { \
+		$(WINDOWS) -m "not quiet" -n 2 --dist loadfile $(ARGUMENTS) || test $$? = 5 || status=1; \
+		$(WINDOWS) -m quiet $(ARGUMENTS) || test $$? = 5 || status=1; } \
+		&& { test $$status = 0 || { echo "once more, what has failed:"; $(WINDOWS) --last-failed $(ARGUMENTS); }; }
 
 # Real processes that share the cores: one test at a time.
 cluster: $(VENV)/.cluster $(STAGE)/.linked

@@ -5,10 +5,14 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
+import pytest
+
 from tests.window.display import Display
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SURFACE
 from tests.window.test_sliders import changes, seen
+
+pytestmark = pytest.mark.quiet
 
 PATHS = SURFACE.replace(
     "material: {ambient: 0.02, diffuse: 0.9, specular: 0.3, shininess: 35}",

@@ -13,6 +13,8 @@ from tests.window.display import Display
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SURFACE
 
+pytestmark = pytest.mark.quiet
+
 PLAIN = ("--size", "480x320", "--no-panels")
 # What one answer may take on a loaded machine; the promise, half a second, the fastest of three has to keep.
 LIMIT_SECONDS, PROMISE_SECONDS = 1.5, 0.5

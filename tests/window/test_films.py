@@ -6,10 +6,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from clfractal.viewer.panels import menu, theme
 from tests.window.display import Display
 from tests.window.driver import Window, wait_for
+
+pytestmark = pytest.mark.quiet
 
 SIZE = (900, 640)
 FILM = """version: 1

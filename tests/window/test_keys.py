@@ -14,6 +14,8 @@ from tests.window.display import Display, needed
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SPHERE
 
+pytestmark = pytest.mark.quiet
+
 # Where W and Q are on a keyboard of any layout, as X numbers places.
 PLACE_W, PLACE_A, PLACE_6 = "25", "38", "15"
 

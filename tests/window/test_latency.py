@@ -23,6 +23,8 @@ LATENCY_MS, FRAMES, PANELS_MS = 10 * 100, 30 / 10, 10 * 33
 CHILD = """
 import json, sys
 from benchmarks.window import measure
+
+pytestmark = pytest.mark.quiet
 found = measure("row", sys.argv[1], sys.argv[2:], size=(1280, 720), seconds=3.0, singles=6, device="pthread")
 print(json.dumps({**found.figures(), "inputs": len(found.stream)}))
 """

@@ -14,6 +14,8 @@ from tests.window.display import Display
 from tests.window.driver import LEFT, RIGHT, Window
 from tests.window.scenes import SPHERE
 
+pytestmark = pytest.mark.quiet
+
 WIDTH, HEIGHT = 480, 360
 START = (200.0, 150.0)
 WHEEL = 0.88  # factor of the distance for a step of the wheel

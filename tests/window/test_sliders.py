@@ -14,6 +14,8 @@ from tests.window.display import Display, Pixels
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SURFACE
 
+pytestmark = pytest.mark.quiet
+
 BOX = SURFACE.replace("mandelbulb, iterations: 7", "mandelbox, iterations: 8").replace(
     "[1.25, -2.05, 0.85]", "[6, -14, 7]"
 )

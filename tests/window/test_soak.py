@@ -6,8 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.shell import environment
 from tests.window.display import Display
+
+pytestmark = pytest.mark.quiet
 
 ROOT = Path(__file__).absolute().parents[2]  # not resolved: tests of the installed package are linked to
 
